@@ -1,0 +1,95 @@
+//! The measured response itself: frequencies, complex values, and how uncertain each one is.
+
+use nalgebra::Complex;
+use thiserror::Error;
+
+/// A frequency response on an ascending grid.
+///
+/// * `w_rad_s`: angular frequencies, strictly ascending, positive, finite (rad/s)
+/// * `value`: position over command at each frequency (position_unit / command_unit), not zero, finite
+/// * `relative_std`: standard deviation of each value divided by its magnitude, where the file carries it
+///
+/// The fields are private so that the promise of the first two lines holds for every `Frf`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frf {
+    w_rad_s: Vec<f64>,
+    value: Vec<Complex<f64>>,
+    relative_std: Option<Vec<f64>>,
+}
+
+/// Why numbers do not make a frequency response.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[allow(missing_docs, reason = "each field is named in the message")]
+pub enum FrfShapeError {
+    /// The columns differ in length.
+    #[error("a response needs columns of one length: {frequencies} frequencies, {values} values")]
+    Length { frequencies: usize, values: usize },
+    /// There is nothing in it.
+    #[error("a response needs at least one point")]
+    Empty,
+    /// A frequency is not positive and finite, or not above the one before it.
+    #[error("point {index}: frequency {found_hz} Hz; expected finite, positive and above the point before")]
+    Frequency { index: usize, found_hz: f64 },
+    /// A value is zero or not finite.
+    #[error("point {index} at {at_hz} Hz: the response is zero or not finite")]
+    Value { index: usize, at_hz: f64 },
+    /// A standard deviation is negative or not finite.
+    #[error("point {index} at {at_hz} Hz: the standard deviation is negative or not finite")]
+    Deviation { index: usize, at_hz: f64 },
+}
+
+impl Frf {
+    /// A response from its columns; see the struct for shapes and units.
+    pub fn new(
+        w_rad_s: Vec<f64>,
+        value: Vec<Complex<f64>>,
+        relative_std: Option<Vec<f64>>,
+    ) -> Result<Self, FrfShapeError> {
+        let deviations = relative_std.as_ref().map_or(value.len(), Vec::len);
+        if w_rad_s.len() != value.len() || deviations != value.len() {
+            return Err(FrfShapeError::Length { frequencies: w_rad_s.len(), values: value.len().min(deviations) });
+        }
+        if w_rad_s.is_empty() {
+            return Err(FrfShapeError::Empty);
+        }
+        let mut before = 0.0;
+        for (index, (&w, v)) in w_rad_s.iter().zip(&value).enumerate() {
+            let at_hz = w / std::f64::consts::TAU;
+            if !w.is_finite() || w <= before {
+                return Err(FrfShapeError::Frequency { index, found_hz: at_hz });
+            }
+            let size = v.norm();
+            if !size.is_finite() || size == 0.0 {
+                return Err(FrfShapeError::Value { index, at_hz });
+            }
+            if let Some(s) = relative_std.as_ref().map(|s| s[index])
+                && (!s.is_finite() || s < 0.0)
+            {
+                return Err(FrfShapeError::Deviation { index, at_hz });
+            }
+            before = w;
+        }
+        Ok(Frf { w_rad_s, value, relative_std })
+    }
+
+    /// Angular frequencies, ascending (rad/s).
+    pub fn w_rad_s(&self) -> &[f64] {
+        &self.w_rad_s
+    }
+
+    /// Complex response at each frequency.
+    pub fn value(&self) -> &[Complex<f64>] {
+        &self.value
+    }
+
+    /// Relative standard deviation of each value, where known.
+    pub fn relative_std(&self) -> Option<&[f64]> {
+        self.relative_std.as_deref()
+    }
+
+    /// Number of points, at least one.
+    #[allow(clippy::len_without_is_empty, reason = "a response is never empty")]
+    pub fn len(&self) -> usize {
+        self.value.len()
+    }
+}

@@ -1,0 +1,3 @@
+//! The `servotune` program; everything it does lives in [`servotune`].
+
+fn main() {}
