@@ -5,4 +5,7 @@
 
 pub mod units;
 
+pub mod document;
+
 pub mod frf;
+pub mod lti;

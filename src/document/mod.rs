@@ -1,0 +1,13 @@
+//! Documents on disk: a TOML text into a struct with a located error, whole-file writing, digests.
+//!
+//! In: paths and texts. Out: values, or an error that names file, line, column and what was expected.
+//! No control meaning lives here; the rooms define what stands in their files. Files: `../shared/contract.md` is
+//! restated in `specs/files.md`.
+
+mod digest;
+mod read;
+mod write;
+
+pub use digest::sha256_hex;
+pub use read::{DocumentError, parse_toml, read_text, read_toml};
+pub use write::{write_text, write_whole};

@@ -1,0 +1,30 @@
+//! Writing whole files: a temporary name beside the target, flushed to disk, then renamed over it.
+
+use super::DocumentError;
+use std::io::Write;
+use std::path::Path;
+
+/// Writes `bytes` so that the file is either the old one or the new one, never a part of either.
+pub fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), DocumentError> {
+    let fail = |action| move |source| DocumentError::Io { file: file.into(), action, source };
+    let folder = match file.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    };
+    std::fs::create_dir_all(folder).map_err(fail("make the folder of"))?;
+    let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let temporary = folder.join(format!(".{name}.{}.part", std::process::id()));
+    let written = std::fs::File::create(&temporary)
+        .and_then(|mut f| f.write_all(bytes).and_then(|()| f.sync_all()))
+        .and_then(|()| std::fs::rename(&temporary, file));
+    written.map_err(|source| {
+        // The half-written file is of no use to anybody; the error that matters is the one being reported.
+        let _ = std::fs::remove_file(&temporary);
+        fail("write")(source)
+    })
+}
+
+/// [`write_whole`] for text.
+pub fn write_text(file: &Path, text: &str) -> Result<(), DocumentError> {
+    write_whole(file, text.as_bytes())
+}

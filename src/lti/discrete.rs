@@ -1,0 +1,209 @@
+//! The plant as the digital controller sees it: zero-order hold and fractional delay, exact, in modal form.
+//!
+//! With delay = D T + δ, 0 <= δ < T, the command held over a sample reaches the modes δ late. For one pole p
+//!   x[k+1] = e^{pT} x[k] + φ(T-δ) u[k-D] + e^{p(T-δ)} φ(δ) u[k-D-1],   φ(h) = (e^{ph} - 1)/p,
+//! which is the modified z-transform (Åström & Wittenmark, Computer-Controlled Systems, ch. 2), eq. (31)'s counterpart.
+
+use super::{FrequencyResponse, LtiError, ModalForm, Plant};
+use nalgebra::Complex;
+
+/// Longest delay taken (samples): a guard against a delay typed in the wrong unit.
+const DELAY_LIMIT: usize = 1000;
+
+/// The exactly sampled plant. Arrays hold one entry per term; a complex pole stands for itself and its conjugate.
+///
+/// The states carry their residues, so that the position is the plain sum of their real parts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiscretePlant {
+    pub(super) sample_time_s: f64,
+    /// Whole samples of delay, D.
+    pub(super) whole: usize,
+    /// The rest of the delay, δ (s).
+    pub(super) rest_s: f64,
+    pub(super) pole: Vec<Complex<f64>>,
+    /// Weight: 2 residue for a complex pole, residue for a real one.
+    pub(super) weight: Vec<Complex<f64>>,
+    pub(super) lambda_re: Vec<f64>,
+    pub(super) lambda_im: Vec<f64>,
+    /// Input gain of u[k-D], weight included.
+    pub(super) now_re: Vec<f64>,
+    pub(super) now_im: Vec<f64>,
+    /// Input gain of u[k-D-1], weight included.
+    pub(super) before_re: Vec<f64>,
+    pub(super) before_im: Vec<f64>,
+    pub(super) rigid2: f64,
+    pub(super) rigid1: f64,
+}
+
+/// (e^{ph} - 1)/p without cancellation for small p h.
+pub(super) fn phi(p: Complex<f64>, h: f64) -> Complex<f64> {
+    let (a, b) = (p.re * h, p.im * h);
+    if a == 0.0 && b == 0.0 {
+        return Complex::new(h, 0.0);
+    }
+    let half = (0.5 * b).sin();
+    let grown = Complex::new(a.exp_m1() * b.cos() - 2.0 * half * half, a.exp() * b.sin());
+    grown / p
+}
+
+/// How to read the position at one instant between controller samples; made once, used for every simulation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Intersample {
+    /// Propagation of the real and imaginary state parts to that instant.
+    pub(super) re: Vec<f64>,
+    pub(super) im: Vec<f64>,
+    /// Gain of u[k-D] and of u[k-D-1].
+    pub(super) now: f64,
+    pub(super) before: f64,
+    /// Time since the sample (s), for the double integrator.
+    pub(super) offset_s: f64,
+}
+
+impl DiscretePlant {
+    /// Samples a plant at `sample_time_s` (s).
+    pub fn of(plant: &Plant, sample_time_s: f64) -> Result<DiscretePlant, LtiError> {
+        if !(sample_time_s.is_finite() && sample_time_s > 0.0) {
+            let expected = "a finite time above 0 s";
+            return Err(LtiError::Range { key: "sample_time_s".into(), found: sample_time_s, expected });
+        }
+        let modal = ModalForm::of(plant)?;
+        let samples = modal.delay_s / sample_time_s;
+        if samples > DELAY_LIMIT as f64 {
+            let delay_s = modal.delay_s;
+            return Err(LtiError::Delay { delay_s, sample_time_s, samples, limit: DELAY_LIMIT });
+        }
+        // A delay within rounding of whole samples is that many samples: 79.2 us at 39.6 us is two, not one and a rest.
+        let nearest = samples.round();
+        let (whole, rest_s) = if (samples - nearest).abs() < 1e-9 {
+            (nearest as usize, 0.0)
+        } else {
+            (samples.floor() as usize, modal.delay_s - samples.floor() * sample_time_s)
+        };
+        let n = modal.terms.len();
+        let mut d = DiscretePlant {
+            sample_time_s,
+            whole,
+            rest_s,
+            pole: Vec::with_capacity(n),
+            weight: Vec::with_capacity(n),
+            lambda_re: Vec::with_capacity(n),
+            lambda_im: Vec::with_capacity(n),
+            now_re: Vec::with_capacity(n),
+            now_im: Vec::with_capacity(n),
+            before_re: Vec::with_capacity(n),
+            before_im: Vec::with_capacity(n),
+            rigid2: modal.rigid2,
+            rigid1: modal.rigid1,
+        };
+        for t in &modal.terms {
+            let weight = if t.pole.im > 0.0 { t.residue * 2.0 } else { t.residue };
+            let lambda = (t.pole * sample_time_s).exp();
+            let now = weight * phi(t.pole, sample_time_s - rest_s);
+            let before = weight * (t.pole * (sample_time_s - rest_s)).exp() * phi(t.pole, rest_s);
+            d.pole.push(t.pole);
+            d.weight.push(weight);
+            d.lambda_re.push(lambda.re);
+            d.lambda_im.push(lambda.im);
+            d.now_re.push(now.re);
+            d.now_im.push(now.im);
+            d.before_re.push(before.re);
+            d.before_im.push(before.im);
+        }
+        Ok(d)
+    }
+
+    /// Sample time T (s).
+    pub fn sample_time_s(&self) -> f64 {
+        self.sample_time_s
+    }
+
+    /// Whole samples of delay.
+    pub fn whole_delay_samples(&self) -> usize {
+        self.whole
+    }
+
+    /// The delay left over after the whole samples (s), at least 0 and below T.
+    pub fn fractional_delay_s(&self) -> f64 {
+        self.rest_s
+    }
+
+    /// Poles of the sampled plant in z, conjugates and the integrator's included, the delay's poles at 0 not.
+    pub fn poles(&self) -> Vec<Complex<f64>> {
+        let mut all = Vec::with_capacity(2 * self.pole.len() + 2);
+        if self.rigid2 != 0.0 {
+            all.extend([Complex::new(1.0, 0.0); 2]);
+        }
+        for (i, p) in self.pole.iter().enumerate() {
+            let z = Complex::new(self.lambda_re[i], self.lambda_im[i]);
+            all.push(z);
+            if p.im > 0.0 {
+                all.push(z.conj());
+            }
+        }
+        all
+    }
+
+    /// Continuous poles of the terms (rad/s), each conjugate pair once.
+    pub fn terms(&self) -> &[Complex<f64>] {
+        &self.pole
+    }
+
+    /// How many of the plant's poles lie on z = 1.
+    pub fn integrators(&self) -> usize {
+        let at_origin = self.pole.iter().filter(|p| p.norm() == 0.0).count();
+        at_origin + if self.rigid2 != 0.0 { 2 } else { 0 }
+    }
+
+    /// The reading of the position `offset_s` after a controller sample, 0 <= offset < T.
+    pub fn intersample(&self, offset_s: f64) -> Intersample {
+        let late = (offset_s - self.rest_s).max(0.0);
+        let early = offset_s.min(self.rest_s);
+        let mut reading = Intersample {
+            re: Vec::with_capacity(self.pole.len()),
+            im: Vec::with_capacity(self.pole.len()),
+            now: 0.0,
+            before: 0.0,
+            offset_s,
+        };
+        for (&p, &weight) in self.pole.iter().zip(&self.weight) {
+            let e = (p * offset_s).exp();
+            reading.re.push(e.re);
+            reading.im.push(-e.im);
+            reading.now += (weight * phi(p, late)).re;
+            reading.before += (weight * (p * late).exp() * phi(p, early)).re;
+        }
+        reading.now += 0.5 * self.rigid2 * late * late + self.rigid1 * late;
+        reading.before += self.rigid2 * early * (late + 0.5 * early) + self.rigid1 * early;
+        reading
+    }
+}
+
+impl FrequencyResponse for DiscretePlant {
+    /// P(z) at z = e^{j w T}: position over command as the controller sees it.
+    fn at(&self, w: f64) -> Complex<f64> {
+        let t = self.sample_time_s;
+        let z = Complex::from_polar(1.0, w * t);
+        let mut now = Complex::new(0.0, 0.0);
+        let mut before = Complex::new(0.0, 0.0);
+        for i in 0..self.pole.len() {
+            let lambda = Complex::new(self.lambda_re[i], self.lambda_im[i]);
+            let gain_now = Complex::new(self.now_re[i], self.now_im[i]);
+            let gain_before = Complex::new(self.before_re[i], self.before_im[i]);
+            // Re(weight x) is the half sum of the term and its conjugate, over the common denominator.
+            let upper = z - lambda;
+            let lower = z - lambda.conj();
+            let scale = 0.5 / (upper * lower);
+            now += (gain_now * lower + gain_now.conj() * upper) * scale;
+            before += (gain_before * lower + gain_before.conj() * upper) * scale;
+        }
+        if self.rigid2 != 0.0 {
+            let (h, d) = (t - self.rest_s, self.rest_s);
+            let step = z - 1.0;
+            // Velocity and position of the double integrator, driven over h by u[k-D] and over d before it.
+            let drift = self.rigid2 * t / (step * step);
+            now += drift * h + (0.5 * self.rigid2 * h * h + self.rigid1 * h) / step;
+            before += drift * d + (self.rigid2 * d * (h + 0.5 * d) + self.rigid1 * d) / step;
+        }
+        (now + before / z) * Complex::from_polar(1.0, -w * t * self.whole as f64)
+    }
+}

@@ -1,0 +1,20 @@
+//! Linear time-invariant models: the plant in product form, its modal form, its exact discretisation, sections.
+//!
+//! In: parameters with units. Out: responses, poles, states that step in time.
+//! Convention: s in rad/s, z = exp(j w T); `specs/conventions.md`. Sources: the paper's eqs. (1)-(3), (21), (29), (31).
+
+mod discrete;
+mod modal;
+mod plant;
+mod plant_file;
+mod response;
+mod section;
+mod state;
+
+pub use discrete::{DiscretePlant, Intersample};
+pub use modal::{ModalForm, ModalTerm};
+pub use plant::{Body, LtiError, Mode, PhysicsEntry, Plant};
+pub use plant_file::PlantFile;
+pub use response::FrequencyResponse;
+pub use section::{Section, SectionError, Sections};
+pub use state::PlantState;

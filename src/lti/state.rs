@@ -1,0 +1,99 @@
+//! The plant stepping in time: exact at every controller sample and between them.
+
+use super::{DiscretePlant, Intersample};
+
+/// State of one simulated plant, from rest at position 0.
+///
+/// Order of calls for sample k: [`PlantState::position`] (and [`PlantState::between`] for instants before k+1 need the
+/// command of sample k, so call [`PlantState::command`] first), then [`PlantState::advance`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlantState {
+    re: Vec<f64>,
+    im: Vec<f64>,
+    /// Double integrator: velocity part and position.
+    velocity: f64,
+    rigid: f64,
+    /// Ring of the commands u[k] back to u[k-D-1].
+    commands: Vec<f64>,
+    head: usize,
+}
+
+impl PlantState {
+    /// The plant at rest.
+    pub fn at_rest(plant: &DiscretePlant) -> PlantState {
+        let n = plant.pole.len();
+        PlantState {
+            re: vec![0.0; n],
+            im: vec![0.0; n],
+            velocity: 0.0,
+            rigid: 0.0,
+            commands: vec![0.0; plant.whole + 2],
+            head: 0,
+        }
+    }
+
+    /// Back to rest, without a new allocation.
+    pub fn reset(&mut self) {
+        self.re.fill(0.0);
+        self.im.fill(0.0);
+        self.velocity = 0.0;
+        self.rigid = 0.0;
+        self.commands.fill(0.0);
+        self.head = 0;
+    }
+
+    /// Position at the sample (position_unit).
+    #[inline]
+    pub fn position(&self) -> f64 {
+        self.re.iter().sum::<f64>() + self.rigid
+    }
+
+    /// Takes the command of this sample, held until the next one.
+    #[inline]
+    pub fn command(&mut self, u: f64) {
+        self.head = if self.head == 0 { self.commands.len() - 1 } else { self.head - 1 };
+        self.commands[self.head] = u;
+    }
+
+    /// The commands u[k-D] and u[k-D-1] that act now.
+    #[inline]
+    fn acting(&self) -> (f64, f64) {
+        let n = self.commands.len();
+        let wrap = |i: usize| if i >= n { i - n } else { i };
+        (self.commands[wrap(self.head + n - 2)], self.commands[wrap(self.head + n - 1)])
+    }
+
+    /// Position at an instant between this sample and the next, after [`PlantState::command`].
+    #[inline]
+    pub fn between(&self, at: &Intersample) -> f64 {
+        let (now, before) = self.acting();
+        let mut sum = 0.0;
+        for i in 0..self.re.len() {
+            sum += at.re[i] * self.re[i] + at.im[i] * self.im[i];
+        }
+        sum + at.now * now + at.before * before + self.rigid + self.velocity * at.offset_s
+    }
+
+    /// To the next sample.
+    #[inline]
+    pub fn advance(&mut self, plant: &DiscretePlant) {
+        let (now, before) = self.acting();
+        let n = self.re.len();
+        let (re, im) = (&mut self.re[..n], &mut self.im[..n]);
+        let (lr, li) = (&plant.lambda_re[..n], &plant.lambda_im[..n]);
+        let (nr, ni) = (&plant.now_re[..n], &plant.now_im[..n]);
+        let (br, bi) = (&plant.before_re[..n], &plant.before_im[..n]);
+        for i in 0..n {
+            let (a, b) = (re[i], im[i]);
+            re[i] = lr[i] * a - li[i] * b + nr[i] * now + br[i] * before;
+            im[i] = li[i] * a + lr[i] * b + ni[i] * now + bi[i] * before;
+        }
+        if plant.rigid2 != 0.0 {
+            let (d, h) = (plant.rest_s, plant.sample_time_s - plant.rest_s);
+            self.rigid += self.velocity * plant.sample_time_s
+                + before * (plant.rigid2 * d * (h + 0.5 * d) + plant.rigid1 * d)
+                + now * (0.5 * plant.rigid2 * h * h + plant.rigid1 * h);
+            self.velocity += plant.rigid2 * (before * d + now * h);
+        }
+    }
+}
