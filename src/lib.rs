@@ -6,6 +6,11 @@
 pub mod units;
 
 pub mod document;
+pub mod numeric;
 
 pub mod frf;
 pub mod lti;
+
+pub mod controller;
+
+pub mod feedback;

@@ -5,7 +5,7 @@
 //! which is the modified z-transform (Åström & Wittenmark, Computer-Controlled Systems, ch. 2), eq. (31)'s counterpart.
 
 use super::{FrequencyResponse, LtiError, ModalForm, Plant};
-use nalgebra::Complex;
+use nalgebra::{Complex, DMatrix};
 
 /// Longest delay taken (samples): a guard against a delay typed in the wrong unit.
 const DELAY_LIMIT: usize = 1000;
@@ -175,6 +175,58 @@ impl DiscretePlant {
         reading.now += 0.5 * self.rigid2 * late * late + self.rigid1 * late;
         reading.before += self.rigid2 * early * (late + 0.5 * early) + self.rigid1 * early;
         reading
+    }
+}
+
+/// The sampled plant over real states: x' = state x + now u[k-D] + before u[k-D-1], y = output x.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RealForm {
+    /// State matrix, n x n.
+    pub state: DMatrix<f64>,
+    /// Input of u[k-D], n.
+    pub now: Vec<f64>,
+    /// Input of u[k-D-1], n.
+    pub before: Vec<f64>,
+    /// Output row, n.
+    pub output: Vec<f64>,
+}
+
+impl DiscretePlant {
+    /// Real states: two for a complex pole, one for a real one, velocity and position for the double integrator.
+    pub fn real_form(&self) -> RealForm {
+        let n: usize = self.pole.iter().map(|p| if p.im > 0.0 { 2 } else { 1 }).sum();
+        let n = n + if self.rigid2 != 0.0 { 2 } else { 0 };
+        let mut f =
+            RealForm { state: DMatrix::zeros(n, n), now: vec![0.0; n], before: vec![0.0; n], output: vec![0.0; n] };
+        let mut at = 0;
+        for (i, p) in self.pole.iter().enumerate() {
+            f.state[(at, at)] = self.lambda_re[i];
+            f.now[at] = self.now_re[i];
+            f.before[at] = self.before_re[i];
+            f.output[at] = 1.0;
+            if p.im > 0.0 {
+                f.state[(at, at + 1)] = -self.lambda_im[i];
+                f.state[(at + 1, at)] = self.lambda_im[i];
+                f.state[(at + 1, at + 1)] = self.lambda_re[i];
+                f.now[at + 1] = self.now_im[i];
+                f.before[at + 1] = self.before_im[i];
+                at += 1;
+            }
+            at += 1;
+        }
+        if self.rigid2 != 0.0 {
+            let (t, d) = (self.sample_time_s, self.rest_s);
+            let h = t - d;
+            f.state[(at, at)] = 1.0;
+            f.state[(at + 1, at)] = t;
+            f.state[(at + 1, at + 1)] = 1.0;
+            f.now[at] = self.rigid2 * h;
+            f.now[at + 1] = 0.5 * self.rigid2 * h * h + self.rigid1 * h;
+            f.before[at] = self.rigid2 * d;
+            f.before[at + 1] = self.rigid2 * d * (h + 0.5 * d) + self.rigid1 * d;
+            f.output[at + 1] = 1.0;
+        }
+        f
     }
 }
 

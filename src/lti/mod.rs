@@ -11,7 +11,7 @@ mod response;
 mod section;
 mod state;
 
-pub use discrete::{DiscretePlant, Intersample};
+pub use discrete::{DiscretePlant, Intersample, RealForm};
 pub use modal::{ModalForm, ModalTerm};
 pub use plant::{Body, LtiError, Mode, PhysicsEntry, Plant};
 pub use plant_file::PlantFile;

@@ -1,0 +1,40 @@
+//! Filters beside the PID, with the parameters an engineer sets.
+
+use serde::{Deserialize, Serialize};
+
+/// Second-order low-pass w²/(s² + 2 d w s + w²).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lowpass {
+    /// Corner (Hz), below half the sample rate.
+    pub frequency_hz: f64,
+    /// d, above 0.
+    pub damping_ratio: f64,
+}
+
+/// Notch (s² + 2 dz w s + w²)/(s² + 2 dp w s + w²); its depth at the centre is dz/dp.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Notch {
+    /// Centre (Hz), below half the sample rate.
+    pub frequency_hz: f64,
+    /// dz, at least 0.
+    pub zero_damping_ratio: f64,
+    /// dp, above 0.
+    pub pole_damping_ratio: f64,
+}
+
+/// Feed-forward from the reference, known ahead: factor (velocity_s r' + acceleration_s2 r'').
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Feedforward {
+    /// The paper's FF factor, scales both terms.
+    #[serde(default)]
+    pub factor: f64,
+    /// Command per position_unit/s.
+    #[serde(default)]
+    pub velocity_s: f64,
+    /// Command per position_unit/s².
+    #[serde(default)]
+    pub acceleration_s2: f64,
+}

@@ -1,0 +1,28 @@
+//! The loop: one open loop, cut at the plant input, and everything judged from it.
+//!
+//! In: a sampled plant (or a measured response) and the firmware's sections. Out: crossings, margins, Nyquist count, poles,
+//! the gang of four. Convention: L = P C, negative feedback, S = 1/(1 + L), T = L/(1 + L); spec: `specs/margins.md`.
+//!
+//! ```text
+//!        r ──►(+)── e ──► C(z) ──►(+)── u ──► P(z) ──┬──► y
+//!              ▲ -                  ▲ d              │
+//!              └────────────────────┴── (loop is cut at u) ◄──┘
+//! ```
+
+mod crossing;
+mod gang;
+mod grid;
+mod margins;
+mod nyquist;
+mod open_loop;
+mod poles;
+mod trace;
+
+pub use crossing::Crossing;
+pub use gang::{GangOfFour, gang_of_four};
+pub use grid::frequency_grid;
+pub use margins::{Margins, margins};
+pub use nyquist::{NyquistCount, nyquist_count};
+pub use open_loop::{FeedbackError, ModelLoop, OpenLoop};
+pub use poles::closed_loop_poles;
+pub use trace::Trace;

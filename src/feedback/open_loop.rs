@@ -1,0 +1,113 @@
+//! What a loop must offer to be judged, and the loop of a model.
+
+use super::frequency_grid;
+use crate::lti::{DiscretePlant, FrequencyResponse, Sections};
+use nalgebra::Complex;
+use thiserror::Error;
+
+/// A loop cut at the plant input.
+pub trait OpenLoop {
+    /// L(e^{j w T}) at `w_rad_s` (rad/s).
+    fn at(&self, w_rad_s: f64) -> Complex<f64>;
+    /// Ascending frequencies (rad/s) that no mode slips through.
+    fn grid(&self) -> Vec<f64>;
+    /// The frequency (rad/s) at which the loop ends: half the sample rate, or the last point of the sweep.
+    fn end_rad_s(&self) -> f64;
+    /// Poles of L on z = 1.
+    fn integrators(&self) -> usize;
+    /// Poles of L outside the unit circle.
+    fn unstable_poles(&self) -> usize;
+    /// Sample time (s).
+    fn sample_time_s(&self) -> f64;
+    /// Whether [`OpenLoop::end_rad_s`] is half the sample rate, where L is real.
+    fn ends_at_half_rate(&self) -> bool;
+}
+
+/// Why a loop cannot be closed.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[allow(missing_docs, reason = "each field is named in the message")]
+pub enum FeedbackError {
+    /// Plant and controller do not share a clock.
+    #[error("the plant is sampled at {plant_s} s and the controller runs at {controller_s} s: one clock is expected")]
+    SampleTime { plant_s: f64, controller_s: f64 },
+    /// The eigenvalue iteration did not end.
+    #[error("the poles of the closed loop, order {order}, were not found within {limit} iterations")]
+    Poles { order: usize, limit: usize },
+    /// The sweep and half the sample rate leave no band to judge.
+    #[error("the sweep starts at {from_hz} Hz, at or above half the sample rate, {half_rate_hz} Hz")]
+    Band { from_hz: f64, half_rate_hz: f64 },
+}
+
+/// The loop of a sampled plant and the firmware's sections.
+#[derive(Clone, Debug)]
+pub struct ModelLoop<'a> {
+    plant: &'a DiscretePlant,
+    sections: &'a Sections,
+}
+
+/// A pole this close to the unit circle at z = 1 is an integrator: the rounding of 1 + a1 + a2.
+const ON_ONE: f64 = 1e-10;
+
+impl<'a> ModelLoop<'a> {
+    /// Closes nothing yet: L = P C.
+    pub fn new(plant: &'a DiscretePlant, sections: &'a Sections) -> Result<Self, FeedbackError> {
+        let (plant_s, controller_s) = (plant.sample_time_s(), sections.sample_time_s);
+        if ((plant_s - controller_s) / controller_s).abs() > 1e-12 {
+            return Err(FeedbackError::SampleTime { plant_s, controller_s });
+        }
+        Ok(ModelLoop { plant, sections })
+    }
+
+    /// The sampled plant.
+    pub fn plant(&self) -> &DiscretePlant {
+        self.plant
+    }
+
+    /// The firmware's sections.
+    pub fn sections(&self) -> &Sections {
+        self.sections
+    }
+}
+
+/// Poles of the sections on z = 1 and outside the unit circle.
+pub(super) fn section_poles(sections: &Sections) -> (usize, usize) {
+    let mut counts = (0, 0);
+    for pole in sections.chain.iter().flat_map(|s| s.poles()) {
+        if (pole - 1.0).norm() < ON_ONE {
+            counts.0 += 1;
+        } else if pole.norm() > 1.0 {
+            counts.1 += 1;
+        }
+    }
+    counts
+}
+
+impl OpenLoop for ModelLoop<'_> {
+    fn at(&self, w: f64) -> Complex<f64> {
+        self.plant.at(w) * self.sections.at(w)
+    }
+
+    fn grid(&self) -> Vec<f64> {
+        frequency_grid(self.plant.terms(), self.sections)
+    }
+
+    fn end_rad_s(&self) -> f64 {
+        std::f64::consts::PI / self.sections.sample_time_s
+    }
+
+    fn integrators(&self) -> usize {
+        self.plant.integrators() + section_poles(self.sections).0
+    }
+
+    fn unstable_poles(&self) -> usize {
+        section_poles(self.sections).1
+    }
+
+    fn sample_time_s(&self) -> f64 {
+        self.sections.sample_time_s
+    }
+
+    fn ends_at_half_rate(&self) -> bool {
+        true
+    }
+}
