@@ -14,3 +14,5 @@ pub mod lti;
 pub mod controller;
 
 pub mod feedback;
+
+pub mod pes;

@@ -1,0 +1,51 @@
+//! The figures of one PES: harmonics, bands, range and standard deviation of the window.
+
+use super::{Harmonic, Profile, WindowDft};
+use serde::Serialize;
+
+/// The lower band of the DFT (Hz), eq. (42).
+pub const LOW_BAND_HZ: [f64; 2] = [600.0, 1500.0];
+/// The upper band of the DFT (Hz), eq. (43).
+pub const HIGH_BAND_HZ: [f64; 2] = [1500.0, 3000.0];
+
+/// What is read from the window, in the position's unit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PesFigures {
+    /// Harmonics 1 to N/2.
+    pub harmonics: Vec<Harmonic>,
+    /// Euclidean norm over 600 to 1500 Hz, eq. (42).
+    pub dft_low: f64,
+    /// Euclidean norm over 1500 to 3000 Hz, eq. (43).
+    pub dft_high: f64,
+    /// Largest less smallest PES of the window.
+    pub pes_range: f64,
+    /// Standard deviation of the window, eq. (44) (divided by N).
+    pub pes_std: f64,
+}
+
+/// The figures of a record of PES at the servo clock, whose sample 0 lies at time 0; the profile has been checked.
+pub fn figures(pes: &[f64], profile: &Profile) -> PesFigures {
+    let start = profile.first_servo_sample();
+    let [first, last] = profile.pes.window;
+    window_figures(&pes[start + first..start + last], profile.pes.sample_rate_hz)
+}
+
+/// The figures of the window itself.
+pub fn window_figures(window: &[f64], rate_hz: f64) -> PesFigures {
+    let dft = WindowDft::whole(window.len(), rate_hz);
+    let mut amplitude = Vec::with_capacity(dft.bins().len());
+    dft.amplitudes(window, &mut amplitude);
+    let harmonics =
+        dft.bins().iter().zip(&amplitude).map(|(&k, &amplitude)| Harmonic { k, hz: dft.hz(k), amplitude }).collect();
+    let n = window.len() as f64;
+    let mean = window.iter().sum::<f64>() / n;
+    let high = window.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let low = window.iter().copied().fold(f64::INFINITY, f64::min);
+    PesFigures {
+        harmonics,
+        dft_low: dft.band(&amplitude, LOW_BAND_HZ),
+        dft_high: dft.band(&amplitude, HIGH_BAND_HZ),
+        pes_range: high - low,
+        pes_std: (window.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt(),
+    }
+}

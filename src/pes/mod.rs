@@ -1,0 +1,17 @@
+//! The position error signal of a spiral write: reference, closed loop in time, figures of the window.
+//!
+//! In: a sampled plant, a controller, a profile. Out: PES at the servo clock and its DFT, eqs. (40)-(44).
+//! Convention: PES = reference - position (+ run-out), amplitude |X_k|/N; spec: `specs/pes.md`.
+
+mod dft;
+mod figures;
+mod noise;
+mod profile;
+mod reference;
+mod simulation;
+
+pub use dft::{Harmonic, WindowDft};
+pub use figures::{HIGH_BAND_HZ, LOW_BAND_HZ, PesFigures, figures};
+pub use profile::{Noise, PesClock, Profile, ProfileError, Runout, Spiral};
+pub use reference::Reference;
+pub use simulation::{ClosedLoop, PesError, Scene, Workspace, simulate};
