@@ -1,0 +1,24 @@
+//! The only place where numbers become text or pictures: tables, plots, pages.
+//!
+//! In: plain columns and words. Out: [`table::Table`] as HTML or aligned text, [`figure::Figure`] as SVG or as part of
+//! a page, [`page::Page`] as one HTML file that needs nothing else. Convention: every number has its unit beside it;
+//! every text from outside is escaped. Spec: `specs/report.md`.
+
+mod error;
+mod extent;
+mod layout;
+mod marks;
+mod palette;
+mod ticks;
+
+pub mod bode;
+pub mod figure;
+pub mod number;
+pub mod nyquist;
+pub mod sensitivity;
+pub mod spectrum_bars;
+pub mod svg;
+pub mod time;
+
+pub use error::ReportError;
+pub use figure::Figure;
