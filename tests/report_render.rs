@@ -4,10 +4,13 @@
 use nalgebra::Complex;
 use servotune::report::bode::{BodeCurve, BodeMarks, bode_with_residual};
 use servotune::report::figure::{Figure, Ink};
+use servotune::report::number::NumberFormat;
 use servotune::report::nyquist::{NyquistMarks, nyquist};
+use servotune::report::page::{Block, Card, Page, Section};
 use servotune::report::sensitivity::sensitivity;
 use servotune::report::spectrum_bars::{SpectrumBars, spectrum_bars};
 use servotune::report::svg::{Size, standalone};
+use servotune::report::table::{Cell, Column, Table, Verdict};
 use servotune::report::time::{CurveKind, TimeCurve, TimePanel, time};
 use std::f64::consts::TAU;
 
@@ -69,7 +72,7 @@ fn bode_demo() -> Figure {
 }
 
 fn figures() -> Vec<(&'static str, Figure)> {
-    let dense: Vec<f64> = (0..900).map(|k| 20.0 * (12000.0f64 / 20.0).powf(f64::from(k) / 899.0)).collect();
+    let dense: Vec<f64> = (0..3000).map(|k| 20.0 * (12000.0f64 / 20.0).powf(f64::from(k) / 2999.0)).collect();
     let open: Vec<C> = dense.iter().map(|&f| plant(f, 1.0) * controller(f)).collect();
     let s: Vec<C> = open.iter().map(|l| 1.0 / (1.0 + l)).collect();
     let t: Vec<C> = open.iter().map(|l| l / (1.0 + l)).collect();
@@ -166,4 +169,81 @@ fn every_figure_is_drawn_and_drawn_alike_twice() {
         assert!(!svg.contains("NaN") && !svg.contains("inf "), "{name}");
         std::fs::write(folder().join(format!("{name}.svg")), svg).unwrap();
     }
+}
+
+fn card(label: &str, value: &str, unit: &str, note: &str, verdict: Verdict) -> Card {
+    Card { label: label.into(), value: value.into(), unit: unit.into(), note: note.into(), verdict: Some(verdict) }
+}
+
+fn gains() -> Table {
+    let number = NumberFormat::Significant(4);
+    let columns = vec![
+        Column::words("Parameter"),
+        Column::numbers("Before", "V/track, s", number),
+        Column::numbers("After", "V/track, s", number),
+        Column::numbers("Lowest allowed", "V/track, s", number),
+    ];
+    let mut table = Table::new("Gains before and after", columns);
+    table.push(vec!["kp".into(), 0.21.into(), 0.27.into(), 1e-3.into()]).unwrap();
+    table
+        .push(vec!["kd".into(), 3.1e-4.into(), Cell::from(1e-6).flagged(Verdict::Warn, "at bound"), 1e-6.into()])
+        .unwrap();
+    table.push(vec!["ki".into(), None.into(), 60.0.into(), (-2.5e-7).into()]).unwrap();
+    table
+}
+
+fn demo_page() -> Page {
+    let mut figures = figures().into_iter().map(|(_, figure)| figure);
+    let mut next = || figures.next().unwrap();
+    let (plant, open, nyquist, sensitivity, time, dft) = (next(), next(), next(), next(), next(), next());
+    Page {
+        title: "Tuning report".into(),
+        subtitle: "Tester 12, slot 7, spiral write at 350 track/s".into(),
+        cards: vec![
+            card("Phase margin", "59.8", "deg", "at least 35", Verdict::Ok),
+            card("Gain margin", "11.1", "dB", "at least 5", Verdict::Ok),
+            card("Sensitivity peak", "1.89", "", "at most 2.2", Verdict::Ok),
+            card("DFT, low band", "0.0213", "track", "at most 0.02", Verdict::Fail),
+            card("DFT, high band", "0.0184", "track", "within 10 % of 0.02", Verdict::Warn),
+        ],
+        sections: vec![
+            Section {
+                heading: "Verdict".into(),
+                blocks: vec![
+                    Block::Notice(
+                        Verdict::Fail,
+                        "The low band of the DFT is 6 % above its limit; no gains within the bounds reach it.".into(),
+                    ),
+                    Block::Table(gains()),
+                ],
+            },
+            Section {
+                heading: "Plant".into(),
+                blocks: vec![
+                    Block::Prose("The model follows the sweep within 1 dB up to the first resonance.".into()),
+                    Block::Figure(plant),
+                ],
+            },
+            Section { heading: "Loop".into(), blocks: vec![Block::Pair(open, nyquist), Block::Figure(sensitivity)] },
+            Section {
+                heading: "Position error".into(),
+                blocks: vec![
+                    Block::Pair(time, dft),
+                    Block::Details("The gain file".into(), vec![Block::Code("[pid]\nkp = 0.27 # <b>".into())]),
+                ],
+            },
+        ],
+        provenance: vec![
+            ("Program".into(), "servotune 0.1.0".into()),
+            ("Sweep".into(), format!("sha256 {}", "0f".repeat(32))),
+        ],
+    }
+}
+
+#[test]
+fn a_page_holds_every_kind_of_block() {
+    let page = demo_page().html();
+    assert_eq!(page, demo_page().html());
+    std::fs::write(folder().join("page.html"), &page).unwrap();
+    assert_eq!(page.matches("<figure").count(), 6);
 }

@@ -154,7 +154,10 @@ fn band(name: &str, ink: Ink, x: &[f64], middle: &[f64], half: &[f64]) -> Result
 
 fn mark_frequencies(panel: &mut Panel, marks: &BodeMarks, worded: bool) {
     let say = |text: String| if worded { text } else { String::new() };
-    let hz = |value: f64| NumberFormat::Significant(3).text(value);
+    let hz = |value: f64| {
+        let text = NumberFormat::Significant(3).text(value);
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    };
     if let Some((from, to)) = marks.trusted_hz {
         panel.marks.push(Region::of_x(from, to, &say(format!("trusted {} to {} Hz", hz(from), hz(to))), Ink::Data(2)));
     }

@@ -66,6 +66,12 @@ impl Placed<'_> {
         self.area.x + self.x.share(x) * self.area.w
     }
 
+    /// The pixel column of an x value that may lie at infinity: then that of `otherwise`, a share of the view.
+    pub fn px_bounded(&self, x: f64, otherwise: f64) -> f64 {
+        let share = self.x.share(x);
+        self.area.x + if share.is_finite() { share } else { otherwise } * self.area.w
+    }
+
     /// The pixel row of a y value.
     pub fn py(&self, y: f64) -> f64 {
         self.area.y + (1.0 - self.y.share(y)) * self.area.h
@@ -107,8 +113,9 @@ pub(super) struct Layout<'a> {
 }
 
 /// Distance between ticks that reads well (px), across and up.
-pub(super) const SPACING: (f64, f64) = (62.0, 36.0);
-const RIGHT: f64 = 14.0;
+pub(super) const SPACING: (f64, f64) = (62.0, 28.0);
+// Half of a tick's words may stand beyond the frame.
+const RIGHT: f64 = 20.0;
 const ROW: f64 = 20.0;
 const WORD_ROW: f64 = 14.0;
 
@@ -227,7 +234,9 @@ fn place_headers(placed: &mut Placed, width: f64) -> usize {
 
 fn place_keys(figure: &Figure, width: f64, top: f64) -> (Vec<Key>, f64) {
     let mut keys: Vec<Key> = Vec::new();
-    for mark in figure.panels.iter().flat_map(|panel| &panel.marks) {
+    let marks = || figure.panels.iter().flat_map(|panel| &panel.marks);
+    let data = marks().filter(|mark| matches!(mark, Mark::Series(_)));
+    for mark in data.chain(marks().filter(|mark| matches!(mark, Mark::Circle(_)))) {
         let (name, ink, swatch) = match mark {
             Mark::Series(series) => {
                 let swatch = match series.kind {

@@ -6,19 +6,25 @@
 
 mod error;
 mod extent;
+mod html;
 mod layout;
 mod marks;
 mod palette;
 mod ticks;
+mod words;
 
 pub mod bode;
 pub mod figure;
 pub mod number;
 pub mod nyquist;
+pub mod page;
 pub mod sensitivity;
 pub mod spectrum_bars;
 pub mod svg;
+pub mod table;
 pub mod time;
 
 pub use error::ReportError;
 pub use figure::Figure;
+pub use page::Page;
+pub use table::Table;

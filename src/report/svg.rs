@@ -3,10 +3,11 @@
 //! In: a figure and a [`Size`]. Out: an SVG document that stands alone, or the same picture for a page, whose script
 //! finds panels, views and legend entries in `data-` attributes. Spec: `specs/report.md`.
 
-use super::figure::{Axis, Direction, Figure, Mark, Scale, Ticks};
+use super::figure::{Axis, Figure, Scale, Ticks};
 use super::layout::{Key, Layout, Placed, Swatch, place, text_width};
 use super::marks::{draw, px};
 use super::palette::{LIGHT, class};
+use super::words::draw_words;
 use std::fmt::Write;
 
 pub use super::layout::Size;
@@ -172,48 +173,4 @@ fn draw_ticks(svg: &mut String, placed: &Placed) {
         }
     }
     let _ = write!(svg, r#"</g><g class="tick">{words}</g>"#);
-}
-
-fn draw_words(svg: &mut String, placed: &Placed) {
-    let area = placed.area;
-    for header in &placed.headers {
-        let _ = write!(
-            svg,
-            r#"<text class="word {}" text-anchor="middle" data-from="{}" data-to="{}" x="{}" y="{}">{}</text>"#,
-            class(header.ink),
-            px(placed.px(header.from)),
-            px(placed.px(header.to)),
-            px(header.x),
-            px(header.y),
-            escape(&header.text)
-        );
-    }
-    for mark in &placed.panel.marks {
-        match mark {
-            Mark::Line(line) if line.on == Direction::Y && !line.label.is_empty() && placed.y.holds(line.at) => {
-                let at = placed.py(line.at);
-                // Below the line where there is no room above it.
-                let y = if at - area.y < 16.0 { at + 12.0 } else { at - 4.0 };
-                word(svg, class(line.ink), "end", (area.x + area.w - 5.0, y), r#" data-move="y""#, &line.label);
-            }
-            Mark::Region(region) if region.on == Direction::Y && !region.label.is_empty() => {
-                let (a, b) = (placed.y.share(region.from).max(0.0), placed.y.share(region.to).min(1.0));
-                let at = area.y + (1.0 - 0.5 * (a + b)) * area.h + 4.0;
-                word(svg, class(region.ink), "start", (area.x + 6.0, at), r#" data-move="y""#, &region.label);
-            }
-            Mark::Note(note) if placed.x.holds(note.at.0) && placed.y.holds(note.at.1) => {
-                let (x, y) = (placed.px(note.at.0), placed.py(note.at.1));
-                let room = area.x + area.w - x > text_width(&note.text, 11.0) + 14.0;
-                let (anchor, x) = if room { ("start", x + 7.0) } else { ("end", x - 7.0) };
-                word(svg, class(note.ink), anchor, (x, (y - 6.0).max(area.y + 12.0)), r#" data-move="xy""#, &note.text);
-            }
-            _ => {}
-        }
-    }
-}
-
-fn word(svg: &mut String, ink: &str, anchor: &str, at: (f64, f64), data: &str, text: &str) {
-    let (x, y) = (px(at.0), px(at.1));
-    let text = escape(text);
-    let _ = write!(svg, r#"<text class="word halo {ink}" text-anchor="{anchor}"{data} x="{x}" y="{y}">{text}</text>"#);
 }
