@@ -1,3 +1,7 @@
-//! The `servotune` program; everything it does lives in [`servotune`].
+//! The `servotune` program. Everything it does lives in the library; this file only starts it.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    servotune::cli::main()
+}

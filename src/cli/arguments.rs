@@ -1,0 +1,58 @@
+//! The words of the command line.
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Identify a servo machine, judge its loop, simulate its spiral write, tune its gains.
+#[derive(Debug, Parser)]
+#[command(name = "servotune", version, propagate_version = true, arg_required_else_help = true)]
+#[command(
+    after_help = "Exit codes: 0 done, all accepted; 1 done, something was rejected or is unstable; 2 could not do it."
+)]
+pub(super) struct Arguments {
+    /// One JSON document on stdout instead of text
+    #[arg(long, global = true)]
+    pub json: bool,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    Margins(MarginsArguments),
+    Simulate(SimulateArguments),
+}
+
+/// Margins of the open loop: crossings, gain, phase, delay, modulus and disk margin
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  servotune margins --plant specs/machines/healthy.toml --controller specs/controllers/nominal.toml"
+)]
+pub(super) struct MarginsArguments {
+    /// Plant model (plant.toml)
+    #[arg(long, value_name = "PLANT")]
+    pub plant: PathBuf,
+    /// Controller (controller.toml)
+    #[arg(long, value_name = "CONTROLLER")]
+    pub controller: PathBuf,
+}
+
+/// Closed-loop PES of a spiral write and its DFT
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  servotune simulate --plant specs/machines/healthy.toml --controller specs/controllers/nominal.toml --profile specs/profiles/spiral.toml"
+)]
+pub(super) struct SimulateArguments {
+    /// Plant model (plant.toml)
+    #[arg(long, value_name = "PLANT")]
+    pub plant: PathBuf,
+    /// Controller (controller.toml)
+    #[arg(long, value_name = "CONTROLLER")]
+    pub controller: PathBuf,
+    /// Spiral write (profile.toml)
+    #[arg(long, value_name = "PROFILE")]
+    pub profile: PathBuf,
+    /// Also write the record, one row a servo sample, as CSV
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+}

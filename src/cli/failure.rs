@@ -1,0 +1,43 @@
+//! Why a command could not be done: one message, exit code 2.
+
+use crate::controller::ControllerError;
+use crate::document::DocumentError;
+use crate::feedback::FeedbackError;
+use crate::lti::LtiError;
+use crate::pes::{PesError, ProfileError};
+use crate::report::ReportError;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Every way a command can end in a refusal.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "each field is named in the message")]
+pub enum Failure {
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    #[error("{}: {source}", file.display())]
+    Plant { file: PathBuf, source: LtiError },
+    #[error("{}: {source}", file.display())]
+    Controller { file: PathBuf, source: ControllerError },
+    #[error("{}: {source}", file.display())]
+    Profile { file: PathBuf, source: ProfileError },
+    #[error("{}: [[plant.physics]] effect \"{effect}\": `{command}` works on the linear plant only; remove the table to judge the linear part", file.display())]
+    Physics { file: PathBuf, effect: String, command: &'static str },
+    #[error(transparent)]
+    Feedback(#[from] FeedbackError),
+    #[error(transparent)]
+    Pes(#[from] PesError),
+    #[error(transparent)]
+    Lti(#[from] LtiError),
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// Two algorithms that share no code disagree: no answer can be trusted.
+    #[error(
+        "stability: the Nyquist count finds {by_count} unstable poles and the eigenvalues {by_eigenvalues} (largest |z| = {largest}): no answer is given"
+    )]
+    Disagreement { by_count: i64, by_eigenvalues: i64, largest: f64 },
+    #[error("the result cannot be written as JSON: {source}")]
+    Json { source: serde_json::Error },
+    #[error("cannot write to stdout: {source}")]
+    Stdout { source: std::io::Error },
+}

@@ -1,0 +1,32 @@
+//! Files into values, with the file's name in every refusal.
+
+use super::Failure;
+use crate::controller::Controller;
+use crate::document::{parse_toml, read_text};
+use crate::lti::{Plant, PlantFile};
+use crate::pes::Profile;
+use std::path::Path;
+
+/// A plant. `command` names who asks: effects beyond linear are refused by name.
+pub(super) fn plant(file: &Path, command: &'static str) -> Result<Plant, Failure> {
+    let read: PlantFile = parse_toml(file, &read_text(file)?)?;
+    let plant = Plant::try_from(read).map_err(|source| Failure::Plant { file: file.into(), source })?;
+    match plant.physics.first() {
+        Some(entry) => Err(Failure::Physics { file: file.into(), effect: entry.effect.clone(), command }),
+        None => Ok(plant),
+    }
+}
+
+/// A controller.
+pub(super) fn controller(file: &Path) -> Result<Controller, Failure> {
+    let controller: Controller = parse_toml(file, &read_text(file)?)?;
+    controller.check().map_err(|source| Failure::Controller { file: file.into(), source })?;
+    Ok(controller)
+}
+
+/// A profile.
+pub(super) fn profile(file: &Path) -> Result<Profile, Failure> {
+    let profile: Profile = parse_toml(file, &read_text(file)?)?;
+    profile.check().map_err(|source| Failure::Profile { file: file.into(), source })?;
+    Ok(profile)
+}

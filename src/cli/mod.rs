@@ -1,0 +1,51 @@
+//! The command line: the only place with arguments, files, stdout and exit codes.
+//!
+//! In: words typed by a person. Out: text or one JSON document on stdout, messages on stderr, and 0 (done, all accepted),
+//! 1 (done, something was rejected) or 2 (could not do it). Commands: `specs/files.md` and `servotune --help`.
+
+mod arguments;
+mod failure;
+mod load;
+mod margins;
+mod screen;
+mod simulate;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+pub use failure::Failure;
+use screen::Screen;
+use std::process::ExitCode;
+
+/// What a command that ran has to say by its exit code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ending {
+    /// 0: done, all accepted.
+    Accepted,
+    /// 1: done, and something was rejected, infeasible, abstained or failed.
+    Rejected,
+}
+
+/// Runs the program on the process's own arguments.
+pub fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(a) => a,
+        Err(e) => {
+            // Help and version are answers (0); a wrong word is a refusal (2). clap prints each where it belongs.
+            let _ = e.print();
+            return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
+        }
+    };
+    let mut screen = Screen::new(arguments.json);
+    let ending = match arguments.command {
+        Command::Margins(a) => margins::run(&a, &mut screen),
+        Command::Simulate(a) => simulate::run(&a, &mut screen),
+    };
+    match ending {
+        Ok(Ending::Accepted) => ExitCode::SUCCESS,
+        Ok(Ending::Rejected) => ExitCode::from(1),
+        Err(failure) => {
+            screen.refuse(&failure);
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! What a person sees: results on stdout, messages and progress on stderr.
+
+use super::Failure;
+use serde::Serialize;
+use std::error::Error;
+use std::io::Write;
+
+/// The two streams. With `--json` stdout carries one document and nothing else.
+#[derive(Debug)]
+pub(super) struct Screen {
+    json: bool,
+}
+
+impl Screen {
+    pub(super) fn new(json: bool) -> Screen {
+        Screen { json }
+    }
+
+    /// The result: `document` with `--json`, else `text`. A reader that went away (`| head`) is not an error.
+    pub(super) fn result(&mut self, document: &impl Serialize, text: &str) -> Result<(), Failure> {
+        let out = if self.json {
+            serde_json::to_string_pretty(document).map_err(|source| Failure::Json { source })? + "\n"
+        } else {
+            text.to_owned()
+        };
+        match std::io::stdout().lock().write_all(out.as_bytes()) {
+            Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Stdout { source: e }),
+            _ => Ok(()),
+        }
+    }
+
+    /// A message beside the result.
+    pub(super) fn say(&mut self, text: &str) {
+        // There is nowhere to report that stderr is closed.
+        let _ = writeln!(std::io::stderr().lock(), "{text}");
+    }
+
+    /// The refusal and its causes.
+    pub(super) fn refuse(&mut self, failure: &Failure) {
+        let mut text = format!("error: {failure}");
+        let mut cause = failure.source();
+        while let Some(c) = cause {
+            let more = c.to_string();
+            // A transparent wrapper repeats what it wraps.
+            if !text.contains(&more) {
+                text.push_str(&format!("\n  because: {more}"));
+            }
+            cause = c.source();
+        }
+        self.say(&text);
+    }
+}

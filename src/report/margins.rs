@@ -1,0 +1,58 @@
+//! Margins in words: for the terminal and for a page.
+
+use super::ReportError;
+use super::number::NumberFormat;
+use super::table::{Cell, Column, Table, Verdict};
+use crate::feedback::Margins;
+
+/// The figures of one loop as rows of name, value, unit, place.
+pub fn margins_table(m: &Margins) -> Result<Table, ReportError> {
+    let mut table = Table::new(
+        if m.stable { "Margins (the closed loop is stable)" } else { "Margins (the closed loop is UNSTABLE)" },
+        vec![
+            Column::words("figure"),
+            Column::numbers("value", "", NumberFormat::Significant(5)),
+            Column::words("unit"),
+            Column::numbers("at", "Hz", NumberFormat::Significant(5)),
+        ],
+    );
+    let mut row = |name: &str, value: Option<f64>, unit: &str, hz: Option<f64>| {
+        table.push(vec![name.into(), value.into(), unit.into(), hz.into()])
+    };
+    row("phase margin", m.phase_margin_deg, "deg", m.gain_crossover_hz)?;
+    row("gain margin", m.gain_margin_db, "dB", m.phase_crossover_hz)?;
+    row("max sensitivity Ms", Some(m.max_sensitivity), "ratio", Some(m.max_sensitivity_hz))?;
+    row("modulus margin 1/Ms", Some(m.modulus_margin), "ratio", Some(m.max_sensitivity_hz))?;
+    row("delay margin", m.delay_margin_s.map(|s| s * 1e6), "us", None)?;
+    row("disk margin", Some(m.disk_margin), "ratio", Some(m.disk_margin_hz))?;
+    if m.unstable_poles != 0 {
+        let value = Cell::from(m.unstable_poles as f64).flagged(Verdict::Fail, "unstable");
+        table.push(vec!["closed-loop poles outside the unit circle".into(), value, "".into(), None.into()])?;
+    }
+    Ok(table)
+}
+
+/// All crossings of one loop.
+pub fn crossings_table(m: &Margins) -> Result<Table, ReportError> {
+    let mut table = Table::new(
+        "All crossings",
+        vec![
+            Column::words("crossing"),
+            Column::numbers("at", "Hz", NumberFormat::Significant(6)),
+            Column::numbers("phase margin", "deg", NumberFormat::Significant(5)),
+            Column::numbers("gain margin", "dB", NumberFormat::Significant(5)),
+        ],
+    );
+    for c in &m.gain_crossings {
+        table.push(vec!["|L| = 1".into(), c.hz.into(), c.value.into(), None.into()])?;
+    }
+    for c in &m.phase_crossings {
+        table.push(vec!["L real, negative".into(), c.hz.into(), None.into(), c.value.into()])?;
+    }
+    Ok(table)
+}
+
+/// Both tables for a terminal.
+pub fn margins_text(m: &Margins) -> Result<String, ReportError> {
+    Ok(format!("{}\n{}", margins_table(m)?.text(), crossings_table(m)?.text()))
+}

@@ -1,0 +1,32 @@
+//! The only place where numbers become text or pictures: tables, plots, pages.
+//!
+//! In: plain columns and words. Out: [`table::Table`] as HTML or aligned text, [`figure::Figure`] as SVG or as part of
+//! a page, [`page::Page`] as one HTML file that needs nothing else. Convention: every number has its unit beside it;
+//! every text from outside is escaped. Spec: `specs/report.md`.
+
+mod error;
+mod extent;
+mod html;
+mod layout;
+mod marks;
+mod palette;
+mod ticks;
+mod words;
+
+pub mod bode;
+pub mod figure;
+pub mod margins;
+pub mod number;
+pub mod nyquist;
+pub mod page;
+pub mod pes;
+pub mod sensitivity;
+pub mod spectrum_bars;
+pub mod svg;
+pub mod table;
+pub mod time;
+
+pub use error::ReportError;
+pub use figure::Figure;
+pub use page::Page;
+pub use table::Table;
