@@ -48,6 +48,10 @@ pub mod feedback;
 
 pub mod pes;
 
+pub mod twin;
+
 pub mod report;
+
+pub mod study;
 
 pub mod cli;

@@ -1,6 +1,6 @@
 //! The words of the command line.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
 /// Identify a servo machine, judge its loop, simulate its spiral write, tune its gains.
@@ -21,6 +21,7 @@ pub(super) struct Arguments {
 pub(super) enum Command {
     Margins(MarginsArguments),
     Simulate(SimulateArguments),
+    Study(StudyArguments),
 }
 
 /// Margins of the open loop: crossings, gain, phase, delay, modulus and disk margin
@@ -55,4 +56,26 @@ pub(super) struct SimulateArguments {
     /// Also write the record, one row a servo sample, as CSV
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
+}
+
+/// Makes a table or picture of results/ again
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  servotune study classes --out results")]
+pub(super) struct StudyArguments {
+    /// Which study
+    #[arg(value_enum)]
+    pub study: StudyName,
+    /// Folder to write to
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Folder with the measured records (studies `mirror`, `motor`, `hdd`)
+    #[arg(long, value_name = "DIR", default_value = "../shared/data")]
+    pub data: PathBuf,
+}
+
+/// The studies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum StudyName {
+    /// The four machine classes under one controller (figures 16-22)
+    Classes,
 }

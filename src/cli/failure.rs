@@ -6,6 +6,7 @@ use crate::feedback::FeedbackError;
 use crate::lti::LtiError;
 use crate::pes::{PesError, ProfileError};
 use crate::report::ReportError;
+use crate::study::StudyError;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -31,6 +32,8 @@ pub enum Failure {
     Lti(#[from] LtiError),
     #[error(transparent)]
     Report(#[from] ReportError),
+    #[error(transparent)]
+    Study(#[from] StudyError),
     /// Two algorithms that share no code disagree: no answer can be trusted.
     #[error(
         "stability: the Nyquist count finds {by_count} unstable poles and the eigenvalues {by_eigenvalues} (largest |z| = {largest}): no answer is given"

@@ -9,6 +9,7 @@ mod load;
 mod margins;
 mod screen;
 mod simulate;
+mod study;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -39,6 +40,7 @@ pub fn main() -> ExitCode {
     let ending = match arguments.command {
         Command::Margins(a) => margins::run(&a, &mut screen),
         Command::Simulate(a) => simulate::run(&a, &mut screen),
+        Command::Study(a) => study::run(&a, &mut screen),
     };
     match ending {
         Ok(Ending::Accepted) => ExitCode::SUCCESS,

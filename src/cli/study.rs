@@ -1,0 +1,26 @@
+//! `servotune study`: the tables and pictures of `results/`, made again.
+
+use super::arguments::{StudyArguments, StudyName};
+use super::{Ending, Failure, Screen};
+use crate::document::write_text;
+use crate::study;
+use serde::Serialize;
+
+#[derive(Serialize)]
+struct Written {
+    files: Vec<String>,
+}
+
+pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let made = match a.study {
+        StudyName::Classes => study::classes()?,
+    };
+    let mut written = Written { files: Vec::new() };
+    for (name, content) in &made.files {
+        let file = a.out.join(name);
+        write_text(&file, content)?;
+        written.files.push(file.display().to_string());
+    }
+    screen.result(&written, &format!("{}\n", written.files.join("\n")))?;
+    Ok(Ending::Accepted)
+}

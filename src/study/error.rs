@@ -1,0 +1,31 @@
+//! Why a study could not be made.
+
+use crate::controller::ControllerError;
+use crate::feedback::FeedbackError;
+use crate::lti::LtiError;
+use crate::pes::PesError;
+use crate::report::ReportError;
+use crate::twin::TwinError;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Every way a study can fail.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "each variant carries its own message")]
+pub enum StudyError {
+    #[error(transparent)]
+    Twin(#[from] TwinError),
+    #[error(transparent)]
+    Lti(#[from] LtiError),
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
+    #[error(transparent)]
+    Feedback(#[from] FeedbackError),
+    #[error(transparent)]
+    Pes(#[from] PesError),
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// A measured record that this study rests on is not there.
+    #[error("{}: the measured record that this study rests on is not there; give its folder with --data", file.display())]
+    Absent { file: PathBuf },
+}

@@ -1,0 +1,30 @@
+//! Studies: every table and picture in `results/`, made again by `servotune study NAME`.
+//!
+//! In: built-in machines, seeds, and where a study needs them measured records. Out: a [`Study`], pages and pictures as text.
+//! Nothing is written here; the command line does that.
+
+mod classes;
+mod error;
+
+pub use classes::classes;
+pub use error::StudyError;
+
+/// What a study hands over: files by name, relative to the results' folder.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Study {
+    /// Name and content of each file.
+    pub files: Vec<(String, String)>,
+}
+
+/// Size of the pictures.
+const PICTURE: crate::report::svg::Size = crate::report::svg::Size::WIDE;
+
+impl Study {
+    fn page(&mut self, name: &str, text: String) {
+        self.files.push((name.to_owned(), text));
+    }
+
+    fn picture(&mut self, name: &str, figure: &crate::report::Figure) {
+        self.files.push((format!("figures/{name}.svg"), crate::report::svg::standalone(figure, PICTURE)));
+    }
+}
