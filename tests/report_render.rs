@@ -176,12 +176,12 @@ fn card(label: &str, value: &str, unit: &str, note: &str, verdict: Verdict) -> C
 }
 
 fn gains() -> Table {
-    let number = NumberFormat::Significant(4);
+    let number = NumberFormat::Significant(3);
     let columns = vec![
         Column::words("Parameter"),
-        Column::numbers("Before", "V/track, s", number),
-        Column::numbers("After", "V/track, s", number),
-        Column::numbers("Lowest allowed", "V/track, s", number),
+        Column::numbers("Before", "V/track", number),
+        Column::numbers("After", "V/track", number),
+        Column::numbers("Lowest allowed", "V/track", number),
     ];
     let mut table = Table::new("Gains before and after", columns);
     table.push(vec!["kp".into(), 0.21.into(), 0.27.into(), 1e-3.into()]).unwrap();

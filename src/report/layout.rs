@@ -19,7 +19,7 @@ pub struct Size {
 
 impl Size {
     /// For a page as wide as a desk screen or a sheet of paper.
-    pub const WIDE: Size = Size { width: 780.0, panel_height: 240.0, points: 6000 };
+    pub const WIDE: Size = Size { width: 860.0, panel_height: 250.0, points: 6000 };
     /// For one of two pictures side by side.
     pub const HALF: Size = Size { width: 540.0, panel_height: 210.0, points: 4000 };
     /// For a phone.
@@ -199,8 +199,7 @@ fn equal_aspect(x: View, y: View, width: f64, panel_height: f64) -> (View, View,
 
 /// Words of vertical lines and x regions, in rows above the panel so that they never cover data.
 fn place_headers(placed: &mut Placed, width: f64) -> usize {
-    let mut ends: Vec<f64> = Vec::new();
-    let mut headers = Vec::new();
+    let mut drafts: Vec<(Header, f64)> = Vec::new();
     for mark in &placed.panel.marks {
         let (text, ink, from, to) = match mark {
             Mark::Line(line) if line.on == Direction::X => (&line.label, line.ink, line.at, line.at),
@@ -216,11 +215,13 @@ fn place_headers(placed: &mut Placed, width: f64) -> usize {
         let half = 0.5 * text_width(text, 11.0);
         let middle = placed.area.x + 0.5 * (a.max(0.0) + b.min(1.0)) * placed.area.w;
         let x = middle.min(width - half - 2.0).max(half + 2.0);
-        headers.push(Header { text: text.clone(), ink, from, to, x, y: half });
+        drafts.push((Header { text: text.clone(), ink, from, to, x, y: 0.0 }, half));
     }
-    headers.sort_by(|a, b| a.x.total_cmp(&b.x));
-    for header in &mut headers {
-        let (start, end) = (header.x - header.y - 4.0, header.x + header.y + 4.0);
+    drafts.sort_by(|a, b| a.0.x.total_cmp(&b.0.x));
+    // Where the words in each row end.
+    let mut ends: Vec<f64> = Vec::new();
+    for (header, half) in &mut drafts {
+        let (start, end) = (header.x - *half - 4.0, header.x + *half + 4.0);
         let row = ends.iter().position(|&e| e <= start).unwrap_or(ends.len());
         match ends.get_mut(row) {
             Some(e) => *e = end,
@@ -228,7 +229,7 @@ fn place_headers(placed: &mut Placed, width: f64) -> usize {
         }
         header.y = row as f64 * WORD_ROW;
     }
-    placed.headers = headers;
+    placed.headers = drafts.into_iter().map(|(header, _)| header).collect();
     ends.len()
 }
 

@@ -8,9 +8,12 @@ use super::layout::{Layout, Placed};
 use super::palette::class;
 use std::fmt::Write;
 
+/// As far outside as a place needs to be (px).
+const FAR: f64 = 30000.0;
+
 /// A pixel position with two decimals and no superfluous zero; far outside is as good as farther outside.
 pub(super) fn px(value: f64) -> String {
-    let text = format!("{:.2}", value.clamp(-30000.0, 30000.0));
+    let text = format!("{:.2}", value.clamp(-2.0 * FAR, 2.0 * FAR));
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
@@ -100,11 +103,8 @@ fn draw_series(placed: &Placed, series: &Series, limit: usize) -> (&'static str,
         }
         Kind::Band { upper } => {
             for run in runs(placed, series, upper) {
-                polygon(&mut path, run.iter().map(|&i| place(series.x[i], series.y[i])));
-                for &i in run.iter().rev() {
-                    let (x, y) = place(series.x[i], upper[i]);
-                    let _ = write!(path, "L{} {}", px(x), px(y));
-                }
+                let upper_edge = run.iter().rev().map(|&i| place(series.x[i], upper[i]));
+                polygon(&mut path, run.iter().map(|&i| place(series.x[i], series.y[i])).chain(upper_edge));
                 path.push('z');
             }
             ("band", path)
@@ -115,8 +115,8 @@ fn draw_series(placed: &Placed, series: &Series, limit: usize) -> (&'static str,
 /// Stretches of a band without a gap.
 fn runs(placed: &Placed, series: &Series, upper: &[f64]) -> Vec<Vec<usize>> {
     let mut runs: Vec<Vec<usize>> = vec![Vec::new()];
-    for i in 0..series.x.len() {
-        let whole = [placed.px(series.x[i]), placed.py(series.y[i]), placed.py(upper[i])].iter().all(|v| v.is_finite());
+    for (i, ((&x, &low), &high)) in series.x.iter().zip(&series.y).zip(upper).enumerate() {
+        let whole = [placed.px(x), placed.py(low), placed.py(high)].iter().all(|v| v.is_finite());
         match runs.last_mut() {
             Some(run) if whole => run.push(i),
             Some(run) if !run.is_empty() => runs.push(Vec::new()),
@@ -127,15 +127,34 @@ fn runs(placed: &Placed, series: &Series, upper: &[f64]) -> Vec<Vec<usize>> {
     runs
 }
 
+/// Relative steps in hundredths of a pixel: half as long as places, and the rounding does not add up.
 fn polygon(path: &mut String, points: impl Iterator<Item = (f64, f64)>) {
-    let mut down = false;
+    let mut before: Option<(i64, i64)> = None;
     for (x, y) in points {
         if !(x.is_finite() && y.is_finite()) {
-            down = false;
+            before = None;
             continue;
         }
-        let _ = write!(path, "{}{} {}", if down { 'L' } else { 'M' }, px(x), px(y));
-        down = true;
+        let hundredths = |v: f64| (v.clamp(-FAR, FAR) * 100.0).round() as i64;
+        let at = (hundredths(x), hundredths(y));
+        match before {
+            None => {
+                let _ = write!(path, "M{} {}l0 0", hundredth(at.0), hundredth(at.1));
+            }
+            Some((x, y)) if (x, y) != at => {
+                let _ = write!(path, " {} {}", hundredth(at.0 - x), hundredth(at.1 - y));
+            }
+            Some(_) => {}
+        }
+        before = Some(at);
+    }
+}
+
+fn hundredth(value: i64) -> String {
+    let text = px(value as f64 / 100.0);
+    match text.strip_prefix("-0.") {
+        Some(rest) => format!("-.{rest}"),
+        None => text.strip_prefix("0.").map_or_else(|| text.clone(), |rest| format!(".{rest}")),
     }
 }
 

@@ -5,7 +5,7 @@
 
 use super::figure::Figure;
 use super::html::{figure, script, style};
-use super::svg::Size;
+use super::svg::{Size, harmful};
 use super::table::{Table, Verdict};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -107,7 +107,7 @@ impl Page {
                 }
             }
         };
-        page.into_string()
+        page.into_string().replace(harmful, "\u{fffd}")
     }
 }
 
@@ -116,13 +116,13 @@ fn cards(cards: &[Card]) -> Markup {
         section aria-label="Summary" {
             dl.cards {
                 @for card in cards {
-                    div.card class=(card.verdict.map_or("plain", Verdict::class)) {
+                    div class={ "card " (card.verdict.map_or("plain", Verdict::class)) } {
                         dt { (card.label) }
                         dd.value {
                             (card.value) @if !card.unit.is_empty() { " " span.unit { (card.unit) } }
                         }
                         dd.note {
-                            @if let Some(verdict) = card.verdict { span.badge class=(verdict.class()) { (verdict.word()) } " " }
+                            @if let Some(verdict) = card.verdict { span class={ "badge " (verdict.class()) } { (verdict.word()) } " " }
                             (card.note)
                         }
                     }
@@ -162,7 +162,7 @@ fn block(found: &Block, count: &mut usize) -> Markup {
     match found {
         Block::Prose(text) => html! { p { (text) } },
         Block::Notice(verdict, text) => html! {
-            p.notice class=(verdict.class()) { span.badge class=(verdict.class()) { (verdict.word()) } " " (text) }
+            p class={ "notice " (verdict.class()) } { span class={ "badge " (verdict.class()) } { (verdict.word()) } " " (text) }
         },
         Block::Table(table) => table.markup(),
         Block::Figure(f) => draw(f, Size::WIDE),

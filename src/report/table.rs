@@ -5,6 +5,7 @@
 
 use super::error::ReportError;
 use super::number::{MISSING, NumberFormat};
+use super::svg::harmful;
 use maud::{Markup, html};
 
 /// A table whose rows all have one cell for each column.
@@ -266,14 +267,14 @@ impl Cell {
                 Value::Text(words) => (words),
                 Value::Missing => (MISSING),
             }
-            @if let Some((verdict, words)) = &self.flag { " " span.flag class=(verdict.class()) { (words) } }
+            @if let Some((verdict, words)) = &self.flag { " " span class={ "flag " (verdict.class()) } { (words) } }
         }
     }
 }
 
 /// Control characters would break the columns, or talk to the terminal.
 fn one_line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+    text.chars().map(|c| if c.is_control() || harmful(c) { ' ' } else { c }).collect()
 }
 
 #[cfg(test)]

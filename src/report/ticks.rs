@@ -126,18 +126,18 @@ mod tests {
     fn a_narrow_stretch_of_a_logarithmic_axis_gets_linear_steps() {
         let view = View::new(Scale::Log10, 1150.0, 1290.0);
         assert_eq!(
-            labels(view, Ticks::Decimal, 600.0, 100.0),
+            labels(view, Ticks::Decimal, 700.0, 100.0),
             ["1160", "1180", "1200", "1220", "1240", "1260", "1280"]
         );
     }
 
     #[test]
-    fn every_step_is_at_least_what_was_asked_and_at_most_six_times_it() {
+    fn every_step_is_at_least_what_was_asked_and_at_most_two_and_a_half_times_it() {
         for policy in [Ticks::Decimal, Ticks::Decibels, Ticks::Degrees] {
             for k in -60..60 {
                 let raw = 10f64.powf(f64::from(k) * 0.1);
                 let found = step(policy, raw);
-                // 360 follows 180 and 5 follows 2, so that no gap between steps is above 2.5; 1e-9 is rounding.
+                // 360 follows 180 and 5 follows 2, so that no two steps differ by more than 2.5; the rest is rounding.
                 assert!(found >= raw * (1.0 - 1e-8) && found <= 2.6 * raw, "{policy:?} {raw} {found}");
             }
         }

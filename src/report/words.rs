@@ -104,7 +104,7 @@ fn put(svg: &mut String, placed: &Placed, taken: &mut Vec<Rect>, ink: Ink, text:
         let rect = frame(spot);
         let inside = contains(&placed.area, &rect);
         let clash = taken.iter().filter(|other| overlap(&rect, other)).count();
-        covered(placed, &rect) + 1000 * clash + if inside { 0 } else { 3000 }
+        covered(placed, &rect) + crossed(placed, &rect) + 1000 * clash + if inside { 0 } else { 3000 }
     };
     let Some(best) = spots.iter().min_by_key(|spot| cost(spot)) else {
         return;
@@ -158,6 +158,27 @@ fn covered(placed: &Placed, rect: &Rect) -> usize {
                 count += usize::from(near);
             }
             before = Some(at);
+        }
+    }
+    count
+}
+
+/// How much of lines and circles lies under the words, in the same measure as data but lighter.
+fn crossed(placed: &Placed, rect: &Rect) -> usize {
+    let within = |x: f64, y: f64| x >= rect.x && x <= rect.x + rect.w && y >= rect.y && y <= rect.y + rect.h;
+    let mut count = 0;
+    for mark in &placed.panel.marks {
+        match mark {
+            Mark::Line(line) if line.on == Direction::Y => count += 4 * usize::from(within(rect.x, placed.py(line.at))),
+            Mark::Line(line) => count += usize::from(within(placed.px(line.at), rect.y)),
+            Mark::Circle(circle) => {
+                for k in 0..180 {
+                    let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 180.0).sin_cos();
+                    let (x, y) = (circle.centre.0 + circle.radius * cos, circle.centre.1 + circle.radius * sin);
+                    count += usize::from(within(placed.px(x), placed.py(y)));
+                }
+            }
+            _ => {}
         }
     }
     count

@@ -122,6 +122,10 @@ Plot.prototype.moveWord = function (p, e, m) {
   }
   e.setAttribute("transform", "translate(" + dx + " " + dy + ")");
   e.style.display = seen ? "" : "none";
+  if (!seen || this.home(p) || e.dataset.from !== undefined || e.dataset.x === undefined) return;
+  var box = e.getBBox(), left = box.x + dx, right = left + box.width;
+  if (right > p.x + p.w) dx -= right - p.x - p.w + 4; else if (left < p.x) dx += p.x - left + 4;
+  e.setAttribute("transform", "translate(" + dx + " " + dy + ")");
 };
 Plot.prototype.keys = function () {
   var self = this;

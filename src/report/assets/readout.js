@@ -38,8 +38,10 @@ Plot.prototype.hoverCurve = function (p, x, y) {
   if (!best) return;
   make(p.over, "circle", { cx: best.x, cy: best.y, r: 4.5, "class": "spot " + best.s.ink });
   var d = p.data, i = best.i, s = best.s;
-  this.say([[s.name, ""], [s.along.label, withUnit(s.along.v[i], s.along.unit)], [d.xl, withUnit(this.xs[s.x][i], d.xu)],
-    [d.yl, withUnit(s.y[i], d.yu)], ["distance from \u22121", number(Math.hypot(1 + this.xs[s.x][i], s.y[i]))]], best.x, best.y);
+  var lines = [[s.name, ""], [s.along.label, withUnit(s.along.v[i], s.along.unit)], [d.xl, withUnit(this.xs[s.x][i], d.xu)],
+    [d.yl, withUnit(s.y[i], d.yu)]];
+  if (p.equal) lines.push(["distance from \u22121", number(Math.hypot(1 + this.xs[s.x][i], s.y[i]))]);
+  this.say(lines, best.x, best.y);
 };
 Plot.prototype.hoverColumn = function (p, x, y) {
   var self = this, u = this.atColumn(p, x), panels = this.share ? this.panels : [p], at = NaN, least = Infinity;
