@@ -7,5 +7,11 @@ pub mod units;
 
 pub mod document;
 
+pub mod numeric;
+
 pub mod frf;
 pub mod lti;
+
+pub mod identify;
+
+pub mod twin;
