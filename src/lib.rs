@@ -45,6 +45,7 @@ pub mod lti;
 pub mod controller;
 
 pub mod feedback;
+pub mod identify;
 
 pub mod pes;
 

@@ -1,7 +1,8 @@
 //! Where a curve crosses a level: brackets on the trace, refined on the function itself.
 
 use super::{OpenLoop, Trace};
-use crate::numeric::root::{bracketed_root, golden_minimum};
+use crate::numeric::golden::golden_section;
+use crate::numeric::root::bracketed_root;
 use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -36,7 +37,8 @@ pub(super) fn sign_changes(l: &impl OpenLoop, trace: &Trace, level: impl Fn(Comp
             let s = g[i].signum();
             let (a, m, b) = (s * g[i - 1], s * g[i], s * g[i + 1]);
             if m <= a && m <= b && m < 0.25 * (a - m).max(b - m) {
-                let (x, y) = golden_minimum(|x| s * f(x), w[i - 1], w[i + 1], 60);
+                let dip = golden_section(|x| s * f(x), w[i - 1], w[i + 1], 1e-12 * w[i]);
+                let (x, y) = (dip.x, dip.value);
                 if y < 0.0 {
                     found.push(root(w[i - 1], g[i - 1], x, s * y));
                     found.push(root(x, s * y, w[i + 1], g[i + 1]));

@@ -1,4 +1,11 @@
 //! Numerics without control meaning: roots, minima, least squares, spectra, random numbers.
+//!
+//! In: plain slices. Out: plain numbers and small structs. Every method is deterministic.
 
+pub mod golden;
+pub mod least_squares;
+pub mod levenberg;
+pub mod peaks;
+pub mod polynomial;
 pub mod random;
 pub mod root;

@@ -1,4 +1,4 @@
-//! Roots and minima of one variable inside a bracket.
+//! Roots of one variable inside a bracket.
 
 /// A root of `f` between `a` and `b`, where `fa` = f(a) and `fb` = f(b) differ in sign; found to `tolerance` in x.
 ///
@@ -41,26 +41,6 @@ pub fn bracketed_root(mut f: impl FnMut(f64) -> f64, a: f64, fa: f64, b: f64, fb
     0.5 * (a + b)
 }
 
-/// The smallest value of `f` between `a` and `b` and where it lies, by golden section with `steps` reductions of 0.618.
-pub fn golden_minimum(mut f: impl FnMut(f64) -> f64, mut a: f64, mut b: f64, steps: usize) -> (f64, f64) {
-    const RATIO: f64 = 0.618_033_988_749_894_9;
-    let mut c = b - RATIO * (b - a);
-    let mut d = a + RATIO * (b - a);
-    let (mut fc, mut fd) = (f(c), f(d));
-    for _ in 0..steps {
-        if fc < fd {
-            (b, d, fd) = (d, c, fc);
-            c = b - RATIO * (b - a);
-            fc = f(c);
-        } else {
-            (a, c, fc) = (c, d, fd);
-            d = a + RATIO * (b - a);
-            fd = f(d);
-        }
-    }
-    if fc < fd { (c, fc) } else { (d, fd) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -73,12 +53,5 @@ mod tests {
         let falling = |x: f64| (-x).exp() - 0.5;
         let y = bracketed_root(falling, 0.0, falling(0.0), 5.0, falling(5.0), 1e-13);
         assert!((y - 2f64.ln()).abs() < 3e-13);
-    }
-
-    #[test]
-    fn a_minimum_with_a_closed_form() {
-        let (x, y) = golden_minimum(|x| (x - 0.3).powi(2) + 1.0, -2.0, 3.0, 60);
-        // A parabola is flat to rounding within the square root of the machine epsilon.
-        assert!((x - 0.3).abs() < 1e-7 && (y - 1.0).abs() < 1e-14);
     }
 }

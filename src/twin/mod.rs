@@ -3,5 +3,7 @@
 //! In: a class or a seed. Out: plants, controllers, profiles, measured responses. Truth: `specs/machines/`, `specs/paper.md`.
 
 mod machines;
+pub mod plants;
+pub mod study_identify;
 
 pub use machines::{MachineClass, TwinError, nominal_controller, paper_machine, paper_profile};
