@@ -3,7 +3,7 @@
 
 use nalgebra::Complex;
 use servotune::controller::{Controller, Lowpass, Notch, Pid};
-use servotune::feedback::{ModelLoop, OpenLoop, Trace, closed_loop_poles, margins, nyquist_count};
+use servotune::feedback::{ModelLoop, OpenLoop, Trace, angle_from_rest, closed_loop_poles, margins, nyquist_count};
 use servotune::lti::{Body, DiscretePlant, FrequencyResponse, Mode, Plant};
 use servotune::numeric::random::Random;
 use std::f64::consts::{PI, TAU};
@@ -28,14 +28,11 @@ impl<F: Fn(f64) -> Complex<f64>> OpenLoop for Formula<F> {
     fn end_rad_s(&self) -> f64 {
         self.to
     }
-    fn integrators(&self) -> usize {
-        self.integrators
+    fn start_angle(&self, w: f64, value: Complex<f64>) -> f64 {
+        angle_from_rest(w * self.sample_time_s, value, self.integrators)
     }
     fn unstable_poles(&self) -> usize {
         0
-    }
-    fn sample_time_s(&self) -> f64 {
-        self.sample_time_s
     }
     fn ends_at_half_rate(&self) -> bool {
         self.half_rate

@@ -2,7 +2,8 @@
 //!
 //! F(z) = (1 + L)(1 - z⁻¹)^m with m integrators is finite on the unit circle. It has as many zeros as poles, so the zeros
 //! outside, which are the unstable closed-loop poles, number P_out - (turns of F over the circle). By symmetry the turns are
-//! the change of arg F over the upper half, divided by π (argument principle).
+//! the change of arg F over the upper half, divided by π (argument principle). The factor (1 - z⁻¹)^m is real at z = -1, so
+//! once the angle near z = 1 is known ([`OpenLoop::start_angle`]) it need not be carried along.
 
 use super::{OpenLoop, Trace};
 use nalgebra::Complex;
@@ -22,31 +23,13 @@ pub struct NyquistCount {
 
 /// Counts the unstable closed-loop poles; `trace` is the loop's own.
 pub fn nyquist_count(l: &impl OpenLoop, trace: &Trace) -> NyquistCount {
-    let m = l.integrators() as i32;
-    let t = l.sample_time_s();
-    let lifted = |w: f64, v: Complex<f64>| {
-        (Complex::new(1.0, 0.0) + v) * (Complex::new(1.0, 0.0) - Complex::from_polar(1.0, -w * t)).powi(m)
-    };
-    let mut turn = 0.0;
-    let mut before: Option<Complex<f64>> = None;
-    for (&w, &v) in trace.w_rad_s.iter().zip(&trace.value) {
-        let f = lifted(w, v);
-        match before {
-            // At z = 1 F is real: what is missing below the first point is the way to the nearer half of the real axis.
-            None => turn += if f.re >= 0.0 { f.arg() } else { -(-f.conj()).arg() },
-            Some(b) => turn += (f * b.conj()).arg(),
-        }
-        before = Some(f);
-    }
-    if !l.ends_at_half_rate() {
-        // Beyond the sweep |L| < 1 is taken for granted; F then ends on the positive side of its lifting factor.
-        if let Some(&w) = trace.w_rad_s.last() {
-            let lifting = (Complex::new(1.0, 0.0) - Complex::from_polar(1.0, -w * t)).powi(m);
-            let last = before.unwrap_or(lifting);
-            turn += (lifting * last.conj()).arg() + f64::from(m) * (0.5 * w * t - 0.5 * PI);
-        }
-    }
-    let half_turns = turn / PI;
+    let one = Complex::new(1.0, 0.0);
+    let curve = || trace.value.iter().map(|&v| one + v);
+    let start = trace.w_rad_s.first().zip(trace.value.first()).map_or(0.0, |(&w, &v)| l.start_angle(w, v));
+    let turned: f64 = curve().zip(curve().skip(1)).map(|(a, b)| (b * a.conj()).arg()).sum();
+    // Beyond the end of a sweep |L| < 1 is taken for granted: 1 + L comes home to the positive real axis by the short way.
+    let home = if l.ends_at_half_rate() { 0.0 } else { -curve().last().unwrap_or(one).arg() };
+    let half_turns = (start + turned + home) / PI;
     let whole = half_turns.round();
     NyquistCount {
         unstable_closed_loop_poles: l.unstable_poles() as i64 - whole as i64,

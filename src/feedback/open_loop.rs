@@ -13,12 +13,11 @@ pub trait OpenLoop {
     fn grid(&self) -> Vec<f64>;
     /// The frequency (rad/s) at which the loop ends: half the sample rate, or the last point of the sweep.
     fn end_rad_s(&self) -> f64;
-    /// Poles of L on z = 1.
-    fn integrators(&self) -> usize;
+    /// Argument of 1 + L at the first point of the grid (rad), followed from z = 1, where 1 + L with its integrators taken
+    /// out is real and positive or negative.
+    fn start_angle(&self, w_rad_s: f64, value: Complex<f64>) -> f64;
     /// Poles of L outside the unit circle.
     fn unstable_poles(&self) -> usize;
-    /// Sample time (s).
-    fn sample_time_s(&self) -> f64;
     /// Whether [`OpenLoop::end_rad_s`] is half the sample rate, where L is real.
     fn ends_at_half_rate(&self) -> bool;
 }
@@ -82,6 +81,17 @@ pub(super) fn section_poles(sections: &Sections) -> (usize, usize) {
     counts
 }
 
+/// The argument of 1 + L near z = 1, `turn` = w T, where L has `integrators` poles on z = 1.
+///
+/// F = (1 + L)(1 - 1/z)^m is real at z = 1, so near it F has hardly left the nearer half of the real axis.
+pub fn angle_from_rest(turn: f64, value: Complex<f64>, integrators: usize) -> f64 {
+    let m = integrators as i32;
+    let step = Complex::new(1.0, 0.0) - Complex::from_polar(1.0, -turn);
+    let f = (Complex::new(1.0, 0.0) + value) * step.powi(m);
+    let snapped = if f.re >= 0.0 { f.arg() } else { (-f).arg() };
+    snapped - f64::from(m) * step.arg()
+}
+
 impl OpenLoop for ModelLoop<'_> {
     fn at(&self, w: f64) -> Complex<f64> {
         self.plant.at(w) * self.sections.at(w)
@@ -95,16 +105,16 @@ impl OpenLoop for ModelLoop<'_> {
         std::f64::consts::PI / self.sections.sample_time_s
     }
 
-    fn integrators(&self) -> usize {
-        self.plant.integrators() + section_poles(self.sections).0
+    fn start_angle(&self, w: f64, value: Complex<f64>) -> f64 {
+        angle_from_rest(
+            w * self.sections.sample_time_s,
+            value,
+            self.plant.integrators() + section_poles(self.sections).0,
+        )
     }
 
     fn unstable_poles(&self) -> usize {
         section_poles(self.sections).1
-    }
-
-    fn sample_time_s(&self) -> f64 {
-        self.sections.sample_time_s
     }
 
     fn ends_at_half_rate(&self) -> bool {

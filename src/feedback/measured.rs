@@ -1,0 +1,257 @@
+//! The loop of a measured response: the same margins, each with its interval.
+//!
+//! Between the points of the sweep ln L is interpolated over ln w. Each value may be off by the measurement's deviation and by
+//! the interpolation's error, for which the local second differences speak. A mode narrower than the grid can still hide:
+//! these are intervals about noise and interpolation, not certificates.
+
+use super::open_loop::section_poles;
+use super::{FeedbackError, Margins, OpenLoop, margins};
+use crate::frf::Frf;
+use crate::lti::{FrequencyResponse, Sections};
+use crate::numeric::interpolation::MonotoneCubic;
+use nalgebra::Complex;
+use serde::Serialize;
+use std::f64::consts::{PI, TAU};
+
+/// A measured plant response under the firmware's sections.
+#[derive(Clone, Debug)]
+pub struct MeasuredLoop<'a> {
+    sections: &'a Sections,
+    /// ln |P| and the continuous phase of P (rad) over ln w, hold included.
+    ln_size: MonotoneCubic,
+    phase: MonotoneCubic,
+    /// Half width (95 %) of ln|P| and of the phase (rad) in each interval of the sweep.
+    slack: Vec<f64>,
+    start_phase: f64,
+}
+
+/// A range.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// 95 % intervals of the named margins; `None` where the margin does not exist.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct MarginIntervals {
+    /// Phase margin (deg).
+    pub phase_margin_deg: Option<Interval>,
+    /// Gain crossover (Hz).
+    pub gain_crossover_hz: Option<Interval>,
+    /// Gain margin (dB).
+    pub gain_margin_db: Option<Interval>,
+    /// Phase crossover (Hz).
+    pub phase_crossover_hz: Option<Interval>,
+    /// Ms (ratio).
+    pub max_sensitivity: Interval,
+}
+
+/// Margins of a measured loop.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MeasuredMargins {
+    /// The margins of the interpolated curve.
+    #[serde(flatten)]
+    pub margins: Margins,
+    /// Their intervals.
+    pub intervals: MarginIntervals,
+    /// Band that was judged (Hz): below and above it nothing is known.
+    pub band_hz: Interval,
+    /// |L| at the upper end of the band; the count of unstable poles takes for granted that it stays below 1 from there on.
+    pub end_gain: f64,
+}
+
+/// Two-sided 95 % of a normal, on one part of a complex value whose deviation is given for both parts together.
+const REACH: f64 = 1.96 * std::f64::consts::FRAC_1_SQRT_2;
+
+impl<'a> MeasuredLoop<'a> {
+    /// `hold_included`: the sweep was taken through the controller's own hold, so it is not applied again.
+    ///
+    /// The plant is taken to be stable with a phase between +90 and -270 deg at the first point, as a positioner's is.
+    pub fn new(frf: &Frf, sections: &'a Sections, hold_included: bool) -> Result<Self, FeedbackError> {
+        let t = sections.sample_time_s;
+        let n = frf.w_rad_s().partition_point(|&w| w < PI / t);
+        if n < 4 {
+            let from_hz = frf.w_rad_s()[0] / TAU;
+            return Err(FeedbackError::Band { from_hz, half_rate_hz: 0.5 / t });
+        }
+        let w = &frf.w_rad_s()[..n];
+        let value: Vec<Complex<f64>> =
+            w.iter().zip(frf.value()).map(|(&w, &p)| if hold_included { p } else { p * hold(w * t) }).collect();
+        let ln_w: Vec<f64> = w.iter().map(|w| w.ln()).collect();
+        let ln_size: Vec<f64> = value.iter().map(|v| v.norm().ln()).collect();
+        let mut phase = Vec::with_capacity(n);
+        let first = value[0].arg();
+        phase.push(if first > PI / 2.0 { first - TAU } else { first });
+        for pair in value.windows(2) {
+            let before = phase[phase.len() - 1];
+            phase.push(before + (pair[1] * pair[0].conj()).arg());
+        }
+        let deviation: Vec<f64> = match frf.relative_std() {
+            Some(s) => s[..n].to_vec(),
+            None => vec![scatter(&ln_size, &phase); n],
+        };
+        let slack = (0..n - 1)
+            .map(|i| {
+                let noise = REACH * deviation[i].max(deviation[i + 1]);
+                noise + bend(&ln_w, &ln_size, i).max(bend(&ln_w, &phase, i))
+            })
+            .collect();
+        let start_phase = phase[0];
+        Ok(MeasuredLoop {
+            sections,
+            ln_size: MonotoneCubic::new(ln_w.clone(), ln_size),
+            phase: MonotoneCubic::new(ln_w, phase),
+            slack,
+            start_phase,
+        })
+    }
+
+    /// Half width (95 %) of ln|L| and of arg L (rad) at a frequency of the band.
+    fn slack_at(&self, w: f64) -> f64 {
+        self.slack[self.ln_size.interval(w.ln())]
+    }
+
+    fn ends(&self) -> (f64, f64) {
+        let x = self.ln_size.x();
+        (x[0].exp(), x[x.len() - 1].exp())
+    }
+
+    /// How far (rad/s) around a crossing `level(w)` stays within the slack of 0: there the true curve may cross.
+    fn reach(&self, w0: f64, level: impl Fn(f64) -> f64) -> Interval {
+        let (first, last) = self.ends();
+        let walk = |factor: f64, end: f64| {
+            let mut w = w0;
+            // Steps of a thousandth: finer than any sweep, and bounded by the band.
+            while (w - end) * (factor - 1.0) < 0.0 {
+                let next = w * factor;
+                if level(next).abs() > self.slack_at(next) {
+                    return next;
+                }
+                w = next;
+            }
+            end
+        };
+        Interval { low: walk(1.0 / 1.001, first).max(first), high: walk(1.001, last).min(last) }
+    }
+
+    /// Range of `value(w)` over a range of frequencies, widened by `widen` times the slack.
+    fn range(&self, over: Interval, value: impl Fn(f64) -> f64, widen: f64) -> Interval {
+        let steps = 64;
+        let mut range = Interval { low: f64::INFINITY, high: f64::NEG_INFINITY };
+        for i in 0..=steps {
+            let w = over.low * (over.high / over.low).powf(f64::from(i) / f64::from(steps));
+            let (v, s) = (value(w), widen * self.slack_at(w));
+            range = Interval { low: range.low.min(v - s), high: range.high.max(v + s) };
+        }
+        range
+    }
+}
+
+/// The zero-order hold's response, (1 - e^{-jx})/(jx) with x = w T.
+pub fn hold(x: f64) -> Complex<f64> {
+    let half = 0.5 * x;
+    Complex::from_polar(half.sin() / half, -half)
+}
+
+/// Relative deviation of the values where the file gives none: third differences see noise and hardly anything else, and the
+/// median ignores the resonances. A third difference of white noise has 20 times its variance; 0.6745 is a normal's quartile.
+fn scatter(ln_size: &[f64], phase: &[f64]) -> f64 {
+    let third =
+        |y: &[f64]| -> Vec<f64> { y.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect() };
+    let mut all = third(ln_size);
+    all.extend(third(phase));
+    all.sort_by(f64::total_cmp);
+    let one_part = all[all.len() / 2] / (0.6745 * 20f64.sqrt());
+    one_part * std::f64::consts::SQRT_2
+}
+
+/// Error of interpolating `y` in interval `i`: h²/8 of the larger second derivative at its ends.
+fn bend(x: &[f64], y: &[f64], i: usize) -> f64 {
+    let second = |k: usize| {
+        let (a, b) = (x[k] - x[k - 1], x[k + 1] - x[k]);
+        2.0 * ((y[k + 1] - y[k]) / b - (y[k] - y[k - 1]) / a).abs() / (a + b)
+    };
+    let inner = 1..x.len() - 1;
+    let ends = [i, i + 1];
+    let largest = ends.into_iter().filter(|k| inner.contains(k)).map(second).fold(0.0, f64::max);
+    (x[i + 1] - x[i]).powi(2) / 8.0 * largest
+}
+
+impl OpenLoop for MeasuredLoop<'_> {
+    fn at(&self, w: f64) -> Complex<f64> {
+        let x = w.ln();
+        Complex::from_polar(self.ln_size.at(x).exp(), self.phase.at(x)) * self.sections.at(w)
+    }
+
+    fn grid(&self) -> Vec<f64> {
+        let (first, last) = self.ends();
+        let mut grid = super::frequency_grid(&[], self.sections);
+        grid.retain(|&w| w > first && w < last);
+        grid.extend(self.ln_size.x().iter().map(|x| x.exp()));
+        grid.sort_by(f64::total_cmp);
+        grid.dedup_by(|b, a| *b - *a < 1e-9 * *a);
+        grid
+    }
+
+    fn end_rad_s(&self) -> f64 {
+        self.ends().1
+    }
+
+    fn start_angle(&self, w: f64, value: Complex<f64>) -> f64 {
+        // The plant's phase is known as far as its branch; each section's is followed from z = 1 on its own.
+        let step = Complex::new(1.0, 0.0) - Complex::from_polar(1.0, -w * self.sections.sample_time_s);
+        let back = Complex::from_polar(1.0, -w * self.sections.sample_time_s);
+        let sections: f64 = self
+            .sections
+            .chain
+            .iter()
+            .map(|s| {
+                let at_one = s.poles().iter().filter(|z| (*z - 1.0).norm() < 1e-9).count() as i32;
+                (s.at_delay(back) * step.powi(at_one)).arg() - f64::from(at_one) * step.arg()
+            })
+            .sum();
+        self.start_phase + sections + ((1.0 + value) / value).arg()
+    }
+
+    fn unstable_poles(&self) -> usize {
+        section_poles(self.sections).1
+    }
+
+    fn ends_at_half_rate(&self) -> bool {
+        false
+    }
+}
+
+/// Margins of a measured loop with their intervals.
+pub fn measured_margins(l: &MeasuredLoop<'_>) -> MeasuredMargins {
+    let m = margins(l);
+    let hz = |i: Interval| Interval { low: i.low / TAU, high: i.high / TAU };
+    let gain_reach = m.gain_crossover_hz.map(|f| l.reach(f * TAU, |w| l.at(w).norm().ln()));
+    let phase_reach = m.phase_crossover_hz.map(|f| l.reach(f * TAU, |w| (-l.at(w)).arg()));
+    let degrees = |w: f64| (-l.at(w)).arg().to_degrees();
+    let decibels = |w: f64| -20.0 * l.at(w).norm().log10();
+    // Ms: every point of the curve may lie anywhere in a disc of radius slack |L|.
+    let (mut closest, mut farthest) = (f64::INFINITY, f64::INFINITY);
+    for w in l.grid() {
+        let v = l.at(w);
+        let (distance, radius) = ((1.0 + v).norm(), std::f64::consts::SQRT_2 * l.slack_at(w) * v.norm());
+        closest = closest.min((distance - radius).max(0.0));
+        farthest = farthest.min(distance + radius);
+    }
+    let (first, last) = l.ends();
+    MeasuredMargins {
+        intervals: MarginIntervals {
+            phase_margin_deg: gain_reach.map(|r| l.range(r, degrees, 1f64.to_degrees())),
+            gain_crossover_hz: gain_reach.map(hz),
+            gain_margin_db: phase_reach.map(|r| l.range(r, decibels, 20.0 * std::f64::consts::LOG10_E)),
+            phase_crossover_hz: phase_reach.map(hz),
+            max_sensitivity: Interval { low: 1.0 / farthest, high: 1.0 / closest },
+        },
+        margins: m,
+        band_hz: hz(Interval { low: first, high: last }),
+        end_gain: l.at(last).norm(),
+    }
+}
