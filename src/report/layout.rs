@@ -158,7 +158,7 @@ pub(super) fn place(figure: &Figure, size: Size, title: bool) -> Layout<'_> {
         drafts.push((view_x, view_y, height));
     }
     // Tick words, a gap, and the rotated label of the axis.
-    let left = 26.0 + gutter.max(24.0);
+    let left = 30.0 + gutter.max(24.0);
     let count = figure.panels.len();
     let mut panels = Vec::with_capacity(count);
     for (index, (panel, (view_x, view_y, height))) in figure.panels.iter().zip(drafts).enumerate() {

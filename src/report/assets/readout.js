@@ -38,7 +38,7 @@ Plot.prototype.hoverCurve = function (p, x, y) {
   if (!best) return;
   make(p.over, "circle", { cx: best.x, cy: best.y, r: 4.5, "class": "spot " + best.s.ink });
   var d = p.data, i = best.i, s = best.s;
-  var lines = [[s.name, ""], [s.along.label, withUnit(s.along.v[i], s.along.unit)], [d.xl, withUnit(this.xs[s.x][i], d.xu)],
+  var lines = [[s.name, "", s.ink], [s.along.label, withUnit(s.along.v[i], s.along.unit)], [d.xl, withUnit(this.xs[s.x][i], d.xu)],
     [d.yl, withUnit(s.y[i], d.yu)]];
   if (p.equal) lines.push(["distance from \u22121", number(Math.hypot(1 + this.xs[s.x][i], s.y[i]))]);
   this.say(lines, best.x, best.y);
@@ -62,7 +62,8 @@ Plot.prototype.hoverColumn = function (p, x, y) {
       if (self.hidden[s.key] || i < 0 || (s.kind !== "stairs" && Math.abs(bend(q.ax, self.xs[s.x][i]) - at) > near)) return;
       var value = withUnit(s.y[i], q.data.yu);
       if (s.upper) value = number(s.y[i]) + " to " + withUnit(s.upper[i], q.data.yu);
-      lines.push([s.name + (panels.length > 1 ? ", " + q.data.yl.toLowerCase() : ""), value, s.ink]);
+      var named = panels.length > 1 && q.data.yl.toLowerCase() !== s.name.toLowerCase();
+      lines.push([s.name + (named ? ", " + q.data.yl : ""), value, s.ink]);
       var row = self.row(q, bend(q.ay, s.y[i]));
       if (!s.upper && row >= q.y && row <= q.y + q.h) make(q.over, "circle", { cx: column, cy: row, r: 3.5, "class": "spot " + s.ink });
     });
@@ -74,7 +75,9 @@ Plot.prototype.say = function (lines, x, y) {
   box.textContent = "";
   lines.forEach(function (l) {
     var row = box.appendChild(document.createElement("div"));
-    row.appendChild(document.createElement("span")).textContent = l[0];
+    var name = row.appendChild(document.createElement("span"));
+    if (l[2]) name.appendChild(document.createElement("i")).className = l[2];
+    name.appendChild(document.createTextNode(l[0]));
     row.appendChild(document.createElement("b")).textContent = l[1];
   });
   box.hidden = false;
