@@ -141,6 +141,8 @@ fn attributes(text: &str, found: &mut Found) {
 #[test]
 fn a_page_is_well_formed_and_complete_in_itself_whatever_its_inputs_are_called() {
     let html = nasty_page().html();
+    // For a look at it in a browser, where nothing may pop up.
+    std::fs::write(std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("nasty.html"), &html).unwrap();
     let found = walk(&html);
     assert!(found.wanted.is_subset(&found.ids), "{:?}", found.wanted.difference(&found.ids));
     let count = |name: &str| found.tags.iter().filter(|t| *t == name).count();

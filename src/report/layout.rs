@@ -133,6 +133,24 @@ pub(super) fn text_width(text: &str, font_px: f64) -> f64 {
     em * font_px
 }
 
+/// The text, cut with an ellipsis where it is wider than the room for it (px).
+pub(super) fn fitted(text: &str, font_px: f64, room: f64) -> String {
+    if text_width(text, font_px) <= room {
+        return text.to_owned();
+    }
+    let mut cut = String::new();
+    let mut width = text_width("…", font_px);
+    for c in text.chars() {
+        width += text_width(c.encode_utf8(&mut [0; 4]), font_px);
+        if width > room {
+            break;
+        }
+        cut.push(c);
+    }
+    cut.push('…');
+    cut
+}
+
 /// Places a figure; with `title` its title stands on the picture itself.
 pub(super) fn place(figure: &Figure, size: Size, title: bool) -> Layout<'_> {
     let mut y = 6.0;
@@ -158,7 +176,7 @@ pub(super) fn place(figure: &Figure, size: Size, title: bool) -> Layout<'_> {
         drafts.push((view_x, view_y, height));
     }
     // Tick words, a gap, and the rotated label of the axis.
-    let left = 26.0 + gutter.max(24.0);
+    let left = 30.0 + gutter.max(24.0);
     let count = figure.panels.len();
     let mut panels = Vec::with_capacity(count);
     for (index, (panel, (view_x, view_y, height))) in figure.panels.iter().zip(drafts).enumerate() {
@@ -212,10 +230,11 @@ fn place_headers(placed: &mut Placed, width: f64) -> usize {
         if text.is_empty() || b < 0.0 || a > 1.0 {
             continue;
         }
-        let half = 0.5 * text_width(text, 11.0);
+        let text = fitted(text, 11.0, width - 8.0);
+        let half = 0.5 * text_width(&text, 11.0);
         let middle = placed.area.x + 0.5 * (a.max(0.0) + b.min(1.0)) * placed.area.w;
         let x = middle.min(width - half - 2.0).max(half + 2.0);
-        drafts.push((Header { text: text.clone(), ink, from, to, x, y: 0.0 }, half));
+        drafts.push((Header { text, ink, from, to, x, y: 0.0 }, half));
     }
     drafts.sort_by(|a, b| a.0.x.total_cmp(&b.0.x));
     // Where the words in each row end.
@@ -233,7 +252,7 @@ fn place_headers(placed: &mut Placed, width: f64) -> usize {
     ends.len()
 }
 
-fn place_keys(figure: &Figure, width: f64, top: f64) -> (Vec<Key>, f64) {
+fn place_keys(figure: &Figure, picture: f64, top: f64) -> (Vec<Key>, f64) {
     let mut keys: Vec<Key> = Vec::new();
     let marks = || figure.panels.iter().flat_map(|panel| &panel.marks);
     let data = marks().filter(|mark| matches!(mark, Mark::Series(_)));
@@ -256,13 +275,13 @@ fn place_keys(figure: &Figure, width: f64, top: f64) -> (Vec<Key>, f64) {
             _ => continue,
         };
         if !name.is_empty() && keys.iter().all(|key| key.name != *name) {
-            let width = 30.0 + text_width(name, 12.0);
+            let width = (30.0 + text_width(name, 12.0)).min(picture - 16.0);
             keys.push(Key { name: name.clone(), ink, swatch, x: 0.0, y: 0.0, width });
         }
     }
     let (mut x, mut y) = (8.0, top + 0.5 * ROW);
     for key in &mut keys {
-        if x > 8.0 && x + key.width > width - 4.0 {
+        if x > 8.0 && x + key.width > picture - 4.0 {
             (x, y) = (8.0, y + ROW);
         }
         (key.x, key.y) = (x, y);

@@ -240,3 +240,40 @@ fn ring(placed: &Placed, circle: &Circle, key: Option<usize>) -> String {
     );
     element(&path, if circle.filled { "disc" } else { "ring" }, class(circle.ink), key)
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::report::figure::Ink;
+
+    #[test]
+    fn thinning_keeps_a_lone_peak_and_a_lone_gap() {
+        let n = 100_000;
+        let x: Vec<f64> = (0..n).map(f64::from).collect();
+        for at in [0usize, 1, 49_999, 77_777, 99_999] {
+            let mut y = vec![0.0; n as usize];
+            y[at] = 5.0;
+            y[(at + 500) % n as usize] = f64::NAN;
+            let series = Series::new("record", Ink::Data(0), Kind::Solid, &x, &y).unwrap();
+            let kept = thin(&series, 1200);
+            assert!(kept.contains(&at) && kept.contains(&((at + 500) % n as usize)));
+            // Four points and at most one gap for each of 300 buckets.
+            assert!(kept.len() <= 1500 && kept.windows(2).all(|pair| pair[0] < pair[1]));
+        }
+    }
+
+    #[test]
+    fn relative_steps_add_up_to_the_place() {
+        let mut path = String::new();
+        let places: Vec<(f64, f64)> =
+            (0..1000).map(|k| (f64::from(k) / 3.0, (f64::from(k) * 0.7).sin() * 40.0)).collect();
+        polygon(&mut path, places.iter().copied());
+        let numbers = path.replace(['M', 'l'], " ");
+        let numbers: Vec<f64> = numbers.split_whitespace().map(|t| t.parse().unwrap()).collect();
+        let end = numbers.chunks(2).fold((0.0, 0.0), |sum, step| (sum.0 + step[0], sum.1 + step[1]));
+        // Half a hundredth of a pixel, however many steps; the rest is the rounding of this sum.
+        let last = places[999];
+        assert!((end.0 - last.0).abs() < 0.0051 && (end.1 - last.1).abs() < 0.0051, "{end:?} {last:?}");
+    }
+}

@@ -71,14 +71,13 @@ pub fn nyquist(
     let im: Vec<f64> = open_loop.iter().map(|v| v.im).collect();
     let mirrored: Vec<f64> = im.iter().map(|v| -v).collect();
     let negative_hz: Vec<f64> = frequency_hz.iter().map(|f| -f).collect();
-    panel.marks.push(
-        Series::new("loop, negative frequencies", Ink::Muted, Kind::Dashed, &re, &mirrored)?
-            .along("frequency", "Hz", &negative_hz)?
-            .into(),
-    );
-    panel
-        .marks
-        .push(Series::new("loop", Ink::Data(0), Kind::Solid, &re, &im)?.along("frequency", "Hz", frequency_hz)?.into());
+    let positive = Series::new("loop", Ink::Data(0), Kind::Solid, &re, &im)?.along("frequency", "Hz", frequency_hz)?;
+    let negative = Series::new("loop, negative frequencies", Ink::Muted, Kind::Dashed, &re, &mirrored)?.along(
+        "frequency",
+        "Hz",
+        &negative_hz,
+    )?;
+    panel.marks.extend([positive.into(), negative.into()]);
     panel.marks.push(circle(-1.0, 0.0, false, "critical point", Ink::Limit));
     for (at, text) in &marks.points {
         panel.marks.push(Mark::Note(Note { at: (at.re, at.im), text: text.clone(), ink: Ink::Plain }));

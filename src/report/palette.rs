@@ -1,7 +1,8 @@
 //! Colours, in light and in dark, that stay apart for colour-blind readers.
 //!
-//! In: the meaning of a colour ([`Ink`]). Out: class names and style rules. The six data colours follow the palette of
-//! Okabe and Ito, "Color Universal Design" (2008); the dark set is the same hues, lighter. Colour is never the only
+//! In: the meaning of a colour ([`Ink`]). Out: class names and style rules. The first four data colours follow the
+//! palette of Okabe and Ito, "Color Universal Design" (2008), darkened until they read as words on white; the dark set
+//! is the same hues, lighter. Colour is never the only
 //! sign: series differ in dash or shape too, limits carry words. Spec: `specs/report.md`.
 
 use super::figure::Ink;
@@ -22,11 +23,11 @@ pub(super) struct Theme {
 pub(super) const LIGHT: Theme = Theme {
     inks: [
         ("i0", "#0072b2"),
-        ("i1", "#d55e00"),
-        ("i2", "#00875f"),
+        ("i1", "#c65200"),
+        ("i2", "#007f5a"),
         ("i3", "#a6508a"),
-        ("i4", "#9a7200"),
-        ("i5", "#3d8fc4"),
+        ("i4", "#6b5200"),
+        ("i5", "#4b3fb0"),
         ("im", "#8a929c"),
         ("il", "#b3202c"),
         ("ip", "#3b434d"),
@@ -45,8 +46,8 @@ pub(super) const DARK: Theme = Theme {
         ("i1", "#ff9248"),
         ("i2", "#37c99b"),
         ("i3", "#e39cc6"),
-        ("i4", "#e6b93d"),
-        ("i5", "#9ad2f5"),
+        ("i4", "#f2e05c"),
+        ("i5", "#8f8cff"),
         ("im", "#848d99"),
         ("il", "#ff7b80"),
         ("ip", "#c9d0d9"),
@@ -81,8 +82,42 @@ impl Theme {
         let _ = write!(
             css,
             ".plot .paper{{fill:{paper}}}.plot text{{fill:{text}}}.plot .tick text,.plot .far{{fill:{faint}}}\
-             .plot .grid path{{stroke:{grid}}}.plot .frame{{stroke:{frame}}}.plot .halo{{stroke:{paper}}}"
+             .plot .grid path{{stroke:{grid}}}.plot .frame{{stroke:{frame}}}.plot .halo{{stroke:{paper}}}.plot .word.im{{fill:{faint}}}"
         );
         css
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// Relative luminance of sRGB, WCAG 2.2.
+    fn luminance(colour: &str) -> f64 {
+        let part = |k: usize| {
+            let c = f64::from(u8::from_str_radix(&colour[k..k + 2], 16).unwrap()) / 255.0;
+            if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+        };
+        0.2126 * part(1) + 0.7152 * part(3) + 0.0722 * part(5)
+    }
+
+    fn contrast(a: &str, b: &str) -> f64 {
+        let (a, b) = (luminance(a), luminance(b));
+        (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    #[test]
+    fn words_reach_a_contrast_of_four_and_a_half_and_lines_of_three() {
+        // The limits of WCAG 2.2, success criteria 1.4.3 and 1.4.11; grey data have grey words of their own.
+        for theme in [&LIGHT, &DARK] {
+            for (class, colour) in theme.inks {
+                let wanted = if class == "im" { 3.0 } else { 4.5 };
+                assert!(contrast(colour, theme.paper) >= wanted, "{class} {colour}");
+            }
+            assert!(contrast(theme.text, theme.paper) >= 4.5 && contrast(theme.faint, theme.paper) >= 4.5);
+        }
+        // Closed form: black on white is 21.
+        assert!((contrast("#000000", "#ffffff") - 21.0).abs() < 1e-9);
     }
 }

@@ -49,3 +49,27 @@ pub fn sensitivity(
     panel.y.range = Some((floor.max(-60.0), top + 6.0));
     Ok(Figure { title: title.to_owned(), caption: caption.to_owned(), share_x: false, panels: vec![panel] })
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn the_peak_on_the_grid_is_named_and_a_limit_that_is_none_is_refused() {
+        let hz = [10.0, 100.0, 1000.0];
+        let s = [Complex::new(0.1, 0.0), Complex::new(0.0, 2.0), Complex::new(1.0, 0.0)];
+        let t: Vec<Complex<f64>> = s.iter().map(|s| 1.0 - s).collect();
+        let figure = sensitivity("t", "c", &hz, &s, &t, Some(2.2)).unwrap();
+        let notes: Vec<&Note> = figure.panels[0]
+            .marks
+            .iter()
+            .filter_map(|mark| if let Mark::Note(note) = mark { Some(note) } else { None })
+            .collect();
+        assert_eq!(notes.len(), 1);
+        // 20 log10 2, exactly as the series is made.
+        assert_eq!((notes[0].at, notes[0].text.as_str()), ((100.0, 20.0 * 2f64.log10()), "peak of S 2.00 at 100 Hz"));
+        let refused = sensitivity("t", "c", &hz, &s, &t, Some(f64::NAN));
+        assert!(matches!(refused, Err(ReportError::Domain { figure: "sensitivity plot", .. })), "{refused:?}");
+    }
+}

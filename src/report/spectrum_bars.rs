@@ -55,3 +55,34 @@ pub fn spectrum_bars(title: &str, caption: &str, bars: &SpectrumBars) -> Result<
     }
     Ok(Figure { title: title.to_owned(), caption: caption.to_owned(), share_x: false, panels: vec![panel] })
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn bars_of_before_and_after_stand_side_by_side_within_their_harmonic() {
+        let hz: Vec<f64> = (1..=30).map(|k| 137.4 * f64::from(k)).collect();
+        let (before, after) = (vec![2.0; 30], vec![1.0; 30]);
+        let limits = [(137.4, 0.5), (9000.0, 0.1)];
+        let bars = SpectrumBars {
+            frequency_hz: &hz,
+            before: Some(&before),
+            after: &after,
+            limits: &limits,
+            unit: "track",
+            until_hz: 3000.0,
+        };
+        let figure = spectrum_bars("t", "c", &bars).unwrap();
+        let series: Vec<&Series> = figure.panels[0].series().collect();
+        let (Kind::Bars { from: a, to: b }, Kind::Bars { from: c, to: d }) = (&series[0].kind, &series[1].kind) else {
+            panic!("bars expected");
+        };
+        assert!(a < b && b <= c && c < d && d - a < 137.4);
+        // floor(3000 / 137.4) harmonics and the one limit below the last shown frequency.
+        assert_eq!((series[0].len(), series[1].len(), series[2].len()), (21, 21, 1));
+        let refused = spectrum_bars("t", "c", &SpectrumBars { after: &after[1..], ..bars });
+        assert!(matches!(refused, Err(ReportError::SeriesLength { expected: 30, found: 29, .. })), "{refused:?}");
+    }
+}

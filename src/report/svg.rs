@@ -4,7 +4,7 @@
 //! finds panels, views and legend entries in `data-` attributes. Spec: `specs/report.md`.
 
 use super::figure::{Axis, Figure, Scale, Ticks};
-use super::layout::{Key, Layout, Placed, Swatch, place, text_width};
+use super::layout::{Key, Layout, Placed, Swatch, fitted, place, text_width};
 use super::marks::{draw, px};
 use super::palette::{LIGHT, class};
 use super::words::draw_words;
@@ -67,7 +67,11 @@ fn render(figure: &Figure, size: Size, id: &str, alone: bool) -> String {
     }
     let _ = write!(svg, r#"<rect class="paper" width="{w}" height="{h}"/>"#);
     if let Some(title) = layout.title {
-        let _ = write!(svg, r#"<text class="title" x="8" y="22">{}</text>"#, escape(title));
+        let _ = write!(
+            svg,
+            r#"<text class="title" x="8" y="22">{}</text>"#,
+            escape(&fitted(title, 15.0, layout.width - 12.0))
+        );
     }
     for (index, key) in layout.keys.iter().enumerate() {
         svg.push_str(&legend_key(index, key));
@@ -99,7 +103,7 @@ fn legend_key(index: usize, key: &Key) -> String {
         class(key.ink),
         px(x + 26.0),
         px(y + 4.0),
-        escape(&key.name)
+        escape(&fitted(&key.name, 12.0, key.width - 26.0))
     )
 }
 
@@ -139,14 +143,14 @@ fn draw_panel(svg: &mut String, layout: &Layout, placed: &Placed, index: usize, 
             r#"<text class="far" text-anchor="middle" x="{}" y="{}">{}</text>"#,
             px(area.x + 0.5 * area.w),
             px(area.y + area.h + 36.0),
-            escape(&panel.x.text())
+            escape(&fitted(&panel.x.text(), 12.0, area.w))
         );
     }
     let _ = write!(
         svg,
         r#"<text class="far" text-anchor="middle" transform="translate(13 {}) rotate(-90)">{}</text></g>"#,
         px(area.y + 0.5 * area.h),
-        escape(&panel.y.text())
+        escape(&fitted(&panel.y.text(), 12.0, area.h + 8.0))
     );
 }
 

@@ -82,3 +82,30 @@ pub fn time(
     }
     Ok(Figure { title: title.to_owned(), caption: caption.to_owned(), share_x: true, panels: drawn })
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn curve<'a>(time_s: &'a [f64], value: &'a [f64]) -> TimeCurve<'a> {
+        TimeCurve { name: "pes", time_s, value, ink: Ink::Data(0), kind: CurveKind::Line }
+    }
+
+    #[test]
+    fn a_short_record_is_in_milliseconds_and_so_is_its_window() {
+        let curves = [curve(&[0.0, 0.5], &[1.0, 2.0])];
+        let panel = TimePanel { quantity: "PES", unit: "track", curves: &curves, limits: &[] };
+        let figure = time("t", "c", &[panel], Some((0.1, 0.2, "window"))).unwrap();
+        assert_eq!((figure.panels[0].x.unit.as_str(), figure.panels[0].series().next().unwrap().x[1]), ("ms", 500.0));
+        assert!(figure.panels[0].marks.contains(&Region::of_x(100.0, 200.0, "window", Ink::Data(4))));
+    }
+
+    #[test]
+    fn columns_of_different_length_are_refused() {
+        let curves = [curve(&[0.0, 0.5], &[1.0])];
+        let panel = TimePanel { quantity: "PES", unit: "track", curves: &curves, limits: &[] };
+        let refused = time("t", "c", &[panel], None);
+        assert!(matches!(refused, Err(ReportError::SeriesLength { expected: 2, found: 1, .. })), "{refused:?}");
+    }
+}

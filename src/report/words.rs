@@ -4,7 +4,7 @@
 //! Spec: `specs/report.md`.
 
 use super::figure::{Direction, Ink, Kind, Mark};
-use super::layout::{Placed, Rect, text_width};
+use super::layout::{Placed, Rect, fitted, text_width};
 use super::marks::px;
 use super::palette::class;
 use super::svg::escape;
@@ -92,6 +92,7 @@ fn put(svg: &mut String, placed: &Placed, taken: &mut Vec<Rect>, ink: Ink, text:
     if text.is_empty() {
         return;
     }
+    let text = &fitted(text, FONT_PX, 0.7 * placed.area.w);
     let width = text_width(text, FONT_PX);
     let frame = |&(anchor, x, y): &Spot| {
         let left = match anchor {

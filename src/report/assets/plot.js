@@ -21,7 +21,7 @@ function Plot(fig, svg, data, hidden, share) {
   var self = this;
   this.svg = svg; this.fig = fig; this.hidden = hidden; this.share = share; this.others = [];
   this.readout = svg.parentNode.appendChild(document.createElement("div"));
-  this.readout.className = "readout"; this.readout.hidden = true;
+  this.readout.className = "readout plot"; this.readout.hidden = true;
   this.panels = Array.prototype.map.call(svg.querySelectorAll("g.panel"), function (g, i) {
     var a = g.dataset.area.split(" ").map(Number);
     var p = { g: g, x: a[0], y: a[1], w: a[2], h: a[3], ax: axisOf(g.dataset.x), ay: axisOf(g.dataset.y), equal: !!g.dataset.equal,

@@ -9,9 +9,10 @@ Plot.prototype.leave = function () {
   this.readout.hidden = true;
   this.panels.forEach(function (p) { p.over.textContent = ""; });
 };
-// The index whose x is nearest; where x is not ascending, every index is tried.
+// The index whose x is nearest, or of the x that is held; x ascends.
 function nearest(axis, xs, u, held) {
   var best = -1, least = Infinity;
+  if (!xs.length) return best;
   var lo = 0, hi = xs.length - 1;
   while (hi - lo > 1) { var mid = (lo + hi) >> 1; if (bend(axis, xs[mid]) <= u || isNaN(bend(axis, xs[mid]))) lo = mid; else hi = mid; }
   if (held) return bend(axis, xs[hi]) <= u ? hi : lo;
@@ -23,12 +24,20 @@ function nearest(axis, xs, u, held) {
 }
 Plot.prototype.hover = function (p, x, y) {
   this.leave();
-  if (p.data.series.some(function (s) { return s.along; })) this.hoverCurve(p, x, y); else this.hoverColumn(p, x, y);
+  if (this.scattered(p)) this.hoverPoint(p, x, y); else this.hoverColumn(p, x, y);
 };
-Plot.prototype.hoverCurve = function (p, x, y) {
+// Whether the panel must be read point by point: a curve with a parameter, or one whose x does not ascend.
+Plot.prototype.scattered = function (p) {
+  var xs = this.xs;
+  if (p.points === undefined) p.points = p.data.series.some(function (s) {
+    return s.along || xs[s.x].some(function (x, i, all) { return i > 0 && x !== null && all[i - 1] !== null && x < all[i - 1]; });
+  });
+  return p.points;
+};
+Plot.prototype.hoverPoint = function (p, x, y) {
   var self = this, best = null, least = 80 * 80;
   p.data.series.forEach(function (s) {
-    if (self.hidden[s.key] || !s.along) return;
+    if (self.hidden[s.key]) return;
     var xs = self.xs[s.x];
     for (var i = 0; i < xs.length; i++) {
       var dx = self.column(p, bend(p.ax, xs[i])) - x, dy = self.row(p, bend(p.ay, s.y[i])) - y, d = dx * dx + dy * dy;
@@ -38,8 +47,9 @@ Plot.prototype.hoverCurve = function (p, x, y) {
   if (!best) return;
   make(p.over, "circle", { cx: best.x, cy: best.y, r: 4.5, "class": "spot " + best.s.ink });
   var d = p.data, i = best.i, s = best.s;
-  var lines = [[s.name, ""], [s.along.label, withUnit(s.along.v[i], s.along.unit)], [d.xl, withUnit(this.xs[s.x][i], d.xu)],
-    [d.yl, withUnit(s.y[i], d.yu)]];
+  var lines = [[s.name, "", s.ink]];
+  if (s.along) lines.push([s.along.label, withUnit(s.along.v[i], s.along.unit)]);
+  lines.push([d.xl, withUnit(this.xs[s.x][i], d.xu)], [d.yl, withUnit(s.y[i], d.yu)]);
   if (p.equal) lines.push(["distance from \u22121", number(Math.hypot(1 + this.xs[s.x][i], s.y[i]))]);
   this.say(lines, best.x, best.y);
 };
@@ -62,7 +72,8 @@ Plot.prototype.hoverColumn = function (p, x, y) {
       if (self.hidden[s.key] || i < 0 || (s.kind !== "stairs" && Math.abs(bend(q.ax, self.xs[s.x][i]) - at) > near)) return;
       var value = withUnit(s.y[i], q.data.yu);
       if (s.upper) value = number(s.y[i]) + " to " + withUnit(s.upper[i], q.data.yu);
-      lines.push([s.name + (panels.length > 1 ? ", " + q.data.yl.toLowerCase() : ""), value, s.ink]);
+      var named = panels.length > 1 && q.data.yl.toLowerCase() !== s.name.toLowerCase();
+      lines.push([s.name + (named ? ", " + q.data.yl : ""), value, s.ink]);
       var row = self.row(q, bend(q.ay, s.y[i]));
       if (!s.upper && row >= q.y && row <= q.y + q.h) make(q.over, "circle", { cx: column, cy: row, r: 3.5, "class": "spot " + s.ink });
     });
@@ -74,7 +85,9 @@ Plot.prototype.say = function (lines, x, y) {
   box.textContent = "";
   lines.forEach(function (l) {
     var row = box.appendChild(document.createElement("div"));
-    row.appendChild(document.createElement("span")).textContent = l[0];
+    var name = row.appendChild(document.createElement("span"));
+    if (l[2]) name.appendChild(document.createElement("i")).className = l[2];
+    name.appendChild(document.createTextNode(l[0]));
     row.appendChild(document.createElement("b")).textContent = l[1];
   });
   box.hidden = false;
@@ -144,7 +157,9 @@ Plot.prototype.listen = function () {
   }
   svg.addEventListener("pointerup", up);
   svg.addEventListener("pointercancel", up);
-  svg.addEventListener("pointerleave", function () { if (!drag) self.leave(); });
+  // A finger that is lifted leaves its readout; the next touch elsewhere takes it away.
+  svg.addEventListener("pointerleave", function (e) { if (!drag && e.pointerType !== "touch") self.leave(); });
+  document.addEventListener("pointerdown", function (e) { if (!svg.contains(e.target)) self.leave(); });
   svg.addEventListener("dblclick", function (e) { self.reset(); e.preventDefault(); });
   // A page that scrolls must not be caught by a picture: the wheel zooms once the picture has been clicked, or with Ctrl.
   svg.addEventListener("wheel", function (e) {
