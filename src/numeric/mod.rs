@@ -1,0 +1,4 @@
+//! Numerical tools without any control meaning.
+
+pub mod spectrum;
+pub mod unwrap;
