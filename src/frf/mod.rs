@@ -3,6 +3,31 @@
 //! In: sweep files. Out: [`Frf`], the response on its own ascending grid.
 //! Convention: `specs/conventions.md`; files: `specs/frf.md`.
 
+mod bytes;
+mod causality;
+mod columns;
+mod decide;
+mod error;
+mod header;
+mod minimum_phase;
+mod note;
+mod number;
+mod order;
+mod read;
 mod response;
+mod settings;
+mod table;
+mod uff;
+mod uff_block;
+mod write;
 
+pub use causality::{Evidence, Misfit, Reading};
+pub use error::{Doubt, FrfError, NotText, Question};
+pub use note::{Ground, Note};
+pub use read::{Sweep, read_bytes, read_file};
 pub use response::{Frf, FrfShapeError};
+pub use settings::{
+    AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale,
+    PhaseConvention, ReadSettings, UnknownWord, Unsorted,
+};
+pub use write::{PhaseDisplay, write_bod, write_bod_as};

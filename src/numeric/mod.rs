@@ -10,3 +10,5 @@ pub mod peaks;
 pub mod polynomial;
 pub mod random;
 pub mod root;
+pub mod spectrum;
+pub mod unwrap;
