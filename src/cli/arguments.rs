@@ -1,5 +1,6 @@
 //! The words of the command line.
 
+pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -19,23 +20,52 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    Margins(MarginsArguments),
+    Identify(Box<IdentifyArguments>),
+    Margins(Box<MarginsArguments>),
     Simulate(SimulateArguments),
     Study(StudyArguments),
 }
 
+/// Swept-sine file to plant model
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  servotune identify slot07.bod --out plant.toml
+  servotune identify wide.csv --columns frequency=f_Hz,real=G11_re,imaginary=G11_im --out plant.toml
+  servotune identify sweep.txt --phase margin --order 22 --out plant.toml")]
+pub(super) struct IdentifyArguments {
+    /// Swept-sine file: .bod, .csv, .tsv, .txt (gzip allowed) or UFF with dataset 58
+    #[arg(value_name = "FRF")]
+    pub frf: PathBuf,
+    /// Plant model to write
+    #[arg(long, value_name = "PLANT")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
+    #[command(flatten)]
+    pub model: ModelArguments,
+}
+
 /// Margins of the open loop: crossings, gain, phase, delay, modulus and disk margin
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Example:\n  servotune margins --plant specs/machines/healthy.toml --controller specs/controllers/nominal.toml"
-)]
+#[command(group = clap::ArgGroup::new("machine").required(true))]
+#[command(after_help = "Examples:
+  servotune margins --plant specs/machines/healthy.toml --controller specs/controllers/nominal.toml
+  servotune margins --frf slot07.bod --controller specs/controllers/nominal.toml")]
 pub(super) struct MarginsArguments {
     /// Plant model (plant.toml)
-    #[arg(long, value_name = "PLANT")]
-    pub plant: PathBuf,
-    /// Controller (controller.toml)
+    #[arg(long, value_name = "PLANT", group = "machine")]
+    pub plant: Option<PathBuf>,
+    /// Swept-sine file: margins of the measured response, each with a 95 % interval
+    #[arg(long, value_name = "FRF", group = "machine")]
+    pub frf: Option<PathBuf>,
+    /// The sweep was taken through the controller's own hold, which is then not applied again
+    #[arg(long, requires = "frf")]
+    pub hold_included: bool,
+    /// Controller (controller.toml) or gain table (gains.toml)
     #[arg(long, value_name = "CONTROLLER")]
     pub controller: PathBuf,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }
 
 /// Closed-loop PES of a spiral write and its DFT

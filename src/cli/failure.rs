@@ -3,6 +3,8 @@
 use crate::controller::ControllerError;
 use crate::document::DocumentError;
 use crate::feedback::FeedbackError;
+use crate::frf::FrfError;
+use crate::identify::IdentifyError;
 use crate::lti::LtiError;
 use crate::pes::{PesError, ProfileError};
 use crate::report::ReportError;
@@ -24,6 +26,12 @@ pub enum Failure {
     Profile { file: PathBuf, source: ProfileError },
     #[error("{}: [[plant.physics]] effect \"{effect}\": `{command}` works on the linear plant only; remove the table to judge the linear part", file.display())]
     Physics { file: PathBuf, effect: String, command: &'static str },
+    #[error(transparent)]
+    Frf(#[from] FrfError),
+    #[error("{}: {source}", file.display())]
+    Identify { file: PathBuf, source: IdentifyError },
+    #[error("the result cannot be written as TOML: {source}")]
+    Toml { source: toml::ser::Error },
     #[error(transparent)]
     Feedback(#[from] FeedbackError),
     #[error(transparent)]

@@ -1,8 +1,10 @@
 //! Files into values, with the file's name in every refusal.
 
-use super::Failure;
+use super::sweep_arguments::ReadingArguments;
+use super::{Failure, Screen};
 use crate::controller::Controller;
 use crate::document::{parse_toml, read_text};
+use crate::frf::{Sweep, read_file};
 use crate::lti::{Plant, PlantFile};
 use crate::pes::Profile;
 use std::path::Path;
@@ -29,4 +31,13 @@ pub(super) fn profile(file: &Path) -> Result<Profile, Failure> {
     let profile: Profile = parse_toml(file, &read_text(file)?)?;
     profile.check().map_err(|source| Failure::Profile { file: file.into(), source })?;
     Ok(profile)
+}
+
+/// A sweep; what its reader decided is said.
+pub(super) fn sweep(file: &Path, reading: &ReadingArguments, screen: &mut Screen) -> Result<Sweep, Failure> {
+    let sweep = read_file(file, &reading.settings())?;
+    for note in &sweep.notes {
+        screen.say(&format!("note: {}: {note}", file.display()));
+    }
+    Ok(sweep)
 }

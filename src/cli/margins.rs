@@ -1,27 +1,43 @@
-//! `servotune margins`: one loop judged, by two algorithms that must agree about stability.
+//! `servotune margins`: one loop judged, of a model or of a measured response.
 
 use super::arguments::MarginsArguments;
 use super::{Ending, Failure, Screen, load};
-use crate::feedback::{Margins, ModelLoop, closed_loop_poles, margins};
-use crate::lti::DiscretePlant;
-use crate::report::margins::margins_text;
+use crate::feedback::{Margins, MeasuredLoop, ModelLoop, closed_loop_poles, margins, measured_margins};
+use crate::lti::{DiscretePlant, Sections};
+use crate::report::margins::{margins_text, measured_text};
+use std::path::Path;
 
 /// A pole this close to the unit circle counts for either side: the eigenvalues of a matrix of order 40 are no surer.
 const ON_THE_CIRCLE: f64 = 1e-6;
 
 pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, Failure> {
-    let plant = load::plant(&a.plant, "margins")?;
     let controller = load::controller(&a.controller)?;
     let sections =
         controller.sections().map_err(|source| Failure::Controller { file: a.controller.clone(), source })?;
-    let sampled = DiscretePlant::of(&plant, controller.sample_time_s)
-        .map_err(|source| Failure::Plant { file: a.plant.clone(), source })?;
-    let judged = judge(&ModelLoop::new(&sampled, &sections)?)?;
-    screen.result(&judged, &margins_text(&judged)?)?;
-    Ok(if judged.stable { Ending::Accepted } else { Ending::Rejected })
+    let stable = match (&a.plant, &a.frf) {
+        (Some(file), _) => of_model(file, &sections, screen)?,
+        (None, Some(file)) => {
+            let sweep = load::sweep(file, &a.reading, screen)?;
+            let judged = measured_margins(&MeasuredLoop::new(&sweep.frf, &sections, a.hold_included)?);
+            screen.result(&judged, &measured_text(&judged)?)?;
+            judged.margins.stable
+        }
+        // The argument group demands one of the two.
+        (None, None) => false,
+    };
+    Ok(if stable { Ending::Accepted } else { Ending::Rejected })
 }
 
-/// Margins whose stability verdict the eigenvalues confirm.
+fn of_model(file: &Path, sections: &Sections, screen: &mut Screen) -> Result<bool, Failure> {
+    let plant = load::plant(file, "margins")?;
+    let sampled = DiscretePlant::of(&plant, sections.sample_time_s)
+        .map_err(|source| Failure::Plant { file: file.into(), source })?;
+    let judged = judge(&ModelLoop::new(&sampled, sections)?)?;
+    screen.result(&judged, &margins_text(&judged)?)?;
+    Ok(judged.stable)
+}
+
+/// Margins whose stability verdict the eigenvalues confirm: two algorithms that share no code.
 pub(super) fn judge(l: &ModelLoop<'_>) -> Result<Margins, Failure> {
     let judged = margins(l);
     let poles = closed_loop_poles(l)?;

@@ -5,11 +5,13 @@
 
 mod arguments;
 mod failure;
+mod identify;
 mod load;
 mod margins;
 mod screen;
 mod simulate;
 mod study;
+mod sweep_arguments;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -38,6 +40,7 @@ pub fn main() -> ExitCode {
     };
     let mut screen = Screen::new(arguments.json);
     let ending = match arguments.command {
+        Command::Identify(a) => identify::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),
         Command::Simulate(a) => simulate::run(&a, &mut screen),
         Command::Study(a) => study::run(&a, &mut screen),

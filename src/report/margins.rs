@@ -3,7 +3,7 @@
 use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Cell, Column, Table, Verdict};
-use crate::feedback::Margins;
+use crate::feedback::{Interval, Margins, MeasuredMargins};
 
 /// The figures of one loop as rows of name, value, unit, place.
 pub fn margins_table(m: &Margins) -> Result<Table, ReportError> {
@@ -55,4 +55,48 @@ pub fn crossings_table(m: &Margins) -> Result<Table, ReportError> {
 /// Both tables for a terminal.
 pub fn margins_text(m: &Margins) -> Result<String, ReportError> {
     Ok(format!("{}\n{}", margins_table(m)?.text(), crossings_table(m)?.text()))
+}
+
+/// The named margins of a measured loop with their 95 % intervals.
+pub fn measured_table(m: &MeasuredMargins) -> Result<Table, ReportError> {
+    let digits = NumberFormat::Significant(4);
+    let mut table = Table::new(
+        if m.margins.stable {
+            "Margins of the measured loop (stable)"
+        } else {
+            "Margins of the measured loop (UNSTABLE)"
+        },
+        vec![
+            Column::words("figure"),
+            Column::numbers("value", "", digits),
+            Column::numbers("95 % low", "", digits),
+            Column::numbers("95 % high", "", digits),
+            Column::words("unit"),
+        ],
+    );
+    let mut row = |name: &str, value: Option<f64>, i: Option<Interval>, unit: &str| {
+        table.push(vec![name.into(), value.into(), i.map(|i| i.low).into(), i.map(|i| i.high).into(), unit.into()])
+    };
+    let (g, i) = (&m.margins, &m.intervals);
+    row("gain crossover", g.gain_crossover_hz, i.gain_crossover_hz, "Hz")?;
+    row("phase margin", g.phase_margin_deg, i.phase_margin_deg, "deg")?;
+    row("phase crossover", g.phase_crossover_hz, i.phase_crossover_hz, "Hz")?;
+    row("gain margin", g.gain_margin_db, i.gain_margin_db, "dB")?;
+    row("max sensitivity Ms", Some(g.max_sensitivity), Some(i.max_sensitivity), "ratio")?;
+    row("delay margin", g.delay_margin_s.map(|s| 1e6 * s), None, "us")?;
+    row("disk margin", Some(g.disk_margin), None, "ratio")?;
+    Ok(table)
+}
+
+/// Tables of a measured loop for a terminal, with what is taken for granted.
+pub fn measured_text(m: &MeasuredMargins) -> Result<String, ReportError> {
+    let format = NumberFormat::Significant(4);
+    Ok(format!(
+        "{}\n{}\nJudged from {} to {} Hz. Taken for granted: |L| stays below 1 above (it is {} there), no crossing lies below.\n",
+        measured_table(m)?.text(),
+        crossings_table(&m.margins)?.text(),
+        format.text(m.band_hz.low),
+        format.text(m.band_hz.high),
+        format.text(m.end_gain),
+    ))
 }

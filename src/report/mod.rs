@@ -15,6 +15,7 @@ mod words;
 
 pub mod bode;
 pub mod figure;
+pub mod identified;
 pub mod margins;
 pub mod number;
 pub mod nyquist;
