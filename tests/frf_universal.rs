@@ -72,6 +72,12 @@ fn other_functions_and_zero_hertz_are_told() {
     ));
     let chosen = read("coherence_only.uff", &ReadSettings { dataset: Some(1), ..Default::default() });
     assert!(matches!(chosen, Err(FrfError::DatasetFunction { found: 6, .. })));
+    // Doubles under a header that says single: no length that the header allows ends at the closing mark.
+    let wrong = read("doubles_called_single.uff", &ReadSettings::default());
+    assert!(matches!(wrong, Err(FrfError::DatasetBytes { expected: 160, .. })), "{wrong:?}");
+    // Half the true length is declared here, and the file is read with a note.
+    let short = read("even_double_binary.uff", &ReadSettings::default()).unwrap();
+    assert!(short.notes.contains(&Note::DatasetBytes { declared: 320, found: 640 }));
     let sweep = read("from_zero.uff", &ReadSettings::default()).unwrap();
     assert!(sweep.notes.contains(&Note::ZeroHertz));
     assert_eq!(sweep.frf.len(), 19);

@@ -175,8 +175,16 @@ impl Decider<'_> {
         let words = columns.unit(2).map_or("", |(_, words)| words);
         // Nobody unwraps beyond 16 turns; 100 rad is more than that.
         let large = second.iter().copied().find(|p| p.abs() > 32.0 * PI).map(|p| (true, Ground::Value(p)));
-        let sure = large.or_else(|| radians_by_range(first, second, decibels).map(|ground| (false, ground)));
+        let narrow = narrow_phase(first, second, decibels);
+        // A free inertia in the margin display stays near 0 deg; its noise does not fill two thirds of a circle's 6.28.
+        let fills = |(low, high): &(f64, f64)| high - low > 4.2;
+        let sure = large.or_else(|| narrow.filter(fills).map(|(low, high)| (false, Ground::PhaseRange(low, high))));
         let (degrees, ground) = self.settle(all, (said, words), sure, Question::Angle, |r| r.degrees)?;
+        // Less than that may be either: degrees would have to be said.
+        if let (true, None, Some((low, high))) = (degrees, said, narrow) {
+            let doubt = Doubt::PhaseRange { low, high };
+            return Err(FrfError::Ambiguous { file: self.file.to_owned(), question: Question::Angle, doubt });
+        }
         let unit = if degrees { AngleUnit::Degrees } else { AngleUnit::Radians };
         notes.push(Note::Angle { unit, ground });
         Ok(degrees)
@@ -295,14 +303,14 @@ impl Decider<'_> {
     }
 }
 
-/// Phases within half a turn in radians that nearly fill it, while the gain changes tenfold. In degrees such a gain comes with far more.
-fn radians_by_range(first: &[f64], second: &[f64], decibels: bool) -> Option<Ground> {
+/// Least and largest phase where they would suit radians, within half a turn either way and spread over more than 1.5, while the gain changes
+/// tenfold: in degrees such a gain comes with far more.
+fn narrow_phase(first: &[f64], second: &[f64], decibels: bool) -> Option<(f64, f64)> {
     let range = |c: &[f64]| c.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
     let (low, high) = range(second);
     let (least, most) = range(first);
     let tenfold = if decibels { most - least > 20.0 } else { most > 10.0 * least };
-    // A free inertia in the margin display stays near 0 deg; its noise does not fill two thirds of the circle's 6.28.
-    (tenfold && low >= -PI - 1e-3 && high <= PI + 1e-3 && high - low > 4.2).then_some(Ground::PhaseRange(low, high))
+    (tenfold && low >= -PI - 1e-3 && high <= PI + 1e-3 && high - low > 1.5).then_some((low, high))
 }
 
 /// The answers left once `never` and `always` are taken into account, yes first.

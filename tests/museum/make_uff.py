@@ -42,12 +42,28 @@ def write(name, sets):
         file.write_sets(one, mode="add", force_double=one["ord_data_type"] != 5)
 
 
+def as_single(name, mistaken):
+    """pyuff 2.5.8 writes binary numbers of single type as doubles: keep that under `mistaken`, and write what it announces."""
+    with open(os.path.join(here, name), "rb") as file:
+        lines = file.read().split(b"\n", 13)
+    if mistaken:
+        with open(os.path.join(here, mistaken), "wb") as file:
+            file.write(b"\n".join(lines))
+    body, mark = lines[13][: lines[13].rindex(b"    -1")], b"    -1\n"
+    single = np.frombuffer(body, "<f8").astype("<f4").tobytes()
+    lines[1] = b"    58b%6i%6i%12i%12i%6i%6i%12i%12i" % (1, 2, 11, len(single), 0, 0, 0, 0)
+    with open(os.path.join(here, name), "wb") as file:
+        file.write(b"\n".join(lines[:13]) + b"\n" + single + mark)
+
+
 even = np.arange(40) * 12.5 + 12.5
 uneven = np.round(np.geomspace(10.0, 1000.0, 40), 3)
 for kind, precision in ((5, "single"), (6, "double")):
     for binary, form in ((0, "text"), (1, "binary")):
         write(f"even_{precision}_{form}.uff", [dataset(even, binary, True, kind)])
         write(f"uneven_{precision}_{form}.uff", [dataset(uneven, binary, False, kind)])
+as_single("even_single_binary.uff", "doubles_called_single.uff")
+as_single("uneven_single_binary.uff", None)
 write("two_responses.uff", [dataset(even, 0, True, 6, title="first"), dataset(uneven, 0, False, 6, title="second")])
 write("from_zero.uff", [dataset(np.arange(20) * 25.0, 0, True, 6)])
 write("coherence_only.uff", [dataset(even, 0, True, 4, function=6)])
