@@ -37,35 +37,29 @@ fn practice_machines_are_margin_displays() {
     }
 }
 
-/// How often each question was answered rightly, wrongly, or refused, over the family.
+/// How often each dress is read rightly, refused, taken as written with a note that says so, or misread, over the family.
 #[test]
 fn units_and_conventions_are_found_on_the_papers_family() {
-    let mut wrong = 0;
+    const PLANTS: u64 = 200;
+    let mut misread = 0;
     for (name, show) in Show::all() {
-        let (mut right, mut refused, mut bad) = (0, 0, 0);
-        let mut worst = 0.0f64;
-        for seed in 0..200 {
+        let (mut right, mut refused, mut noted, mut wrong) = (0, 0, 0, 0);
+        for seed in 0..PLANTS {
             let plant = Plant::random(seed);
             let text = file(&plant, seed, &show);
-            match (read_bytes("made", text.as_bytes(), &ReadSettings::default()), show.conjugated) {
-                (Err(FrfError::Conjugated { .. }), true) => right += 1,
-                (Err(e), _) => {
-                    refused += 1;
-                    if refused < 3 {
-                        eprintln!("   {name} seed {seed}: {e}");
-                    }
-                }
-                (Ok(_), true) => bad += 1,
-                (Ok(sweep), false) => {
-                    // One per cent of noise in each part: eight deviations; a wrong unit is off by far more.
-                    let off = plant.worst_error(&sweep.frf);
-                    worst = worst.max(off);
-                    if off < 0.08 { right += 1 } else { bad += 1 }
-                }
+            match read_bytes("made", text.as_bytes(), &ReadSettings::default()) {
+                Err(FrfError::Conjugated { .. }) if show.conjugated => right += 1,
+                Err(_) => refused += 1,
+                // One per cent of noise in each part: eight deviations; a wrong unit is off by far more.
+                Ok(sweep) if !show.conjugated && plant.worst_error(&sweep.frf) < 0.08 => right += 1,
+                Ok(sweep) if sweep.notes.iter().any(|n| matches!(n, Note::ConjugateUnclear { .. })) => noted += 1,
+                Ok(_) => wrong += 1,
             }
         }
-        eprintln!("{name}: {right} right, {refused} refused, {bad} wrong, worst error {worst:.3}");
-        wrong += bad;
+        eprintln!("{name}: {right} right, {refused} refused, {noted} noted as unclear, {wrong} misread, of {PLANTS}");
+        misread += wrong;
+        // A plant whose corner lies at the start of the sweep hides its sign: one or two in a hundred.
+        assert!(right * 100 >= PLANTS * 95, "{name}");
     }
-    assert_eq!(wrong, 0, "a wrong guess is worse than a refusal");
+    assert_eq!(misread, 0, "a wrong guess is worse than a refusal");
 }

@@ -103,7 +103,7 @@ pub(crate) fn reading(
     let all = decider.candidates((w, first, second));
     let decibels = decider.magnitude(&all, said.decibels, columns, first, notes)?;
     let all: Vec<Misfit> = all.into_iter().filter(|m| m.reading.decibels == decibels).collect();
-    let degrees = decider.angle(&all, said.degrees, columns, second, notes)?;
+    let degrees = decider.angle(&all, said.degrees, columns, (first, second, decibels), notes)?;
     let all: Vec<Misfit> = all.into_iter().filter(|m| m.reading.degrees == degrees).collect();
     let polar = Reading { decibels, degrees, margin: false, conjugated: false };
     let conjugated = decider.conjugate((w, first, second), polar, notes)?;
@@ -148,8 +148,11 @@ impl Decider<'_> {
             MagnitudeScale::Auto => {}
         }
         let words = columns.unit(1).map_or("", |(_, words)| words);
-        let sure =
-            if said == Some(false) { None } else { first.iter().copied().find(|m| *m <= 0.0).map(|m| (true, m)) };
+        let sure = if said == Some(false) {
+            None
+        } else {
+            first.iter().copied().find(|m| *m <= 0.0).map(|m| (true, Ground::Value(m)))
+        };
         let (decibels, ground) = self.settle(all, (said, words), sure, Question::Magnitude, |r| r.decibels)?;
         let scale = if decibels { MagnitudeScale::Decibels } else { MagnitudeScale::Linear };
         notes.push(Note::Magnitude { scale, ground });
@@ -161,7 +164,7 @@ impl Decider<'_> {
         all: &[Misfit],
         said: Option<bool>,
         columns: &Columns,
-        second: &[f64],
+        (first, second, decibels): (&[f64], &[f64], bool),
         notes: &mut Vec<Note>,
     ) -> Result<bool, FrfError> {
         match self.settings.angle {
@@ -171,8 +174,17 @@ impl Decider<'_> {
         }
         let words = columns.unit(2).map_or("", |(_, words)| words);
         // Nobody unwraps beyond 16 turns; 100 rad is more than that.
-        let sure = second.iter().copied().find(|p| p.abs() > 32.0 * PI).map(|p| (true, p));
+        let large = second.iter().copied().find(|p| p.abs() > 32.0 * PI).map(|p| (true, Ground::Value(p)));
+        let narrow = narrow_phase(first, second, decibels);
+        // A free inertia in the margin display stays near 0 deg; its noise does not fill two thirds of a circle's 6.28.
+        let fills = |(low, high): &(f64, f64)| high - low > 4.2;
+        let sure = large.or_else(|| narrow.filter(fills).map(|(low, high)| (false, Ground::PhaseRange(low, high))));
         let (degrees, ground) = self.settle(all, (said, words), sure, Question::Angle, |r| r.degrees)?;
+        // Less than that may be either: degrees would have to be said.
+        if let (true, None, Some((low, high))) = (degrees, said, narrow) {
+            let doubt = Doubt::PhaseRange { low, high };
+            return Err(FrfError::Ambiguous { file: self.file.to_owned(), question: Question::Angle, doubt });
+        }
         let unit = if degrees { AngleUnit::Degrees } else { AngleUnit::Radians };
         notes.push(Note::Angle { unit, ground });
         Ok(degrees)
@@ -183,7 +195,7 @@ impl Decider<'_> {
         &self,
         all: &[Misfit],
         (said, words): (Option<bool>, &str),
-        sure: Option<(bool, f64)>,
+        sure: Option<(bool, Ground)>,
         question: Question,
         answer: impl Fn(&Reading) -> bool,
     ) -> Result<(bool, Ground), FrfError> {
@@ -191,19 +203,23 @@ impl Decider<'_> {
         let clear = evidence.filter(Evidence::is_clear);
         if let Some(said) = said {
             let contradicts = clear.filter(|e| answer(&e.best.reading) != said && !e.rival.is_plausible());
-            let impossible = sure.filter(|(is, _)| *is != said);
+            let impossible = sure.filter(|(is, _)| *is != said).map(|(_, ground)| ground);
             if contradicts.is_some() || impossible.is_some() {
                 return Err(FrfError::Contradiction {
                     file: self.file.to_owned(),
                     question,
                     says: words.to_owned(),
-                    doubt: impossible.map_or(Doubt::of(evidence), |(_, value)| Doubt::Value { value }),
+                    doubt: match impossible {
+                        Some(Ground::Value(value)) => Doubt::Value { value },
+                        Some(Ground::PhaseRange(low, high)) => Doubt::PhaseRange { low, high },
+                        _ => Doubt::of(evidence),
+                    },
                 });
             }
             return Ok((said, Ground::Header(words.to_owned())));
         }
-        if let Some((is, value)) = sure {
-            return Ok((is, Ground::Value(value)));
+        if let Some((is, ground)) = sure {
+            return Ok((is, ground));
         }
         match (clear, evidence) {
             (Some(e), _) => Ok((answer(&e.best.reading), Ground::GainPhase(e))),
@@ -240,10 +256,11 @@ impl Decider<'_> {
         let all = misfits(w, first, second, &readings);
         match evidence(&all, |r| r.conjugated) {
             None => notes.push(Note::ConjugateUntested),
-            Some(e) if !e.is_clear() => notes.push(Note::ConjugateUnclear { evidence: e }),
-            Some(e) if e.best.reading.conjugated => {
+            // Leaning is enough to refuse: a causal file leans the other way. No reading explained is no evidence.
+            Some(e) if e.best.reading.conjugated && e.best.is_plausible() => {
                 return Err(FrfError::Conjugated { file: self.file.to_owned(), evidence: e });
             }
+            Some(e) if !e.is_clear() => notes.push(Note::ConjugateUnclear { evidence: e }),
             Some(_) => {}
         }
         Ok(false)
@@ -284,6 +301,16 @@ impl Decider<'_> {
         notes.push(note(margin, ground));
         Ok(margin)
     }
+}
+
+/// Least and largest phase where they would suit radians, within half a turn either way and spread over more than 1.5, while the gain changes
+/// tenfold: in degrees such a gain comes with far more.
+fn narrow_phase(first: &[f64], second: &[f64], decibels: bool) -> Option<(f64, f64)> {
+    let range = |c: &[f64]| c.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let (low, high) = range(second);
+    let (least, most) = range(first);
+    let tenfold = if decibels { most - least > 20.0 } else { most > 10.0 * least };
+    (tenfold && low >= -PI - 1e-3 && high <= PI + 1e-3 && high - low > 1.5).then_some((low, high))
 }
 
 /// The answers left once `never` and `always` are taken into account, yes first.

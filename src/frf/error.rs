@@ -70,6 +70,13 @@ pub enum Doubt {
         /// The value as written.
         value: f64,
     },
+    /// Phases that stay within half a turn in radians, and would be next to nothing in degrees.
+    PhaseRange {
+        /// Least phase as written.
+        low: f64,
+        /// Largest phase as written.
+        high: f64,
+    },
     /// The ends of the sweep are round numbers in the other unit only.
     RoundEnds {
         /// Lower end in the other unit.
@@ -94,6 +101,7 @@ impl fmt::Display for Doubt {
                 "the gain-phase relation cannot be tested (it needs 12 points over a factor of 3 in frequency)",
             ),
             Doubt::Value { value } => write!(f, "the value {value} cannot be in that unit"),
+            Doubt::PhaseRange { low, high } => write!(f, "all phases lie from {low} to {high}, as if in radians"),
             Doubt::RoundEnds { low, high } => {
                 write!(f, "the ends are round numbers only after division by 2 pi, {low:.6} and {high:.6}")
             }
@@ -198,6 +206,10 @@ pub enum FrfError {
     DatasetField { file: String, dataset: usize, line: u64, found: String, expected: &'static str },
     #[error("{file}, dataset {dataset}: found {found} data values; its header declares {expected}")]
     DatasetLength { file: String, dataset: usize, found: usize, expected: usize },
+    #[error(
+        "{file}, dataset {dataset}, line {line}: {found} bytes are left and no closing -1 stands where the data should end; expected {expected} data bytes"
+    )]
+    DatasetBytes { file: String, dataset: usize, line: u64, found: usize, expected: usize },
     #[error("{file}: {source}")]
     Shape { file: String, source: FrfShapeError },
     #[error(

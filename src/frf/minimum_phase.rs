@@ -16,7 +16,7 @@ fn weight(x: f64) -> f64 {
         let mut power = (-a).exp();
         let mut sum = 0.0;
         let mut k = 1.0;
-        while power > 1e-9 {
+        while power > 1e-8 {
             sum += power / (k * k);
             power *= ratio;
             k += 2.0;

@@ -1,18 +1,22 @@
 //! Measured frequency responses: what a sweep says, before any model.
 //!
-//! In: sweep files. Out: [`Frf`], the response on its own ascending grid.
+//! In: sweep files, time records. Out: [`Frf`], the response on its own ascending grid.
 //! Convention: `specs/conventions.md`; files: `specs/frf.md`.
 
+mod algebra;
 mod bytes;
 mod causality;
 mod columns;
 mod decide;
 mod error;
+mod estimate;
 mod header;
+mod interpolate;
 mod minimum_phase;
 mod note;
 mod number;
 mod order;
+mod phase;
 mod read;
 mod response;
 mod settings;
@@ -21,9 +25,13 @@ mod uff;
 mod uff_block;
 mod write;
 
+pub use algebra::{feedback, product, ratio};
 pub use causality::{Evidence, Misfit, Reading};
 pub use error::{Doubt, FrfError, NotText, Question};
+pub use estimate::{Estimate, PeriodicSettings, SegmentSettings, periodic, segments};
+pub use interpolate::{Interpolation, resample};
 pub use note::{Ground, Note};
+pub use phase::{check_order, phase_rad};
 pub use read::{Sweep, read_bytes, read_file};
 pub use response::{Frf, FrfShapeError};
 pub use settings::{

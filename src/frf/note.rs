@@ -17,6 +17,8 @@ pub enum Ground {
     GainPhase(Evidence),
     /// A value that the other reading cannot take.
     Value(f64),
+    /// All phases lie between these two numbers, which is half a turn either way in radians and next to nothing in degrees.
+    PhaseRange(f64, f64),
     /// Both end points are round numbers in this unit only.
     RoundEnds(f64, f64),
     /// Neither file nor data speak against the standing rule (`specs/frf.md`), and nothing confirms it.
@@ -30,6 +32,10 @@ impl fmt::Display for Ground {
             Ground::Format => f.write_str("the file format fixes it"),
             Ground::GainPhase(evidence) => evidence.fmt(f),
             Ground::Value(value) => write!(f, "the value {value} allows nothing else"),
+            Ground::PhaseRange(low, high) => write!(
+                f,
+                "all phases lie from {low} to {high}, half a turn either way in radians and far too little in degrees for such a change of gain"
+            ),
             Ground::RoundEnds(low, high) => write!(f, "the sweep then runs from {low} to {high}, round numbers"),
             Ground::Contract => f.write_str("the file does not say, and this is the standing rule"),
         }
@@ -76,6 +82,8 @@ pub enum Note {
     ColumnsIgnored { names: Vec<String> },
     /// Which dataset of a universal file was read.
     Dataset { number: usize, of: usize, title: String },
+    /// A binary dataset declares another length than its points take.
+    DatasetBytes { declared: usize, found: usize },
     /// The line at 0 Hz was left out.
     ZeroHertz,
     /// Bytes in the preamble are not UTF-8 and were read as Latin-1.
@@ -127,6 +135,12 @@ impl fmt::Display for Note {
             }
             Note::ColumnsIgnored { names } => write!(f, "Columns not used: {}.", names.join(", ")),
             Note::Dataset { number, of, title } => write!(f, "Read dataset {number} of {of}: {title}."),
+            Note::DatasetBytes { declared, found } => {
+                write!(
+                    f,
+                    "The dataset declares {declared} data bytes; its points take {found}, and its closing mark stands behind them."
+                )
+            }
             Note::ZeroHertz => f.write_str("The line at 0 Hz was left out."),
             Note::Latin1 { line } => write!(f, "Line {line} is not UTF-8 and was read as Latin-1."),
         }

@@ -11,7 +11,7 @@ use super::header::Unit;
 use super::note::{Ground, Note};
 use super::order::{Declared, complete, declared, gaps, groups};
 use super::response::Frf;
-use super::settings::{DeviationScale, ReadSettings};
+use super::settings::{DeviationScale, MagnitudeScale, ReadSettings};
 use super::table::table;
 use super::uff;
 use nalgebra::Complex;
@@ -80,6 +80,7 @@ fn assemble(
     gaps(&hz, notes);
     let (first, second) = (pick(&columns.first), pick(&columns.second));
     varies(file, columns, &first, &second)?;
+    positive(file, columns, settings)?;
     let reading = reading(file, columns, (&w, &first, &second), settings, notes)?;
     let rows = rows(file, columns, reading)?;
     let mean = |f: &dyn Fn(usize) -> f64, g: &[usize]| g.iter().map(|&i| f(i)).sum::<f64>() / g.len() as f64;
@@ -108,6 +109,20 @@ fn varies(file: &str, columns: &Columns, first: &[f64], second: &[f64]) -> Resul
         return Err(FrfError::ConstantMagnitude { file: file.to_owned(), rows: first.len(), found: first[0] });
     }
     Ok(())
+}
+
+/// Refuses magnitudes that cannot be linear where they are said to be.
+fn positive(file: &str, columns: &Columns, settings: &ReadSettings) -> Result<(), FrfError> {
+    let said = match settings.magnitude {
+        MagnitudeScale::Auto => columns.unit(1).is_some_and(|(unit, _)| unit == Unit::Linear),
+        scale => scale == MagnitudeScale::Linear,
+    };
+    match columns.first.iter().position(|m| *m <= 0.0) {
+        Some(i) if said && columns.pair == Pair::Polar => {
+            Err(FrfError::Magnitude { file: file.to_owned(), line: columns.line[i], found: columns.first[i] })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The complex value of each row.

@@ -65,6 +65,11 @@ pub(crate) fn columns(
         return Err(FrfError::DatasetFunction { file: file.to_owned(), dataset: block.number, found: form.function });
     }
     notes.push(Note::Dataset { number: block.number, of: blocks.len(), title: form.title.clone() });
+    if let Body::Binary { bytes, declared, .. } = &block.body
+        && bytes.len() != *declared
+    {
+        notes.push(Note::DatasetBytes { declared: *declared, found: bytes.len() });
+    }
     let numbers = numbers(file, block, form)?;
     let per_point = form.per_point();
     let wanted = form.points.saturating_mul(per_point);
@@ -203,7 +208,7 @@ fn numbers(file: &str, block: &Block<'_>, form: &Form) -> Result<Vec<(u64, f64)>
             }
             Ok(out)
         }
-        Body::Binary { bytes, little } => {
+        Body::Binary { bytes, little, .. } => {
             let widths = widths(file, block.number, bytes.len(), form)?;
             let line = block.line + super::uff_block::HEADER as u64;
             let mut out = Vec::with_capacity(form.points * widths.len());

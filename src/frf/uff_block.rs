@@ -21,8 +21,8 @@ pub(crate) struct Block<'a> {
 pub(crate) enum Body<'a> {
     /// Lines with their numbers.
     Text(Vec<(u64, String)>),
-    /// IEEE numbers.
-    Binary { bytes: &'a [u8], little: bool },
+    /// IEEE numbers, and how many bytes the first line declares.
+    Binary { bytes: &'a [u8], little: bool, declared: usize },
 }
 
 /// Header records between the line `58` and the data.
@@ -119,31 +119,57 @@ pub(crate) fn blocks<'a>(file: &str, bytes: &'a [u8]) -> Result<Vec<Block<'a>>, 
                 let length: usize = field(3).parse().map_err(|_| bad(field(3), "the number of data bytes"))?;
                 let header = header(file, number, &mut lines)?;
                 let rest = &bytes[lines.at..];
-                let Some(body) = rest.get(..length) else {
+                // Some writers declare a wrong length. Points and type tell it too; the closing mark says who is right.
+                let lengths = [vec![length], lengths(&header[6])].concat();
+                let Some(length) = lengths.iter().copied().find(|&n| rest.get(n..).is_some_and(closes)) else {
                     let (found, expected) = (rest.len(), length);
-                    return Err(FrfError::DatasetLength { file: file.to_owned(), dataset: number, found, expected });
+                    return Err(FrfError::DatasetBytes {
+                        file: file.to_owned(),
+                        dataset: number,
+                        line,
+                        found,
+                        expected,
+                    });
                 };
+                let body = &rest[..length];
+                let declared = lengths[0];
                 lines.at += length;
-                // The closing mark stands right behind the data or on the next line.
-                loop {
-                    match lines.next() {
-                        Some((_, text)) if is_mark(text) => break,
-                        Some((_, text)) if text.trim_ascii().is_empty() => {}
-                        Some((_, text)) => {
-                            return Err(bad(
-                                &words(&text[..text.len().min(20)]),
-                                "the closing -1 behind the data bytes",
-                            ));
-                        }
-                        None => return Err(end_of_file(file, number, lines.line, "the closing -1")),
+                while let Some((_, text)) = lines.next() {
+                    if is_mark(text) {
+                        break;
                     }
                 }
-                out.push(Block { number, line: line + 1, header, body: Body::Binary { bytes: body, little } });
+                out.push(Block {
+                    number,
+                    line: line + 1,
+                    header,
+                    body: Body::Binary { bytes: body, little, declared },
+                });
             }
             _ => skip(&mut lines),
         }
     }
     Ok(out)
+}
+
+/// Whether the closing mark follows, at once or on the next line.
+fn closes(rest: &[u8]) -> bool {
+    let mut lines = rest.split(|&b| b == b'\n');
+    match lines.next() {
+        Some(first) if first.trim_ascii().is_empty() => lines.next().is_some_and(is_mark),
+        Some(first) => is_mark(first),
+        None => false,
+    }
+}
+
+/// The lengths (bytes) that the form record allows: type, number of points, spacing.
+fn lengths(form: &str) -> Vec<usize> {
+    let number = |start: usize| form.get(start..start + 10).and_then(|f| f.trim().parse::<usize>().ok());
+    let (Some(kind), Some(points), Some(spacing)) = (number(0), number(10), number(20)) else { return Vec::new() };
+    let size = if kind == 2 || kind == 5 { 4 } else { 8 };
+    let ordinate = size * (1 + usize::from(kind >= 5));
+    let point = if spacing == 1 { vec![ordinate] } else { vec![ordinate + size, ordinate + 4] };
+    point.into_iter().filter_map(|p| p.checked_mul(points)).collect()
 }
 
 /// Goes behind the closing mark of a dataset of another type.

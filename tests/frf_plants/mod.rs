@@ -87,32 +87,38 @@ pub struct Show {
 }
 
 impl Show {
-    /// Every dress, by name; with a header that names the units and without.
+    /// Dresses by name: each question alone and all together, without a header and with one.
     pub fn all() -> Vec<(String, Show)> {
-        let mut out = Vec::new();
-        for bits in 0..64u32 {
-            let bit = |k: u32| bits >> k & 1 == 1;
-            let show = Show {
-                linear: bit(0),
-                radians: bit(1),
-                rad_per_s: bit(2),
-                margin: bit(3),
-                conjugated: bit(4),
-                header: bit(5),
-            };
-            let pick = |on, a: &'static str, b: &'static str| if on { a } else { b };
-            let name = [
-                pick(show.header, "header", "bare"),
-                pick(show.linear, "linear", "dB"),
-                pick(show.radians, "rad", "deg"),
-                pick(show.rad_per_s, "rad/s", "Hz"),
-                pick(show.margin, "margin", "response"),
-                pick(show.conjugated, "conjugated", "causal"),
-            ]
-            .join(" ");
-            out.push((name, show));
-        }
-        out
+        // Bits: linear, radians, rad/s, margin, conjugated, header.
+        let dresses = [
+            0b000000, 0b001000, 0b001001, 0b000010, 0b001010, 0b001100, 0b000111, 0b001111, 0b010000, 0b011000,
+            0b011111, 0b101000, 0b100111, 0b111000,
+        ];
+        dresses
+            .into_iter()
+            .map(|bits: u32| {
+                let bit = |k: u32| bits >> k & 1 == 1;
+                let show = Show {
+                    linear: bit(0),
+                    radians: bit(1),
+                    rad_per_s: bit(2),
+                    margin: bit(3),
+                    conjugated: bit(4),
+                    header: bit(5),
+                };
+                let pick = |on, a: &'static str, b: &'static str| if on { a } else { b };
+                let name = [
+                    pick(show.header, "header", "bare"),
+                    pick(show.linear, "linear", "dB"),
+                    pick(show.radians, "rad", "deg"),
+                    pick(show.rad_per_s, "rad/s", "Hz"),
+                    pick(show.margin, "margin", "response"),
+                    pick(show.conjugated, "conjugated", "causal"),
+                ]
+                .join(" ");
+                (name, show)
+            })
+            .collect()
     }
 }
 
