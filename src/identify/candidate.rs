@@ -13,7 +13,7 @@ use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
 use nalgebra::Complex;
 
 /// Pole dampings of the search; their widths overlap.
-const DAMPINGS: [f64; 4] = [0.004, 0.012, 0.035, 0.1];
+pub(super) const DAMPINGS: [f64; 4] = [0.004, 0.012, 0.035, 0.1];
 /// Fewest points on each side of a centre.
 const LEAST_SIDE: usize = 4;
 
@@ -49,11 +49,8 @@ fn project(w: &[f64], log: &[Complex<f64>], weight: &[f64], centre: f64, damping
         b2 += q_re * y_re + q_im * y_im;
     }
     let det = a11 * a22 - a12 * a12;
-    let part = if det > 1e-12 * a11 * a22 {
-        [(a22 * b1 - a12 * b2) / det, (a11 * b2 - a12 * b1) / det]
-    } else {
-        [0.0, 0.0]
-    };
+    let part =
+        if det > 1e-12 * a11 * a22 { [(a22 * b1 - a12 * b2) / det, (a11 * b2 - a12 * b1) / det] } else { [0.0, 0.0] };
     Centre { w: centre, damping, part, gain: part[0] * b1 + part[1] * b2 }
 }
 
@@ -151,14 +148,21 @@ pub(super) struct Local<'a> {
 }
 
 impl Local<'_> {
-    /// The best pair near a centre, with the fall of the weighted sum of squares in a window of `side` points around it.
-    pub fn best(&self, c: &Centre, work: &mut Workspace, qr: &mut Qr, evaluations: &mut (usize, usize)) -> Option<Mode> {
+    /// The best pair near a centre, with the fall of the weighted sum of squares that it brings to the points around it.
+    pub fn best(
+        &self,
+        c: &Centre,
+        work: &mut Workspace,
+        qr: &mut Qr,
+        evaluations: &mut (usize, usize),
+    ) -> Option<(f64, Mode)> {
         let n = self.w.len();
         let middle = self.w.partition_point(|v| *v < c.w);
         let judge = window(n, middle, 20);
+        let before: f64 = judge.clone().map(|k| self.ratio[k].ln().norm_sqr() * self.weight[k].powi(2)).sum();
         let mut best: Option<(f64, Mode)> = None;
         let mut starts = vec![projected(c)];
-        for side in [5, 10, 20] {
+        for side in [6, 16] {
             let r = window(n, middle, side);
             starts.extend(local_rational(&self.w[r.clone()], &self.ratio[r.clone()], &self.weight[r], c, qr));
         }
@@ -169,7 +173,7 @@ impl Local<'_> {
                 best = Some((cost, mode));
             }
         }
-        best.map(|(_, m)| m)
+        best.map(|(cost, m)| (before - cost, m))
     }
 
     /// Four parameters and a local gain over one window.

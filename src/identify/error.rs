@@ -14,10 +14,14 @@ pub enum IdentifyError {
     #[error("no point between {low_hz} and {high_hz} Hz: the response covers {from_hz} to {to_hz} Hz")]
     EmptyBand { low_hz: f64, high_hz: f64, from_hz: f64, to_hz: f64 },
     /// Fewer numbers than unknowns.
-    #[error("{found} points are too few for {modes} resonance pairs: expected at least {needed}; ask for a lower order")]
+    #[error(
+        "{found} points are too few for {modes} resonance pairs: expected at least {needed}; ask for a lower order"
+    )]
     TooFewPoints { found: usize, needed: usize, modes: usize },
     /// The hold cannot be divided out at or above half the sample rate.
-    #[error("the response reaches {found_hz} Hz, not below half the sample rate, {nyquist_hz} Hz: lower high_hz or correct the sample time")]
+    #[error(
+        "the response reaches {found_hz} Hz, not below half the sample rate, {nyquist_hz} Hz: lower high_hz or correct the sample time"
+    )]
     HoldBand { found_hz: f64, nyquist_hz: f64 },
     /// What is left after removing the hold is no response.
     #[error(transparent)]

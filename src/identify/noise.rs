@@ -71,7 +71,8 @@ mod tests {
             .map(|i| {
                 let level = if i < 2000 { 0.01 } else { 0.03 };
                 // A slow drift that second differences must not see.
-                Complex::new(1.0 + 1e-4 * f64::from(i), 0.0) * Complex::new(level * r.normal(), level * r.normal()).exp()
+                Complex::new(1.0 + 1e-4 * f64::from(i), 0.0)
+                    * Complex::new(level * r.normal(), level * r.normal()).exp()
             })
             .collect();
         let local = local_noise(&ratio);

@@ -91,11 +91,7 @@ impl Shape {
         let body = match self.body {
             BodyForm::SecondOrder | BodyForm::Without => {
                 let w0 = x[1].exp();
-                Body::SecondOrder {
-                    dc_gain: gain / (w0 * w0),
-                    natural_frequency_rad_s: w0,
-                    damping_ratio: x[2].exp(),
-                }
+                Body::SecondOrder { dc_gain: gain / (w0 * w0), natural_frequency_rad_s: w0, damping_ratio: x[2].exp() }
             }
             BodyForm::FreeInertia => Body::FreeInertia { acceleration_gain: gain, viscous_rate_per_s: x[1] },
         };
@@ -307,12 +303,8 @@ mod tests {
             let mut shape = Shape { body, delay: true, modes: 0 };
             let mut x = start;
             for z in [0.03, -0.02] {
-                let mode = Mode {
-                    zero_rad_s: 7400.0,
-                    zero_damping_ratio: z,
-                    pole_rad_s: 7600.0,
-                    pole_damping_ratio: 0.04,
-                };
+                let mode =
+                    Mode { zero_rad_s: 7400.0, zero_damping_ratio: z, pole_rad_s: 7600.0, pole_damping_ratio: 0.04 };
                 shape.push_mode(&mut x, &mode);
             }
             let fit = LogFit { shape, w: &w, target: &target, weight: &weight, ranges };

@@ -56,7 +56,9 @@ impl Spread {
         let n = self.x.len();
         let middle: f64 = terms.iter().map(|(i, c)| c * self.x[*i]).sum();
         let variance: f64 = (0..n)
-            .map(|j| terms.iter().map(|(i, c)| if *i <= j { c * self.root[j * n + i] } else { 0.0 }).sum::<f64>().powi(2))
+            .map(|j| {
+                terms.iter().map(|(i, c)| if *i <= j { c * self.root[j * n + i] } else { 0.0 }).sum::<f64>().powi(2)
+            })
             .sum();
         let half = Z95 * variance.sqrt();
         let (a, b) = (sign * (middle - half).exp(), sign * (middle + half).exp());

@@ -60,7 +60,12 @@ impl Sweep {
             (0..all.len()).filter(|&i| hz(all[i]) >= settings.low_hz && hz(all[i]) <= settings.high_hz).collect();
         let (Some(&first), Some(&last)) = (keep.first(), keep.last()) else {
             let (low_hz, high_hz) = (settings.low_hz, settings.high_hz);
-            return Err(IdentifyError::EmptyBand { low_hz, high_hz, from_hz: hz(all[0]), to_hz: hz(all[all.len() - 1]) });
+            return Err(IdentifyError::EmptyBand {
+                low_hz,
+                high_hz,
+                from_hz: hz(all[0]),
+                to_hz: hz(all[all.len() - 1]),
+            });
         };
         let modes = match settings.order {
             OrderChoice::Auto { .. } => 0,

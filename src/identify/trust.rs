@@ -85,9 +85,7 @@ pub(super) fn band(w: &[f64], error: &[f64], relative_std: Option<&[f64]>, limit
         }
     }
     match best {
-        None => {
-            TrustedBand { low_hz: 0.0, high_hz: 0.0, reason: BandReason { low: state[0], high: state[n - 1] } }
-        }
+        None => TrustedBand { low_hz: 0.0, high_hz: 0.0, reason: BandReason { low: state[0], high: state[n - 1] } },
         Some((from, to)) => TrustedBand {
             low_hz: w[from] / TAU,
             high_hz: w[to] / TAU,

@@ -122,8 +122,7 @@ pub fn visible(mode: &Mode, w_rad_s: &[f64], relative_std: f64) -> bool {
 pub fn judge(truth: &Plant, found: &Identified, w_rad_s: &[f64], relative_std: f64, seed: u64) -> StudyCase {
     let (low, high) = (w_rad_s[0], w_rad_s[w_rad_s.len() - 1]);
     let fine = log_grid(low / std::f64::consts::TAU, high / std::f64::consts::TAU, 10 * w_rad_s.len());
-    let mut error: Vec<f64> =
-        fine.iter().map(|&w| (found.plant.at(w) / truth.at(w) - 1.0).norm()).collect();
+    let mut error: Vec<f64> = fine.iter().map(|&w| (found.plant.at(w) / truth.at(w) - 1.0).norm()).collect();
     let frequency_errors = truth
         .modes
         .iter()
