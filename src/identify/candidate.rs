@@ -59,18 +59,14 @@ pub(super) fn centres(w: &[f64], log: &[Complex<f64>], weight: &[f64], count: us
     let mut all: Vec<Centre> = Vec::with_capacity(2 * w.len());
     for k in 0..w.len() {
         let between = if k + 1 < w.len() { (w[k] * w[k + 1]).sqrt() } else { w[k] };
-        for centre in [w[k], between] {
-            let mut best = project(w, log, weight, centre, DAMPINGS[0]);
-            for &damping in &DAMPINGS[1..] {
-                // Wide pairs need no half steps.
-                if centre == w[k] {
-                    let c = project(w, log, weight, centre, damping);
-                    if c.gain > best.gain {
-                        best = c;
-                    }
-                }
+        all.push(project(w, log, weight, between, DAMPINGS[0]));
+        // Steps of half a width or less, widths taken from the neighbours' distance.
+        let spacing = w[(k + 1).min(w.len() - 1)] / w[k] - 1.0;
+        for &damping in &DAMPINGS {
+            let step = ((damping / spacing.max(1e-9)) as usize).clamp(1, 64);
+            if k % step == 0 {
+                all.push(project(w, log, weight, w[k], damping));
             }
-            all.push(best);
         }
     }
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain).then(a.w.total_cmp(&b.w)));

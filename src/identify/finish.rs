@@ -20,7 +20,7 @@ use std::f64::consts::TAU;
 
 /// Steps of the last joint fit and its tolerance: the sum of squares moves by less than its own scatter by far.
 const LAST_STEPS: usize = 60;
-const LAST_TOLERANCE: f64 = 1e-10;
+const LAST_TOLERANCE: f64 = 1e-8;
 /// A deviation of ln ω0 above this (factor 1.6 either way at 95 %) leaves the natural frequency undetermined.
 const UNDETERMINED: f64 = 0.25;
 

@@ -50,7 +50,7 @@ impl Joint<'_> {
 
     /// A refined model with its held-out errors. The workspace keeps the factors of its last Jacobian.
     fn stage(&mut self, shape: Shape, mut x: Vec<f64>, steps: usize, folds: Option<usize>, q: &mut Vec<f64>) -> Stage {
-        let cost = self.refine(shape, &mut x, steps, 1e-4).cost;
+        let cost = self.refine(shape, &mut x, steps, STAGE_TOLERANCE).cost;
         // The last Jacobian is one small step old, which the held-out errors of a model that moves so little do not see.
         let held_out = match folds {
             Some(folds) => held_out::errors(&self.memory.qr, self.memory.residuals(), folds, q),
@@ -86,6 +86,10 @@ impl Joint<'_> {
 const STEPS: usize = 2;
 /// Steps of the joint fit for models among which the order is chosen.
 const SETTLE: usize = 8;
+/// Tolerance of those fits: a share of chi square that is small against what a pair must bring.
+const STAGE_TOLERANCE: f64 = 1e-3;
+/// A pair whose removal costs this many times what noise could bring, by the linear model, is not put to the test.
+const CLEAR: f64 = 4.0;
 /// Places tried per new pair.
 const PLACES: usize = 3;
 /// Pairs that growth goes beyond the best order so far, or beyond a fixed one.
@@ -142,7 +146,10 @@ pub(super) fn grow(joint: &mut Joint, start: &Start, settings: &IdentifySettings
     stages[last] = joint.stage(shape, x, SETTLE, folds, &mut q);
     while last > wanted.unwrap_or(0) {
         let Stage { shape, x, .. } = stages[last].clone();
-        let Some((pole, zero, _)) = weakest(&joint.memory.qr, shape, &x) else { break };
+        let Some((pole, zero, rise)) = weakest(&joint.memory.qr, shape, &x) else { break };
+        if wanted.is_none() && rise > CLEAR * least * stages[last].cost / rows {
+            break;
+        }
         let (shape, x) = without(shape, &x, pole, zero);
         let stage = joint.stage(shape, x, SETTLE, folds, &mut q);
         let better = stage.cost < stages[last - 1].cost;
