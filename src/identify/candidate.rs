@@ -13,7 +13,7 @@ use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
 use nalgebra::Complex;
 
 /// Pole dampings of the search; their widths overlap.
-const DAMPINGS: [f64; 4] = [0.004, 0.012, 0.035, 0.1];
+pub(super) const DAMPINGS: [f64; 4] = [0.004, 0.012, 0.035, 0.1];
 /// Fewest points on each side of a centre.
 const LEAST_SIDE: usize = 4;
 
@@ -59,18 +59,14 @@ pub(super) fn centres(w: &[f64], log: &[Complex<f64>], weight: &[f64], count: us
     let mut all: Vec<Centre> = Vec::with_capacity(2 * w.len());
     for k in 0..w.len() {
         let between = if k + 1 < w.len() { (w[k] * w[k + 1]).sqrt() } else { w[k] };
-        for centre in [w[k], between] {
-            let mut best = project(w, log, weight, centre, DAMPINGS[0]);
-            for &damping in &DAMPINGS[1..] {
-                // Wide pairs need no half steps.
-                if centre == w[k] {
-                    let c = project(w, log, weight, centre, damping);
-                    if c.gain > best.gain {
-                        best = c;
-                    }
-                }
+        all.push(project(w, log, weight, between, DAMPINGS[0]));
+        // Steps of half a width or less, widths taken from the neighbours' distance.
+        let spacing = w[(k + 1).min(w.len() - 1)] / w[k] - 1.0;
+        for &damping in &DAMPINGS {
+            let step = ((damping / spacing.max(1e-9)) as usize).clamp(1, 64);
+            if k % step == 0 {
+                all.push(project(w, log, weight, w[k], damping));
             }
-            all.push(best);
         }
     }
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain).then(a.w.total_cmp(&b.w)));
@@ -148,20 +144,21 @@ pub(super) struct Local<'a> {
 }
 
 impl Local<'_> {
-    /// The best pair near a centre, with the fall of the weighted sum of squares in a window of `side` points around it.
+    /// The best pair near a centre, with the fall of the weighted sum of squares that it brings to the points around it.
     pub fn best(
         &self,
         c: &Centre,
         work: &mut Workspace,
         qr: &mut Qr,
         evaluations: &mut (usize, usize),
-    ) -> Option<Mode> {
+    ) -> Option<(f64, Mode)> {
         let n = self.w.len();
         let middle = self.w.partition_point(|v| *v < c.w);
         let judge = window(n, middle, 20);
+        let before: f64 = judge.clone().map(|k| self.ratio[k].ln().norm_sqr() * self.weight[k].powi(2)).sum();
         let mut best: Option<(f64, Mode)> = None;
         let mut starts = vec![projected(c)];
-        for side in [5, 10, 20] {
+        for side in [6, 16] {
             let r = window(n, middle, side);
             starts.extend(local_rational(&self.w[r.clone()], &self.ratio[r.clone()], &self.weight[r], c, qr));
         }
@@ -172,7 +169,7 @@ impl Local<'_> {
                 best = Some((cost, mode));
             }
         }
-        best.map(|(_, m)| m)
+        best.map(|(cost, m)| (before - cost, m))
     }
 
     /// Four parameters and a local gain over one window.

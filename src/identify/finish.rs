@@ -20,7 +20,7 @@ use std::f64::consts::TAU;
 
 /// Steps of the last joint fit and its tolerance: the sum of squares moves by less than its own scatter by far.
 const LAST_STEPS: usize = 60;
-const LAST_TOLERANCE: f64 = 1e-10;
+const LAST_TOLERANCE: f64 = 1e-8;
 /// A deviation of ln ω0 above this (factor 1.6 either way at 95 %) leaves the natural frequency undetermined.
 const UNDETERMINED: f64 = 0.25;
 
@@ -56,8 +56,8 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
     let target = sweep.value.iter().map(|v| v * start.sign).collect();
     let work = Work { linear_fits: steps.as_ref().map_or(0, |l| l.fits), ..Work::default() };
     let mut joint = Joint { sweep: &sweep, target, weight, ranges, memory, work };
-    let stages = growth::grow(&mut joint, &start, settings);
-    let (chosen, held_out) = choose(&stages, joint.weight[0]);
+    let (stages, last) = growth::grow(&mut joint, &start, settings);
+    let (chosen, held_out) = choose(&stages, last, joint.weight[0]);
     let Stage { mut shape, mut x, .. } = stages[chosen].clone();
     if sweep.relative_std.is_none() {
         let local = local_noise(&joint.ratio(shape, &x));
@@ -125,16 +125,16 @@ fn flat(sweep: &Sweep) -> Start {
     Start { shape, x: vec![level.ln() + 2.0 * w0.ln(), w0.ln(), 0.0, 0.0], sign: sweep.value[0].re.signum() }
 }
 
-/// The stage to keep: by held-out errors, or the last one of a fixed order.
-fn choose(stages: &[Stage], weight: f64) -> (usize, Vec<HeldOut>) {
+/// The stage to keep: by held-out errors among those up to `last`, or the last one of a fixed order.
+fn choose(stages: &[Stage], last: usize, weight: f64) -> (usize, Vec<HeldOut>) {
     if stages.iter().any(|s| s.held_out.is_empty()) {
-        return (stages.len() - 1, vec![]);
+        return (last, vec![]);
     }
     let errors: Vec<(usize, Vec<f64>)> = stages.iter().map(|s| (s.shape.modes, s.held_out.clone())).collect();
     // The noise of one part from the stage that follows the data best: median of |e|² = 2 ln 2 σ².
     let deviation =
         errors.iter().map(|(_, e)| (median(e) / (2.0 * std::f64::consts::LN_2)).sqrt()).fold(f64::INFINITY, f64::min);
-    held_out::choose(&errors, deviation, 1.0 / weight)
+    held_out::choose(&errors, last, deviation, 1.0 / weight)
 }
 
 /// Decides between a body and a free inertia where the natural frequency lies at or below the sweep.

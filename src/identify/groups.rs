@@ -60,7 +60,9 @@ fn partition(
     groups.into_iter().map(|(g, _)| g).collect()
 }
 
-/// Fits N/D, both monic of `order`, to the ratio over one band, in rounds of eqs. (17)-(18); the best allowed round.
+/// Fits g N/D, N and D monic of `order`, to the ratio over one band, in rounds of eqs. (17)-(18); the best allowed round.
+///
+/// The gain g takes up the level that groups not yet fitted leave behind; it is dropped, as eq. (2) is monic.
 fn fit_group(w: &[f64], ratio: &[Complex<f64>], order: usize, rounds: usize) -> Option<(Vec<Mode>, f64)> {
     let n = w.len();
     let unit = (w[0] * w[n - 1]).sqrt();
@@ -73,30 +75,27 @@ fn fit_group(w: &[f64], ratio: &[Complex<f64>], order: usize, rounds: usize) -> 
         let bottom: Vec<f64> = top.iter().zip(ratio).map(|(t, r)| t * r.norm()).collect();
         let zeros = AxisBasis::new(&scaled, &top, order)?;
         let poles = AxisBasis::new(&scaled, &bottom, order)?;
-        // R (κ φ_n + Σ d φ) = κ' ψ_n + Σ c ψ with known κ, κ': columns ψ_k and -R φ_k.
+        // R (κ φ_n + Σ d φ) = Σ c ψ with known κ: columns ψ_0..ψ_n and -R φ_0..-R φ_(n-1).
         let mut b = vec![0.0; 2 * n];
         for k in 0..n {
-            let right =
-                ratio[k] * poles.values(order)[k] * poles.monic(order) - zeros.values(order)[k] * zeros.monic(order);
+            let right = ratio[k] * poles.values(order)[k] * poles.monic(order);
             (b[k], b[n + k]) = (top[k] * right.re, top[k] * right.im);
         }
-        qr.factor(2 * n, 2 * order, |a| {
-            for c in 0..order {
+        qr.factor(2 * n, 2 * order + 1, |a| {
+            for (c, column) in a.chunks_exact_mut(2 * n).enumerate() {
                 for k in 0..n {
-                    let (p, q) = (zeros.values(c)[k], -ratio[k] * poles.values(c)[k]);
-                    (a[2 * n * c + k], a[2 * n * c + n + k]) = (top[k] * p.re, top[k] * p.im);
-                    let d = 2 * n * (order + c);
-                    (a[d + k], a[d + n + k]) = (top[k] * q.re, top[k] * q.im);
+                    let v = match c.checked_sub(order + 1) {
+                        None => zeros.values(c)[k],
+                        Some(c) => -ratio[k] * poles.values(c)[k],
+                    };
+                    (column[k], column[n + k]) = (top[k] * v.re, top[k] * v.im);
                 }
             }
         });
         let x = qr.solve(&mut b);
-        let combine = |c: &[f64], basis: &AxisBasis| {
-            let mut all = c.to_vec();
-            all.push(basis.monic(order));
-            all
-        };
-        let (c, d) = (combine(&x[..order], &zeros), combine(&x[order..], &poles));
+        let c = x[..=order].to_vec();
+        let mut d = x[order + 1..].to_vec();
+        d.push(poles.monic(order));
         let value = |c: &[f64], basis: &AxisBasis, k: usize| -> Complex<f64> {
             c.iter().enumerate().map(|(i, c)| basis.values(i)[k] * *c).sum()
         };
@@ -147,7 +146,14 @@ fn pairs(zeros: &[Complex<f64>], poles: &[Complex<f64>], unit: f64, band: (f64, 
     Some(modes.collect())
 }
 
+/// The pair scaled to 1 at rest.
+fn at_rest_one(m: &Mode, w: f64) -> Complex<f64> {
+    m.at(w) * (m.pole_rad_s / m.zero_rad_s).powi(2)
+}
+
 /// Pairs of all groups, fitted from the highest peak down, each on what the ones before have left.
+///
+/// Each group is divided out with gain 1 at rest, so that the body keeps the level that it was fitted to.
 pub(super) fn fit(
     w: &[f64],
     ratio: &[Complex<f64>],
@@ -161,17 +167,18 @@ pub(super) fn fit(
     let mut modes = Vec::new();
     for g in &groups {
         let (band, part) = (&w[g.first..g.end], &left[g.first..g.end]);
-        let before = norm_error(part.iter().map(|r| r - 1.0));
-        // Order 2 per peak at most, a second order at least; as many equations as unknowns at least.
+        let mean = part.iter().sum::<Complex<f64>>() / part.len() as f64;
+        let before = norm_error(part.iter().map(|r| r - mean.re));
+        // Order 2 per peak at most, a second order at least; more equations than unknowns.
         let best = (1..=g.peaks)
-            .filter(|n| band.len() > 2 * n)
+            .filter(|n| band.len() > 2 * n + 1)
             .filter_map(|n| fit_group(band, part, 2 * n, settings.weight_rounds))
             .filter(|(_, norm)| *norm < before)
             .min_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((found, _)) = best {
             for (l, w) in left.iter_mut().zip(w) {
                 for m in &found {
-                    *l /= m.at(*w);
+                    *l /= at_rest_one(m, *w);
                 }
             }
             modes.extend(found);

@@ -47,13 +47,13 @@ pub(super) fn errors(qr: &Qr, residuals: &[f64], folds: usize, q: &mut Vec<f64>)
 
 /// The smallest order whose held-out loss lies within one standard error of the best order's, point by point.
 ///
-/// `errors[i]` belongs to `modes[i]` pairs; `deviation` is the noise of one real part in weighted units. The standard
+/// Orders after index `last` are scored but not chosen. `deviation` is the noise of one real part in weighted units. The standard
 /// error is that of the paired difference, which is what tells two orders apart on the same points.
-pub(super) fn choose(errors: &[(usize, Vec<f64>)], deviation: f64, unit: f64) -> (usize, Vec<HeldOut>) {
+pub(super) fn choose(errors: &[(usize, Vec<f64>)], last: usize, deviation: f64, unit: f64) -> (usize, Vec<HeldOut>) {
     let bound = 2.0 * (BOUND * deviation).powi(2);
     let loss: Vec<Vec<f64>> = errors.iter().map(|(_, e)| e.iter().map(|e| e / (1.0 + e / bound)).collect()).collect();
     let sums: Vec<f64> = loss.iter().map(|l| l.iter().sum()).collect();
-    let best = (0..sums.len()).min_by(|&a, &b| sums[a].total_cmp(&sums[b])).unwrap_or(0);
+    let best = (0..sums.len().min(last + 1)).min_by(|&a, &b| sums[a].total_cmp(&sums[b])).unwrap_or(0);
     let scores: Vec<HeldOut> = errors
         .iter()
         .zip(&loss)

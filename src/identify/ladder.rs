@@ -91,20 +91,19 @@ fn climb(sweep: &Sweep, settings: &IdentifySettings, body: Body, end: usize, fit
     let ratio: Vec<Complex<f64>> = sweep.w.iter().zip(&sweep.value).map(|(&w, v)| v / plant.at(w)).collect();
     let noise_db = Decibels::from_ratio(1.0 + difference_noise(&ratio)).0;
     plant.modes = groups::fit(&sweep.w, &ratio, end, settings, noise_db);
+    // Monic pairs change the level at rest; this factor gives it back, and the search below starts from it.
+    let level: f64 = plant.modes.iter().map(|m| (m.pole_rad_s / m.zero_rad_s).powi(2)).product();
+    plant.resonance_gain = level;
     rungs.push(rung("second-order standard form, delay, resonances", sweep, &plant));
 
-    let without = plant.clone();
-    let model: Vec<Complex<f64>> = sweep.w.iter().map(|&w| without.at(w)).collect();
-    // The resonance model and its gain belong to the upper part of the sweep.
-    let from = end.min(sweep.len() - 1);
+    let model: Vec<Complex<f64>> = sweep.w.iter().map(|&w| plant.at(w)).collect();
     let with_gain = |db: f64| {
         let k = Decibels(db).ratio();
-        // Relative, for the gain falls by 40 dB a decade and eq. (19) over this part would see its first points only.
-        norm_error((from..sweep.len()).map(|i| 1.0 - k * model[i] / sweep.value[i]))
+        norm_error(model.iter().zip(&sweep.value).map(|(m, v)| v - k * m))
     };
     let (low, high) = settings.resonance_gain_db;
     let (gain_db, gain_bound) = widening(with_gain, low, high, (-20.0, 20.0), 1e-3, &mut fits);
-    plant.resonance_gain = Decibels(gain_db).ratio();
+    plant.resonance_gain = level * Decibels(gain_db).ratio();
     rungs.push(rung("second-order standard form, delay, resonances, gain", sweep, &plant));
     Ladder { rungs, plant, delay_bound, gain_bound, fits }
 }

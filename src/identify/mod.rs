@@ -14,6 +14,7 @@ mod growth;
 mod held_out;
 mod ladder;
 mod noise;
+mod prune;
 mod result;
 mod settings;
 mod shape;

@@ -19,19 +19,19 @@ pub struct Qr {
     scale: Vec<f64>,
 }
 
-/// Dot product with four running sums: the order of additions is fixed, and the compiler can use vector registers.
+/// Dot product with eight running sums: the order of additions is fixed, and the compiler can use vector registers.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
-    let (a4, a_rest) = a[..n].split_at(n - n % 4);
-    let (b4, b_rest) = b[..n].split_at(n - n % 4);
-    let mut s = [0.0; 4];
-    for (x, y) in a4.chunks_exact(4).zip(b4.chunks_exact(4)) {
-        for i in 0..4 {
+    let (a8, a_rest) = a[..n].split_at(n - n % 8);
+    let (b8, b_rest) = b[..n].split_at(n - n % 8);
+    let mut s = [0.0; 8];
+    for (x, y) in a8.chunks_exact(8).zip(b8.chunks_exact(8)) {
+        for i in 0..8 {
             s[i] += x[i] * y[i];
         }
     }
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
-    (s[0] + s[2]) + (s[1] + s[3]) + rest
+    ((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7])) + rest
 }
 
 impl Qr {

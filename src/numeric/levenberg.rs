@@ -159,7 +159,8 @@ impl Workspace {
                 if b == 0.0 {
                     continue;
                 }
-                let length = a.hypot(b);
+                // Both lie near 1 by the scaling of the columns, so that squares are safe.
+                let length = (a * a + b * b).sqrt();
                 let (cos, sin) = (a / length, b / length);
                 let row = &mut self.damped[k * n + k..(k + 1) * n];
                 for (upper, lower) in row.iter_mut().zip(&mut self.extra[k..]) {
