@@ -16,3 +16,5 @@ pub mod controller;
 pub mod feedback;
 
 pub mod pes;
+
+pub mod tune;

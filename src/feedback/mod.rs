@@ -10,19 +10,24 @@
 //! ```
 
 mod crossing;
+mod cubic;
+mod curve;
 mod gang;
 mod grid;
 mod margins;
 mod nyquist;
 mod open_loop;
 mod poles;
+mod sampled;
 mod trace;
 
 pub use crossing::Crossing;
+pub use curve::{CurveLoop, ResponseCurve};
 pub use gang::{GangOfFour, gang_of_four};
 pub use grid::frequency_grid;
 pub use margins::{Margins, margins};
 pub use nyquist::{NyquistCount, nyquist_count};
 pub use open_loop::{FeedbackError, ModelLoop, OpenLoop};
 pub use poles::closed_loop_poles;
+pub use sampled::{Event, LoopOnGrid, QuickMargins, SampledPlant};
 pub use trace::Trace;
