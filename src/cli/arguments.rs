@@ -23,6 +23,7 @@ pub(super) enum Command {
     Identify(Box<IdentifyArguments>),
     Margins(Box<MarginsArguments>),
     Simulate(SimulateArguments),
+    Tune(Box<TuneArguments>),
     Study(StudyArguments),
 }
 
@@ -86,6 +87,51 @@ pub(super) struct SimulateArguments {
     /// Also write the record, one row a servo sample, as CSV
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
+}
+
+/// Search PID, low-pass and notch gains that meet the limits of a spec
+#[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("machine").required(true))]
+#[command(after_help = "Examples:
+  servotune tune --plant specs/machines/tunable.toml --spec specs/limits/paper.toml --controller specs/controllers/nominal.toml --out gains.toml
+  servotune tune --frf slot07.bod --spec specs/limits/paper.toml --out gains.toml --report slot07.html
+
+With --frf the search runs straight on the measured response; the report then also tunes over an identified model and compares.")]
+pub(super) struct TuneArguments {
+    /// Plant model (plant.toml)
+    #[arg(long, value_name = "PLANT", group = "machine")]
+    pub plant: Option<PathBuf>,
+    /// Swept-sine file, tuned on directly
+    #[arg(long, value_name = "FRF", group = "machine")]
+    pub frf: Option<PathBuf>,
+    /// The sweep was taken through the controller's own hold, which is then not applied again
+    #[arg(long, requires = "frf")]
+    pub hold_included: bool,
+    /// Limits, bounds and write (spec.toml)
+    #[arg(long, value_name = "SPEC")]
+    pub spec: PathBuf,
+    /// Controller to start from and to compare with (controller.toml or gains.toml)
+    #[arg(long, value_name = "START")]
+    pub controller: Option<PathBuf>,
+    /// Gain table to write
+    #[arg(long, value_name = "GAINS")]
+    pub out: PathBuf,
+    /// Report to write, one HTML file
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// Write the best compromise even where the limits are not met
+    #[arg(long)]
+    pub keep_infeasible: bool,
+    /// Sample time where no start controller gives one (s)
+    #[arg(long, value_name = "SECONDS", default_value_t = 39.6e-6)]
+    pub sample_time_s: f64,
+    /// Starts of the search
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    pub starts: usize,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
+    #[command(flatten)]
+    pub model: ModelArguments,
 }
 
 /// Makes a table or picture of results/ again

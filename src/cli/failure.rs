@@ -9,6 +9,7 @@ use crate::lti::LtiError;
 use crate::pes::{PesError, ProfileError};
 use crate::report::ReportError;
 use crate::study::StudyError;
+use crate::tune::{GainTableError, TuneError};
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -40,6 +41,12 @@ pub enum Failure {
     Lti(#[from] LtiError),
     #[error(transparent)]
     Report(#[from] ReportError),
+    #[error(transparent)]
+    Tune(#[from] TuneError),
+    #[error(transparent)]
+    GainTable(#[from] GainTableError),
+    #[error("no machine: expected --plant PLANT or --frf FRF")]
+    NoMachine,
     #[error(transparent)]
     Study(#[from] StudyError),
     /// Two algorithms that share no code disagree: no answer can be trusted.

@@ -10,8 +10,10 @@ mod load;
 mod margins;
 mod screen;
 mod simulate;
+mod slot;
 mod study;
 mod sweep_arguments;
+mod tune;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -43,6 +45,7 @@ pub fn main() -> ExitCode {
         Command::Identify(a) => identify::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),
         Command::Simulate(a) => simulate::run(&a, &mut screen),
+        Command::Tune(a) => tune::run(&a, &mut screen),
         Command::Study(a) => study::run(&a, &mut screen),
     };
     match ending {
