@@ -12,7 +12,7 @@ use crate::report::page::{Block, Page, Section};
 use crate::report::routes::{RouteView, routes_table};
 use crate::report::slot::{LoopView, SlotView, slot_page};
 use crate::report::table::Verdict;
-use crate::report::tuned::{conflicts_table, gains_table, sections_table};
+use crate::report::tuned::{Units, conflicts_table, gains_table, sections_table};
 use crate::tune::{GainTable, Hold, Judged, Machine, Outcome, Spec, judge};
 use std::f64::consts::TAU;
 
@@ -32,6 +32,11 @@ pub(super) struct Slot<'a> {
     pub over_model: Option<&'a Outcome>,
     pub table: &'a GainTable,
     pub provenance: Vec<(String, String)>,
+}
+
+/// The units of a plant file.
+pub(super) fn units(plant: &Plant) -> Units<'_> {
+    Units { position: &plant.position_unit, command: &plant.command_unit }
 }
 
 /// Points of the drawn curves for each decade.
@@ -78,8 +83,7 @@ pub(super) fn page(slot: &Slot<'_>) -> Result<Page, Failure> {
         before: before.as_ref(),
         after: &after,
         spec: slot.spec,
-        position_unit: &slot.plant.position_unit,
-        command_unit: &slot.plant.command_unit,
+        units: units(slot.plant),
         gains: gain_sections(slot)?,
         provenance: slot.provenance.clone(),
     };
@@ -141,7 +145,7 @@ fn gain_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
     };
     let mut blocks = vec![Block::Table(gains_table(slot.start, slot.outcome.controller(), bounds)?)];
     if let Outcome::Infeasible(i) = slot.outcome {
-        blocks.push(Block::Table(conflicts_table(i)?));
+        blocks.push(Block::Table(conflicts_table(i, units(slot.plant))?));
     }
     blocks.push(Block::Details("Sections".into(), vec![Block::Table(sections_table(slot.table.sections())?)]));
     blocks.push(Block::Details("Gain table (gains.toml)".into(), vec![Block::Code(slot.table.text()?)]));
@@ -155,6 +159,7 @@ fn gain_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
         let table = routes_table(
             RouteView { on_response: &first.0, on_model: &first.1 },
             RouteView { on_response: &second.0, on_model: &second.1 },
+            units(slot.plant),
         )?;
         let words = "The gains above were tuned straight on the measured response. The same limits were also tuned over the \
                      identified model; each way's gains are judged by both ways.";

@@ -1,13 +1,13 @@
 //! `servotune tune`: gains that meet the limits, a gain table, a report.
 
-use super::arguments::TuneArguments;
+use super::arguments::{ModelArguments, TuneArguments};
 use super::slot::{self, Slot};
 use super::{Ending, Failure, Screen, load};
 use crate::document::{read_text, sha256_hex, write_text};
 use crate::frf::Sweep;
 use crate::identify::{Identified, identify};
 use crate::lti::Plant;
-use crate::report::tuned::{conflicts_table, gains_table, limits_table};
+use crate::report::tuned::{Units, conflicts_table, gains_table, limits_table};
 use crate::tune::{GainTable, Hold, InputDigest, Machine, Outcome, Spec, TuneSettings, tune};
 use serde::Serialize;
 use std::path::Path;
@@ -27,6 +27,14 @@ enum Given {
 }
 
 impl Given {
+    /// Units from the plant file, or as given for the sweep.
+    fn units<'a>(&'a self, words: &'a ModelArguments) -> Units<'a> {
+        match self {
+            Given::Model(plant) => slot::units(plant),
+            Given::Response { .. } => Units { position: &words.position_unit, command: &words.command_unit },
+        }
+    }
+
     fn machine(&self) -> Machine<'_> {
         match self {
             Given::Model(plant) => Machine::Model(plant),
@@ -80,7 +88,7 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         screen.say(&format!("wrote {}", file.display()));
     }
     let document = Document { outcome: &outcome, gain_table: written, report: a.report.as_deref() };
-    screen.result(&document, &text(&outcome, start.as_ref())?)?;
+    screen.result(&document, &text(&outcome, start.as_ref(), given.units(&a.model))?)?;
     Ok(if tuned { Ending::Accepted } else { Ending::Rejected })
 }
 
@@ -136,7 +144,11 @@ pub(super) fn provenance(table: &GainTable) -> Vec<(String, String)> {
 }
 
 /// The outcome for a terminal.
-pub(super) fn text(outcome: &Outcome, start: Option<&crate::controller::Controller>) -> Result<String, Failure> {
+pub(super) fn text(
+    outcome: &Outcome,
+    start: Option<&crate::controller::Controller>,
+    units: Units<'_>,
+) -> Result<String, Failure> {
     let (before, work, bounds) = match outcome {
         Outcome::Tuned(t) => (&t.before, &t.work, &t.at_bounds),
         Outcome::Infeasible(i) => (&i.before, &i.work, &i.at_bounds),
@@ -144,10 +156,10 @@ pub(super) fn text(outcome: &Outcome, start: Option<&crate::controller::Controll
     let before = before.as_ref().and_then(|b| b.first()).map(|p| &p.judged);
     let after = outcome.after().first().map(|p| &p.judged);
     let mut text = format!("{}\n\n", slot::verdict(outcome).1);
-    text += &limits_table(before, after)?.text();
+    text += &limits_table(before, after, units)?.text();
     if let Outcome::Infeasible(i) = outcome {
         text.push('\n');
-        text += &conflicts_table(i)?.text();
+        text += &conflicts_table(i, units)?.text();
     }
     text.push('\n');
     text += &gains_table(start, outcome.controller(), bounds)?.text();

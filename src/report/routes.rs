@@ -5,6 +5,7 @@
 use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Cell, Column, Table, Verdict};
+use super::tuned::{Units, figure_words};
 use crate::tune::Judged;
 
 /// One controller judged on the response and on the model.
@@ -17,7 +18,11 @@ pub struct RouteView<'a> {
 }
 
 /// Every limit, both controllers, both judgements.
-pub fn routes_table(tuned_on_response: RouteView<'_>, tuned_on_model: RouteView<'_>) -> Result<Table, ReportError> {
+pub fn routes_table(
+    tuned_on_response: RouteView<'_>,
+    tuned_on_model: RouteView<'_>,
+    units: Units<'_>,
+) -> Result<Table, ReportError> {
     let digits = NumberFormat::Significant(4);
     let mut table = Table::new(
         "Both ways of tuning, each judged by both",
@@ -37,14 +42,15 @@ pub fn routes_table(tuned_on_response: RouteView<'_>, tuned_on_model: RouteView<
             let cell = Cell::from(found.and_then(|f| f.found));
             if found.is_some_and(|f| f.violation > 0.0) { cell.flagged(Verdict::Warn, "missed") } else { cell }
         };
+        let (name, unit) = figure_words(l.wanted.what, units);
         table.push(vec![
-            l.wanted.what.to_string().as_str().into(),
+            name.as_str().into(),
             l.wanted.limit.into(),
             cell(tuned_on_response.on_response),
             cell(tuned_on_response.on_model),
             cell(tuned_on_model.on_model),
             cell(tuned_on_model.on_response),
-            l.wanted.what.unit().into(),
+            unit.into(),
         ])?;
     }
     Ok(table)

@@ -13,7 +13,7 @@ use super::sensitivity::sensitivity;
 use super::spectrum_bars::{SpectrumBars, spectrum_bars};
 use super::table::Verdict;
 use super::time::{CurveKind, TimeCurve, TimePanel, time};
-use super::tuned::limits_table;
+use super::tuned::{Units, limits_table};
 use crate::feedback::Margins;
 use crate::pes::{ClosedLoop, PesFigures, Profile};
 use crate::tune::{Judged, Spec};
@@ -51,10 +51,8 @@ pub struct SlotView<'a> {
     pub after: &'a LoopView,
     /// Limits and write.
     pub spec: &'a Spec,
-    /// Unit of position.
-    pub position_unit: &'a str,
-    /// Unit of the command.
-    pub command_unit: &'a str,
+    /// Units of position and command.
+    pub units: Units<'a>,
     /// Sections about the gains, shown last.
     pub gains: Vec<Section>,
     /// Inputs with digests, program, seed.
@@ -67,7 +65,11 @@ pub fn slot_page(view: &SlotView<'_>) -> Result<Page, ReportError> {
         heading: "Verdict".into(),
         blocks: vec![
             Block::Notice(view.verdict.0, view.verdict.1.clone()),
-            Block::Table(limits_table(view.before.and_then(|b| b.judged.as_ref()), view.after.judged.as_ref())?),
+            Block::Table(limits_table(
+                view.before.and_then(|b| b.judged.as_ref()),
+                view.after.judged.as_ref(),
+                view.units,
+            )?),
         ],
     }];
     sections.extend(view.plant.iter().cloned());
@@ -115,8 +117,8 @@ fn cards(view: &SlotView<'_>) -> Vec<Card> {
         card("Phase margin", m.phase_margin_deg, "deg", pm_note, pm),
         card("Gain margin", m.gain_margin_db, "dB", gm_note, gm),
         card("Sensitivity peak Ms", Some(m.max_sensitivity), "", ms_note, ms),
-        card("DFT 600-1500 Hz", low, view.position_unit, low_note, low_verdict),
-        card("DFT 1500-3000 Hz", high, view.position_unit, high_note, high_verdict),
+        card("DFT 600-1500 Hz", low, view.units.position, low_note, low_verdict),
+        card("DFT 1500-3000 Hz", high, view.units.position, high_note, high_verdict),
     ]
 }
 
@@ -181,13 +183,13 @@ fn pes_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
         before: before_bars.as_deref(),
         after: &after_bars,
         limits: &limits,
-        unit: view.position_unit,
+        unit: view.units.position,
         until_hz: 3300.0,
     };
     let spectrum = spectrum_bars("DFT of the window", "Amplitude |X_k|/N of each harmonic.", &bars)?;
     let mut blocks = vec![Block::Figure(record_figure(view, write, before.map(|(w, _)| w))?), Block::Figure(spectrum)];
-    blocks.push(Block::Table(super::pes::pes_table(figures, view.position_unit)?));
-    let harmonics = super::pes::harmonics_table(figures, 24, view.position_unit)?;
+    blocks.push(Block::Table(super::pes::pes_table(figures, view.units.position)?));
+    let harmonics = super::pes::harmonics_table(figures, 24, view.units.position)?;
     blocks.push(Block::Details("Harmonics".into(), vec![Block::Table(harmonics)]));
     Ok(Section { heading, blocks })
 }
@@ -208,10 +210,10 @@ fn record_figure(view: &SlotView<'_>, after: &ClosedLoop, before: Option<&Closed
     let limit = view.spec.limits.command_peak.map(|l| [(l, "limit"), (-l, "limit")]);
     let none: [(f64, &str); 0] = [];
     let panels = [
-        TimePanel { quantity: "PES", unit: view.position_unit, curves: &pes, limits: &none },
+        TimePanel { quantity: "PES", unit: view.units.position, curves: &pes, limits: &none },
         TimePanel {
             quantity: "Command",
-            unit: view.command_unit,
+            unit: view.units.command,
             curves: &command,
             limits: limit.as_ref().map_or(&none[..], |l| &l[..]),
         },

@@ -5,10 +5,33 @@ use super::number::NumberFormat;
 use super::table::{Cell, Column, Table, Verdict};
 use crate::controller::Controller;
 use crate::lti::Section;
-use crate::tune::{AtBound, Infeasible, Judged, Side};
+use crate::tune::{AtBound, Infeasible, Judged, Side, What};
+
+/// The units of one machine's position and command, for figures that carry them.
+#[derive(Clone, Copy, Debug)]
+pub struct Units<'a> {
+    /// Unit of position.
+    pub position: &'a str,
+    /// Unit of the command.
+    pub command: &'a str,
+}
+
+/// A figure in words, with its unit.
+pub(super) fn figure_words<'a>(what: What, units: Units<'a>) -> (String, &'a str) {
+    match what {
+        What::PhaseMargin => ("phase margin".into(), "deg"),
+        What::GainMargin => ("gain margin".into(), "dB"),
+        What::MaxSensitivity => ("max sensitivity Ms".into(), "ratio"),
+        What::GainCrossover => ("gain crossover".into(), "Hz"),
+        What::DftLow => ("DFT 600-1500 Hz".into(), units.position),
+        What::DftHigh => ("DFT 1500-3000 Hz".into(), units.position),
+        What::Harmonic { k } => (format!("harmonic {k}"), units.position),
+        What::CommandPeak => ("command peak".into(), units.command),
+    }
+}
 
 /// Every limit with what was found before and after.
-pub fn limits_table(before: Option<&Judged>, after: Option<&Judged>) -> Result<Table, ReportError> {
+pub fn limits_table(before: Option<&Judged>, after: Option<&Judged>, units: Units<'_>) -> Result<Table, ReportError> {
     let digits = NumberFormat::Significant(4);
     let mut table = Table::new(
         "Limits",
@@ -28,13 +51,14 @@ pub fn limits_table(before: Option<&Judged>, after: Option<&Judged>) -> Result<T
             if violation > 0.0 { cell.flagged(Verdict::Fail, "missed") } else { cell.flagged(Verdict::Ok, "met") }
         };
         let was = before.and_then(|b| b.limits.get(i));
+        let (name, unit) = figure_words(l.wanted.what, units);
         table.push(vec![
-            l.wanted.what.to_string().as_str().into(),
+            name.as_str().into(),
             if l.wanted.side == Side::AtLeast { "at least" } else { "at most" }.into(),
             l.wanted.limit.into(),
             was.map_or(Cell::from(None), |b| cell(b.found, b.violation)),
             cell(l.found, l.violation),
-            l.wanted.what.unit().into(),
+            unit.into(),
         ])?;
     }
     Ok(table)
@@ -100,7 +124,7 @@ pub fn sections_table(sections: &[Section]) -> Result<Table, ReportError> {
 }
 
 /// The limits in conflict and what each would have to be.
-pub fn conflicts_table(i: &Infeasible) -> Result<Table, ReportError> {
+pub fn conflicts_table(i: &Infeasible, units: Units<'_>) -> Result<Table, ReportError> {
     let digits = NumberFormat::Significant(4);
     let mut table = Table::new(
         "Limits in conflict",
@@ -114,13 +138,14 @@ pub fn conflicts_table(i: &Infeasible) -> Result<Table, ReportError> {
         ],
     );
     for c in &i.conflicts {
+        let (name, unit) = figure_words(c.what, units);
         table.push(vec![
-            c.what.to_string().as_str().into(),
+            name.as_str().into(),
             c.limit.into(),
             c.found.into(),
             c.missed_by.into(),
             c.feasible_limit.into(),
-            c.what.unit().into(),
+            unit.into(),
         ])?;
     }
     Ok(table)
