@@ -134,10 +134,12 @@ impl Qr {
         out
     }
 
-    /// Ratio of the largest to the smallest singular value of the scaled matrix; infinite when it has no full rank.
+    /// Ratio of the largest to the smallest singular value of the scaled matrix without its zero columns; infinite when
+    /// those that are left have no full rank.
     pub fn condition(&self) -> f64 {
-        let n = self.cols;
-        let r = DMatrix::from_fn(n, n, |i, j| if i <= j { self.r(i, j) } else { 0.0 });
+        let kept: Vec<usize> = (0..self.cols).filter(|&j| self.diagonal[j] != 0.0).collect();
+        let (rows, n) = (self.cols, kept.len());
+        let r = DMatrix::from_fn(rows, n, |i, j| if i <= kept[j] { self.r(i, kept[j]) } else { 0.0 });
         let s = r.singular_values();
         if n == 0 { 1.0 } else { s.max() / s.min() }
     }
