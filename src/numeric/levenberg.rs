@@ -110,10 +110,10 @@ pub fn minimise(
             work.solve_damped(damping);
             // What the linear model promises: |r|² - |r + J s|² = 2 cᵀ R s - |R s|².
             let promised = work.promise();
-            for i in 0..cols {
+            let steps = work.step.iter().zip(work.qr.scale());
+            for (i, ((t, x), (step, scale))) in work.trial.iter_mut().zip(x.iter()).zip(steps).enumerate() {
                 let l = problem.limit(i);
-                let change = (work.step[i] / work.qr.scale()[i]).clamp(-l.step, l.step);
-                work.trial[i] = (x[i] + change).clamp(l.low, l.high);
+                *t = (x + (step / scale).clamp(-l.step, l.step)).clamp(l.low, l.high);
             }
             problem.evaluate(&work.trial, &mut work.trial_r);
             out.evaluations += 1;
