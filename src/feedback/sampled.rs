@@ -10,6 +10,11 @@ use crate::lti::{DiscretePlant, FrequencyResponse, Section, Sections};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
+/// Phase crossings this much (ln|L|²) beyond the smallest gain margin are read: 6.5 dB, several times what a step changes.
+const NEARLY: f64 = 1.5;
+/// Dips of |1 + L|² up to this factor above the lowest are read: twice the lowest distance.
+const DEEP: f64 = 4.0;
+
 /// Numbers handled side by side.
 const LANES: usize = 4;
 
@@ -29,6 +34,8 @@ pub struct SampledPlant {
     sin: Vec<[f64; LANES]>,
     cos2: Vec<[f64; LANES]>,
     sin2: Vec<[f64; LANES]>,
+    /// (1 - z⁻¹)^m for m of the plant alone and for one more in the chain.
+    lift: [[Vec<[f64; LANES]>; 2]; 2],
 }
 
 /// The open loop on the grid of one plant, and what was read off it. Made once, used for every candidate.
@@ -42,6 +49,10 @@ pub struct LoopOnGrid {
     gain: Vec<f64>,
     /// |1 + L|².
     distance: Vec<f64>,
+    /// (1 + L)(1 - z⁻¹)^m, whose turns are counted.
+    lifted: [Vec<f64>; 2],
+    /// Candidates for phase crossings: point before, ln|L|² there.
+    passes: Vec<(usize, f64)>,
     /// What was read off.
     pub quick: QuickMargins,
 }
@@ -66,9 +77,9 @@ pub struct QuickMargins {
     pub unstable_poles: i64,
     /// |L| = 1, value: phase margin (deg).
     pub gain_crossings: Vec<Event>,
-    /// L real and negative, value: gain margin (dB).
+    /// L real and negative, those near the smallest gain margin; value: gain margin (dB).
     pub phase_crossings: Vec<Event>,
-    /// Local minima of |1 + L| below 1 and the lowest of all, value: |1 + L|.
+    /// Local minima of |1 + L| up to twice the lowest, value: |1 + L|.
     pub dips: Vec<Event>,
     /// Largest |L|, for loops that never reach 1.
     pub largest_gain: f64,
@@ -126,6 +137,8 @@ impl SampledPlant {
             (0..points.div_ceil(LANES)).map(|c| std::array::from_fn(|lane| at(c, lane))).collect()
         };
         let angle = |i: usize| w[i] * sample_time_s;
+        let power = |i: usize, m: usize| (Complex::new(1.0, 0.0) - Complex::from_polar(1.0, -angle(i))).powu(m as u32);
+        let lift = [integrators, integrators + 1].map(|m| [lanes(&|i| power(i, m).re), lanes(&|i| power(i, m).im)]);
         SampledPlant {
             sample_time_s,
             integrators,
@@ -136,6 +149,7 @@ impl SampledPlant {
             sin: lanes(&|i| angle(i).sin()),
             cos2: lanes(&|i| (2.0 * angle(i)).cos()),
             sin2: lanes(&|i| (2.0 * angle(i)).sin()),
+            lift,
             ln_w: w.iter().map(|w| w.ln()).collect(),
             w,
         }
@@ -197,28 +211,32 @@ impl SampledPlant {
         quick.gain_crossings.clear();
         quick.phase_crossings.clear();
         quick.dips.clear();
+        let mut passes = std::mem::take(&mut on.passes);
+        passes.clear();
         let (re, im, gain, distance) = (&on.re[..n], &on.im[..n], &on.gain[..n], &on.distance[..n]);
         quick.largest_gain = gain.iter().copied().fold(0.0, f64::max).sqrt();
-        let (mut lowest, mut lowest_at) = (f64::INFINITY, 0);
-        for i in 0..n {
-            if distance[i] < lowest {
-                (lowest, lowest_at) = (distance[i], i);
+        let lowest = distance.iter().copied().fold(f64::INFINITY, f64::min);
+        for i in 0..n - 1 {
+            if (gain[i] < 1.0) != (gain[i + 1] < 1.0) {
+                quick.gain_crossings.push(self.gain_event(on, i));
             }
-            if i + 1 < n {
-                if (gain[i] < 1.0) != (gain[i + 1] < 1.0) {
-                    quick.gain_crossings.push(self.gain_event(on, i));
-                }
-                if (im[i] < 0.0) != (im[i + 1] < 0.0) && crossing_side(re[i], im[i], re[i + 1], im[i + 1]) < 0.0 {
-                    quick.phase_crossings.extend(self.phase_event(on, i));
-                }
+            if (im[i] < 0.0) != (im[i + 1] < 0.0) && crossing_side(re[i], im[i], re[i + 1], im[i + 1]) < 0.0 {
+                passes.push((i, gain[i].ln()));
             }
+        }
+        // Only crossings that may be the worst, or nearly, are worth their interpolation.
+        let least = passes.iter().map(|(_, g)| g.abs()).fold(f64::INFINITY, f64::min);
+        for (i, _) in passes.iter().filter(|(_, g)| g.abs() <= least + NEARLY) {
+            quick.phase_crossings.extend(self.phase_event(on, *i));
         }
         for i in 1..n.saturating_sub(1) {
             let low = distance[i] <= distance[i - 1] && distance[i] < distance[i + 1];
-            if low && (distance[i] < 1.0 || i == lowest_at) {
+            if low && distance[i] <= DEEP * lowest {
                 quick.dips.push(self.dip_event(on, i));
             }
         }
+        let lowest_at = distance.iter().position(|d| *d == lowest).unwrap_or(0);
+        on.passes = passes;
         if lowest_at == 0 || lowest_at + 1 == n {
             let l = Complex::new(re[lowest_at], im[lowest_at]);
             let slope = Complex::new(0.0, 0.0);
@@ -236,7 +254,7 @@ impl SampledPlant {
     }
 
     /// The Nyquist count of [`super::nyquist_count`], by crossings of the real axis instead of angles.
-    fn unstable_poles(&self, chain: &[Section], on: &LoopOnGrid) -> i64 {
+    fn unstable_poles(&self, chain: &[Section], on: &mut LoopOnGrid) -> i64 {
         let (mut m, mut outside) = (self.integrators, 0);
         for pole in chain.iter().flat_map(|s| s.poles()) {
             if (pole - 1.0).norm() < 1e-10 {
@@ -245,18 +263,28 @@ impl SampledPlant {
                 outside += 1;
             }
         }
-        let mut half_turns = 0;
-        let mut before: Option<(f64, f64)> = None;
-        let mut side = 1.0;
-        for i in 0..self.points {
-            let (c, j) = (i / LANES, i % LANES);
-            let (lift_re, lift_im) = (1.0 - self.cos[c][j], self.sin[c][j]);
-            let (mut x, mut y) = (1.0 + on.re[i], on.im[i]);
-            for _ in 0..m {
-                (x, y) = (x * lift_re - y * lift_im, x * lift_im + y * lift_re);
+        // The chain of a PID and its filters has one integrator at most.
+        let [lift_re, lift_im] = &self.lift[(m - self.integrators).min(1)];
+        let LoopOnGrid { re, im, lifted: [x, y], .. } = on;
+        x.resize(re.len(), 0.0);
+        y.resize(re.len(), 0.0);
+        let lanes = x.as_chunks_mut::<LANES>().0.iter_mut().zip(y.as_chunks_mut::<LANES>().0);
+        let l = re.as_chunks::<LANES>().0.iter().zip(im.as_chunks::<LANES>().0);
+        for (((x, y), (re, im)), (a, b)) in lanes.zip(l).zip(lift_re.iter().zip(lift_im)) {
+            for j in 0..LANES {
+                let f = 1.0 + re[j];
+                (x[j], y[j]) = (f * a[j] - im[j] * b[j], f * b[j] + im[j] * a[j]);
             }
-            visit((x, y), &mut before, &mut side, &mut half_turns);
         }
+        let (x, y) = (&x[..self.points], &y[..self.points]);
+        let mut half_turns = 0;
+        let mut side = if x[0] >= 0.0 { 1.0 } else { -1.0 };
+        for i in 1..self.points {
+            if (y[i - 1] < 0.0) != (y[i] < 0.0) {
+                visit((x[i], y[i]), &mut (x[i - 1], y[i - 1]), &mut side, &mut half_turns);
+            }
+        }
+        let mut before = (x[self.points - 1], y[self.points - 1]);
         // Beyond a sweep |L| < 1 is taken for granted: F goes over to its lifting factor and along it to half the sample rate.
         let reached = self.w[self.points - 1] * self.sample_time_s;
         if reached < PI * (1.0 - 1e-9) {
@@ -266,10 +294,8 @@ impl SampledPlant {
                 visit((lift.re, lift.im), &mut before, &mut side, &mut half_turns);
             }
         }
-        if let Some((x, y)) = before {
-            half_turns += passage(side, if x >= 0.0 { 1.0 } else { -1.0 }, y);
-        }
-        outside - half_turns
+        let (x, y) = before;
+        outside - half_turns - passage(side, if x >= 0.0 { 1.0 } else { -1.0 }, y)
     }
 
     fn gain_event(&self, on: &LoopOnGrid, i: usize) -> Event {
@@ -327,17 +353,14 @@ const BEYOND: u32 = 8;
 
 /// Takes the next point of F: counts the half turn that ends where the curve meets the real axis.
 #[inline]
-fn visit((x, y): (f64, f64), before: &mut Option<(f64, f64)>, side: &mut f64, half_turns: &mut i64) {
-    match *before {
-        None => *side = if x >= 0.0 { 1.0 } else { -1.0 },
-        Some((bx, by)) if (by < 0.0) != (y < 0.0) => {
-            let now = crossing_side(bx, by, x, y);
-            *half_turns += passage(*side, now, by);
-            *side = now;
-        }
-        Some(_) => {}
+fn visit((x, y): (f64, f64), before: &mut (f64, f64), side: &mut f64, half_turns: &mut i64) {
+    let (bx, by) = *before;
+    if (by < 0.0) != (y < 0.0) {
+        let now = crossing_side(bx, by, x, y);
+        *half_turns += passage(*side, now, by);
+        *side = now;
     }
-    *before = Some((x, y));
+    *before = (x, y);
 }
 
 /// Half turns of a piece of curve between two visits of the real axis, within the half-plane of `im`.

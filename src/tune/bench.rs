@@ -106,7 +106,7 @@ impl Bench {
         let sections = 1 + controller.lowpass.len() + controller.notch.len();
         Desk {
             chain: Vec::with_capacity(sections),
-            buffers: self.machines.iter().map(|m| m.buffers(sections)).collect(),
+            buffers: self.machines.iter().map(Prepared::buffers).collect(),
             scores: vec![MachineScore::default(); self.machines.len()],
             controller,
             evaluations: 0,
