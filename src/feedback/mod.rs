@@ -29,5 +29,5 @@ pub use margins::{Margins, margins};
 pub use nyquist::{NyquistCount, nyquist_count};
 pub use open_loop::{FeedbackError, ModelLoop, OpenLoop};
 pub use poles::closed_loop_poles;
-pub use sampled::{Event, LoopOnGrid, QuickMargins, SampledPlant};
+pub use sampled::{Event, GRAZE, Graze, LoopOnGrid, QuickMargins, SampledPlant};
 pub use trace::Trace;

@@ -70,6 +70,18 @@ pub struct Event {
     pub slope: Complex<f64>,
 }
 
+/// An extremum of |L| near 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Graze {
+    /// The extremum; value: the phase margin that a crossing there would have (deg).
+    pub event: Event,
+    /// Whether |L| comes down to 1 there, rather than up to it.
+    pub minimum: bool,
+}
+
+/// Extrema of |L| within this of 1 (ln) are grazes: far more than the grid's error, far less than anybody can measure.
+pub const GRAZE: f64 = 0.01;
+
 /// Margins read off the grid.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct QuickMargins {
@@ -79,6 +91,8 @@ pub struct QuickMargins {
     pub gain_crossings: Vec<Event>,
     /// L real and negative, those near the smallest gain margin; value: gain margin (dB).
     pub phase_crossings: Vec<Event>,
+    /// Extrema of |L| so near to 1 that a finer grid may see crossings there; value: phase margin (deg).
+    pub grazes: Vec<Graze>,
     /// Local minima of |1 + L| up to twice the lowest, value: |1 + L|.
     pub dips: Vec<Event>,
     /// Largest |L|, for loops that never reach 1.
@@ -113,10 +127,11 @@ impl SampledPlant {
     /// A model on a grid that resolves its modes: the grid of the exact margins, filled up where filters may come to lie.
     pub fn of_model(plant: &DiscretePlant) -> SampledPlant {
         let none = Sections { chain: vec![], sample_time_s: plant.sample_time_s() };
+        let near_mode = |x: f64| plant.terms().iter().any(|p| (x - p.im).abs() < 4.0 * p.re.abs());
         let mut w = Vec::new();
         let mut last = 0.0;
         for x in frequency_grid(plant.terms(), &none) {
-            if last > TAU * 20.0 && x > STEP * last {
+            if last > TAU * 20.0 && (x > STEP * last || near_mode(0.5 * (last + x))) {
                 w.push((last * x).sqrt());
             }
             // Far below any crossover a loop needs few points; its integrators draw a straight line there.
@@ -211,6 +226,7 @@ impl SampledPlant {
         quick.gain_crossings.clear();
         quick.phase_crossings.clear();
         quick.dips.clear();
+        quick.grazes.clear();
         let mut passes = std::mem::take(&mut on.passes);
         passes.clear();
         let (re, im, gain, distance) = (&on.re[..n], &on.im[..n], &on.gain[..n], &on.distance[..n]);
@@ -230,6 +246,12 @@ impl SampledPlant {
             quick.phase_crossings.extend(self.phase_event(on, *i));
         }
         for i in 1..n.saturating_sub(1) {
+            if (gain[i] - 1.0).abs() < 2.0 * GRAZE + 0.05 && (gain[i] < gain[i - 1]) == (gain[i] < gain[i + 1]) {
+                let event = self.gain_extremum(on, i, gain[i] < gain[i - 1]);
+                if event.l.norm().ln().abs() < GRAZE {
+                    quick.grazes.push(Graze { event, minimum: gain[i] < gain[i - 1] });
+                }
+            }
             let low = distance[i] <= distance[i - 1] && distance[i] < distance[i + 1];
             if low && distance[i] <= DEEP * lowest {
                 quick.dips.push(self.dip_event(on, i));
@@ -305,6 +327,15 @@ impl SampledPlant {
         Event { w_rad_s: at.exp(), value: wrapped(ln_l.im - PI).to_degrees(), l: ln_l.exp(), slope }
     }
 
+    /// The extremum of |L| around point `i`; its place is a parabola's, its value the cubic's.
+    fn gain_extremum(&self, on: &LoopOnGrid, i: usize, minimum: bool) -> Event {
+        let curve = self.cubic(on, if on.gain[i - 1] < on.gain[i + 1] { i - 1 } else { i }, 0.0);
+        let sign = if minimum { 1.0 } else { -1.0 };
+        let at = curve.level(sign, self.ln_w[i - 1], self.ln_w[i + 1]).unwrap_or(self.ln_w[i]);
+        let (ln_l, slope) = curve.at(at);
+        Event { w_rad_s: at.exp(), value: wrapped(ln_l.im - PI).to_degrees(), l: ln_l.exp(), slope }
+    }
+
     fn phase_event(&self, on: &LoopOnGrid, i: usize) -> Option<Event> {
         let curve = self.cubic(on, i, 0.0);
         let from = curve.at(self.ln_w[i]).0.im;
@@ -316,16 +347,10 @@ impl SampledPlant {
     }
 
     fn dip_event(&self, on: &LoopOnGrid, i: usize) -> Event {
-        // The parabola of ln|1 + L| through three points says where, the cubic of ln(1 + L) says how low.
-        let x = [self.ln_w[i - 1], self.ln_w[i], self.ln_w[i + 1]];
-        let y = [on.distance[i - 1].ln(), on.distance[i].ln(), on.distance[i + 1].ln()];
-        let (left, right) = ((y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1]));
-        let bend = (right - left) / (x[2] - x[0]);
-        let middle = if bend > 0.0 { 0.5 * (x[0] + x[1]) - 0.5 * left / bend } else { x[1] };
-        let at = middle.clamp(x[0], x[2]);
-        let first = if at < x[1] { i - 1 } else { i };
+        // The stencil that has the dip in its middle: towards the lower neighbour.
+        let first = if on.distance[i - 1] < on.distance[i + 1] { i - 1 } else { i };
         let one_plus = self.cubic(on, first, 1.0);
-        // One Newton step on the cubic itself would need its bend; the parabola's is enough for the value.
+        let at = one_plus.level(1.0, self.ln_w[i - 1], self.ln_w[i + 1]).unwrap_or(self.ln_w[i]);
         let (ln_f, slope_f) = one_plus.at(at);
         let f = ln_f.exp();
         let l = f - 1.0;
