@@ -20,11 +20,21 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
+    Demo(DemoArguments),
     Identify(Box<IdentifyArguments>),
     Margins(Box<MarginsArguments>),
     Simulate(SimulateArguments),
     Tune(Box<TuneArguments>),
     Study(StudyArguments),
+}
+
+/// The whole chain on a built-in machine: sweep, identification, tuning, gain table, report
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  servotune demo --out demo")]
+pub(super) struct DemoArguments {
+    /// Folder to write to
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 /// Swept-sine file to plant model

@@ -4,6 +4,7 @@
 //! 1 (done, something was rejected) or 2 (could not do it). Commands: `specs/files.md` and `servotune --help`.
 
 mod arguments;
+mod demo;
 mod failure;
 mod identify;
 mod load;
@@ -42,6 +43,7 @@ pub fn main() -> ExitCode {
     };
     let mut screen = Screen::new(arguments.json);
     let ending = match arguments.command {
+        Command::Demo(a) => demo::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),
         Command::Simulate(a) => simulate::run(&a, &mut screen),
