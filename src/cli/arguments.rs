@@ -164,4 +164,8 @@ pub(super) struct StudyArguments {
 pub(super) enum StudyName {
     /// The four machine classes under one controller (figures 16-22)
     Classes,
+    /// The ladder of Table 1 and figures 6, 9, 12-14
+    Ladder,
+    /// 200 random plants of order 22: response, frequency and margin errors
+    Plants,
 }

@@ -2,6 +2,8 @@
 
 use crate::controller::ControllerError;
 use crate::feedback::FeedbackError;
+use crate::frf::{FrfError, FrfShapeError};
+use crate::identify::IdentifyError;
 use crate::lti::LtiError;
 use crate::pes::PesError;
 use crate::report::ReportError;
@@ -21,6 +23,12 @@ pub enum StudyError {
     Controller(#[from] ControllerError),
     #[error(transparent)]
     Feedback(#[from] FeedbackError),
+    #[error(transparent)]
+    Sweep(#[from] FrfShapeError),
+    #[error(transparent)]
+    Frf(#[from] FrfError),
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
     #[error(transparent)]
     Pes(#[from] PesError),
     #[error(transparent)]

@@ -5,9 +5,13 @@
 
 mod classes;
 mod error;
+mod ladder;
+mod plants;
 
 pub use classes::classes;
 pub use error::StudyError;
+pub use ladder::ladder;
+pub use plants::plants;
 
 /// What a study hands over: files by name, relative to the results' folder.
 #[derive(Clone, Debug, Default, PartialEq)]
