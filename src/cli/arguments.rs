@@ -168,4 +168,10 @@ pub(super) enum StudyName {
     Ladder,
     /// 200 random plants of order 22: response, frequency and margin errors
     Plants,
+    /// The nine measured responses of a fast steering mirror
+    Mirror,
+    /// The motor bench with flexible coupling, measured
+    Motor,
+    /// The nine cases of the public HDD benchmark plant
+    Hdd,
 }

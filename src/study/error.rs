@@ -6,7 +6,9 @@ use crate::frf::{FrfError, FrfShapeError};
 use crate::identify::IdentifyError;
 use crate::lti::LtiError;
 use crate::pes::PesError;
+use crate::recording::RecordingError;
 use crate::report::ReportError;
+use crate::tune::{SpecError, TuneError};
 use crate::twin::TwinError;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -29,6 +31,12 @@ pub enum StudyError {
     Frf(#[from] FrfError),
     #[error(transparent)]
     Identify(#[from] IdentifyError),
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    #[error(transparent)]
+    Tune(#[from] TuneError),
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
     #[error(transparent)]
     Pes(#[from] PesError),
     #[error(transparent)]
