@@ -12,6 +12,7 @@
 mod crossing;
 mod cubic;
 mod curve;
+mod events;
 mod gang;
 mod grid;
 mod margins;
@@ -23,11 +24,12 @@ mod trace;
 
 pub use crossing::Crossing;
 pub use curve::{CurveLoop, ResponseCurve};
+pub use events::{Event, GRAZE, Graze, QuickMargins};
 pub use gang::{GangOfFour, gang_of_four};
 pub use grid::frequency_grid;
 pub use margins::{Margins, margins};
 pub use nyquist::{NyquistCount, nyquist_count};
 pub use open_loop::{FeedbackError, ModelLoop, OpenLoop};
 pub use poles::closed_loop_poles;
-pub use sampled::{Event, GRAZE, Graze, LoopOnGrid, QuickMargins, SampledPlant};
+pub use sampled::{LoopOnGrid, SampledPlant};
 pub use trace::Trace;
