@@ -69,8 +69,7 @@ fn a_room_uses_lower_ranks_only() {
         let code = text.split("#[cfg(test)]").next().unwrap_or_default();
         for line in code.lines().map(str::trim_start).filter(|l| !l.starts_with("//")) {
             for (at, _) in line.match_indices("crate::") {
-                let used: String =
-                    line[at + 7..].chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                let used: String = line[at + 7..].chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
                 if used != room && rank(&used).is_some_and(|r| r >= own) {
                     wrong.push(format!("{name}: {line}"));
                 }

@@ -15,15 +15,16 @@ use std::f64::consts::{PI, TAU};
 #[derive(Clone, Debug)]
 pub struct SpectralPes {
     lines: SampledPlant,
-    bins: SampledPlant,
     dft: WindowDft,
     /// For every bin, the weights of Re S and Im S of every line, to Re X and Im X: X = sum S A + conj(S) B.
     weight: Vec<[Vec<f64>; 4]>,
     /// Run-out of every bin, added at the head.
     runout: Vec<Complex<f64>>,
-    /// Expected |X|² of every bin per |T|² and per |P S|².
-    encoder_power: f64,
-    windage_power: Vec<f64>,
+    /// For every bin, the share of every line's noise density that falls into it, leakage of the window included.
+    leak: Vec<Vec<f64>>,
+    /// Densities (per hertz, both signs) of the encoder noise, and of the windage on every line.
+    encoder: f64,
+    windage: Vec<f64>,
     command: Option<Box<CommandLines>>,
     /// Which lines lie outside the sweep.
     outside: Vec<bool>,
@@ -37,9 +38,11 @@ struct CommandLines {
     forward: Vec<Complex<f64>>,
     /// Angle steps: instants (s) at which the command is looked at.
     instants: Vec<f64>,
-    /// Encoder and windage power density times line spacing, each counted for both signs.
-    encoder: f64,
-    windage: Vec<f64>,
+    /// The plant next to rest, and the mean of the reference: half the distance.
+    rest: SampledPlant,
+    mean: f64,
+    /// Line spacing, both signs counted (Hz).
+    spacing_hz: f64,
     samples: f64,
 }
 
@@ -47,13 +50,16 @@ struct CommandLines {
 #[derive(Clone, Debug, Default)]
 pub struct SpectralWork {
     lines: LoopOnGrid,
-    bins: LoopOnGrid,
+    rest: LoopOnGrid,
+    density: Vec<f64>,
     s_re: Vec<f64>,
     s_im: Vec<f64>,
 }
 
 /// Rest after the move before the way back, where the record itself leaves less (s).
 const REST_S: f64 = 0.02;
+/// How near to rest, as a share of the first line, the command that holds the mean position is taken.
+const NEAR_REST: f64 = 1e-2;
 /// Instants at which the command is looked at, spread over the move and a little beyond.
 const INSTANTS: usize = 400;
 
@@ -107,10 +113,12 @@ impl SpectralPes {
             let back = Complex::new(1.0, 0.0) - keep * Complex::from_polar(1.0, -w * t);
             noise.windage_rms.powi(2) * t * (1.0 - keep * keep) / back.norm_sqr()
         };
-        let bin_w: Vec<f64> = dft.bins().iter().map(|&k| TAU * dft.hz(k)).collect();
-        let bin_p: Vec<Complex<f64>> = bin_w.iter().map(|w| plant.at(*w)).collect();
-        // Density (per hertz, both signs) times rate over N: the power of one bin of a white sequence is its variance over N.
-        let per_bin = rate / n as f64;
+        let spacing_hz = 2.0 / period;
+        let leak_into = |k: &usize| -> Vec<f64> {
+            let bin = TAU * *k as f64 / n as f64;
+            let share = |w: &f64| kernel(w / rate - bin, n).norm_sqr() + kernel(-w / rate - bin, n).norm_sqr();
+            w.iter().map(|w| share(w) * spacing_hz).collect()
+        };
         let runout = runout(profile, &dft, from_s, n);
         let command = command.then(|| {
             Box::new(CommandLines {
@@ -119,20 +127,25 @@ impl SpectralPes {
                 instants: (0..INSTANTS)
                     .map(|i| spiral.start_s + (end_s + 0.5 * REST_S - spiral.start_s) * i as f64 / INSTANTS as f64)
                     .collect(),
-                encoder: noise.encoder_rms.powi(2) * t * 4.0 / period,
-                windage: w.iter().map(|w| coloured(*w) * 4.0 / period).collect(),
+                rest: {
+                    let near = NEAR_REST * w[0];
+                    SampledPlant::of_points(t, plant.integrators(), vec![near], &[plant.at(near)])
+                },
+                mean: 0.5 * spiral.distance.copysign(spiral.velocity),
+                spacing_hz: 2.0 * spacing_hz,
                 samples: spiral.duration_s / t,
             })
         });
+        let windage = w.iter().map(|w| coloured(*w)).collect();
         Ok(SpectralPes {
             outside: w.iter().map(|w| !plant.covers(*w)).collect(),
+            leak: dft.bins().iter().map(leak_into).collect(),
+            encoder: noise.encoder_rms.powi(2) * t,
+            windage,
             lines: SampledPlant::of_points(t, plant.integrators(), w, &p),
-            windage_power: bin_w.iter().map(|w| coloured(*w) * per_bin).collect(),
-            bins: SampledPlant::of_points(t, plant.integrators(), bin_w, &bin_p),
             dft,
             weight,
             runout,
-            encoder_power: noise.encoder_rms.powi(2) * t * per_bin,
             command,
         })
     }
@@ -145,19 +158,21 @@ impl SpectralPes {
     /// Root of the expected |X_k|²/N² for every bin, into `amplitude`; returns the command's peak, 0 where it is not asked for.
     pub fn write(&self, chain: &[Section], work: &mut SpectralWork, amplitude: &mut Vec<f64>) -> f64 {
         self.sensitivities(chain, work);
-        self.bins.close(chain, &mut work.bins);
+        work.density.clear();
+        for i in 0..self.outside.len() {
+            let s = work.s_re[i] * work.s_re[i] + work.s_im[i] * work.s_im[i];
+            let l = work.lines.re[i] * work.lines.re[i] + work.lines.im[i] * work.lines.im[i];
+            work.density.push(s * (self.encoder * l + self.windage[i] * self.lines.value(i).norm_sqr()));
+        }
         amplitude.clear();
         for (k, rows) in self.weight.iter().enumerate() {
             let [a, b, c, d] = rows;
             let re = dot(a, &work.s_re) + dot(b, &work.s_im) + self.runout[k].re;
             let im = dot(c, &work.s_re) + dot(d, &work.s_im) + self.runout[k].im;
-            let l = Complex::new(work.bins.re[k], work.bins.im[k]);
-            let s = 1.0 / (1.0 + l);
-            let noise =
-                self.encoder_power * (l * s).norm_sqr() + self.windage_power[k] * (self.bins.value(k) * s).norm_sqr();
+            let noise = dot(&self.leak[k], &work.density);
             amplitude.push((re * re + im * im + noise).sqrt());
         }
-        self.command.as_ref().map_or(0.0, |c| self.command_peak(c, work))
+        self.command.as_ref().map_or(0.0, |c| self.command_peak(c, chain, work))
     }
 
     /// Share of the energy in the bins that comes from lines outside the sweep, where the plant is a continuation.
@@ -190,7 +205,7 @@ impl SpectralPes {
     }
 
     /// The largest command of the move, and the expected largest of its noise on top.
-    fn command_peak(&self, c: &CommandLines, work: &SpectralWork) -> f64 {
+    fn command_peak(&self, c: &CommandLines, chain: &[Section], work: &mut SpectralWork) -> f64 {
         let n = self.outside.len();
         let mut power = 0.0;
         // U = C E + F R; C from L = P C, and outside the sweep, where P is 0, nothing is known of it: the lines end there.
@@ -200,8 +215,12 @@ impl SpectralPes {
             let s = Complex::new(work.s_re[i], work.s_im[i]);
             let gain = if p.norm_sqr() > 0.0 { l / p } else { Complex::new(0.0, 0.0) };
             command.push(gain * s * c.error[i] + c.forward[i]);
-            power += c.encoder * (gain * s).norm_sqr() + c.windage[i] * (l * s).norm_sqr();
+            power += (self.encoder * (gain * s).norm_sqr() + self.windage[i] * (l * s).norm_sqr()) * c.spacing_hz;
         }
+        // What holds the mean position: C S next to rest, where it is real.
+        c.rest.close(chain, &mut work.rest);
+        let l = Complex::new(work.rest.re[0], work.rest.im[0]);
+        let held = c.mean * (l / (c.rest.value(0) * (1.0 + l))).re;
         let at = |time: f64| {
             // The lines are odd multiples of the first: one rotation steps from each to the next.
             let first = self.lines.w_rad_s()[0] * time;
@@ -211,7 +230,7 @@ impl SpectralPes {
                 sum += u.re * turn.re - u.im * turn.im;
                 turn *= step;
             }
-            (2.0 * sum).abs()
+            (held + 2.0 * sum).abs()
         };
         let peak = c.instants.iter().map(|t| at(*t)).fold(0.0, f64::max);
         peak + (power * 2.0 * c.samples.max(2.0).ln()).sqrt()
