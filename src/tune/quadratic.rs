@@ -155,6 +155,7 @@ mod tests {
     }
 
     #[test]
+    #[allow(clippy::needless_range_loop, reason = "rows and columns of matrices by index")]
     fn random_programmes_meet_the_optimality_conditions() {
         let mut r = crate::numeric::random::Random::new(5);
         for _ in 0..50 {
