@@ -40,8 +40,6 @@ pub struct QuickMargins {
     pub grazes: Vec<Graze>,
     /// Local minima of |1 + L| up to twice the lowest, value: |1 + L|.
     pub dips: Vec<Event>,
-    /// Largest |L|, for loops that never reach 1.
-    pub largest_gain: f64,
 }
 
 impl QuickMargins {

@@ -27,7 +27,7 @@ pub struct TuneSettings {
 
 impl Default for TuneSettings {
     fn default() -> Self {
-        TuneSettings { sample_time_s: 39.6e-6, starts: 12, simplex_steps: 100, polish_steps: 40 }
+        TuneSettings { sample_time_s: 39.6e-6, starts: 12, simplex_steps: 40, polish_steps: 40 }
     }
 }
 
