@@ -6,7 +6,8 @@ use crate::feedback::{CurveLoop, LoopOnGrid, ResponseCurve, SampledPlant};
 use crate::frf::Frf;
 use crate::lti::{DiscretePlant, Plant, Section, Sections};
 use crate::pes::{
-    HIGH_BAND_HZ, LOW_BAND_HZ, Profile, QuickScene, QuickWork, Scene, SpectralPes, SpectralWork, WindowDft,
+    ExpectedNoise, HIGH_BAND_HZ, LOW_BAND_HZ, NoiseWork, Profile, QuickScene, QuickWork, Scene, SpectralPes,
+    SpectralWork, WindowDft,
 };
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
@@ -89,7 +90,7 @@ pub(super) struct Prepared {
 
 #[derive(Clone, Debug)]
 enum Source {
-    Model { scene: Box<QuickScene>, dft: WindowDft },
+    Model { scene: Box<QuickScene>, dft: WindowDft, noise: Option<Box<ExpectedNoise>>, peak: bool },
     Response(Box<SpectralPes>),
 }
 
@@ -98,6 +99,7 @@ enum Source {
 pub(super) struct Buffers {
     pub on: LoopOnGrid,
     simulation: QuickWork,
+    noise: NoiseWork,
     spectral: SpectralWork,
     amplitude: Vec<f64>,
 }
@@ -128,11 +130,15 @@ impl Prepared {
                     return Err(TuneError::Physics { effect: p.effect.clone() });
                 }
                 let plant = DiscretePlant::of(plant, t)?;
-                let scene = if peak { Scene::new(profile, &plant)? } else { Scene::of_window(profile, &plant)? };
+                // The search sees the write without noise and the noise by its expected power; one draw it would learn by heart.
+                let mut still = profile.clone();
+                (still.noise.encoder_rms, still.noise.windage_rms) = (0.0, 0.0);
+                let scene = if peak { Scene::new(&still, &plant)? } else { Scene::of_window(&still, &plant)? };
                 let [first, last] = profile.pes.window;
                 let dft = WindowDft::new(last - first, profile.pes.sample_rate_hz, bins);
                 let sampled = SampledPlant::of_model(&plant);
-                let source = Source::Model { scene: Box::new(QuickScene::of(scene, &plant)), dft };
+                let noise = ExpectedNoise::of(profile, t, plant.integrators(), &plant, &dft).map(Box::new);
+                let source = Source::Model { scene: Box::new(QuickScene::of(scene, &plant)), dft, noise, peak };
                 Ok(Prepared { sampled, source })
             }
             Machine::Response { frf, hold } => {
@@ -148,6 +154,7 @@ impl Prepared {
         Buffers {
             on: LoopOnGrid::default(),
             simulation: QuickWork::default(),
+            noise: NoiseWork::default(),
             spectral: SpectralWork::default(),
             amplitude: Vec::new(),
         }
@@ -156,9 +163,13 @@ impl Prepared {
     /// Simulates the write with these sections, or reads it off the spectrum.
     pub fn write(&self, c: &Controller, chain: &[Section], b: &mut Buffers, harmonics: &[usize], out: &mut PesScore) {
         let dft = match &self.source {
-            Source::Model { scene, dft } => {
+            Source::Model { scene, dft, noise, peak } => {
                 out.command_peak = scene.run(chain, c.feedforward.as_ref(), c.output_limit, &mut b.simulation);
                 dft.amplitudes(&b.simulation.window, &mut b.amplitude);
+                if let Some(noise) = noise {
+                    noise.add(chain, &mut b.noise, &mut b.amplitude);
+                    out.command_peak += if *peak { noise.command(&mut b.noise) } else { 0.0 };
+                }
                 dft
             }
             Source::Response(s) => {
