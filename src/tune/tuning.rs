@@ -75,7 +75,7 @@ pub enum TuneError {
     Setting { key: &'static str, found: f64, expected: &'static str },
     /// No start could be brought to a stable loop.
     #[error(
-        "none of {starts} starts could be brought to a stable loop within the bounds; lower the gains' lower bounds"
+        "none of {starts} starts could be brought to a stable loop within the bounds; lower the gains' lower bounds, or turn the sign of the response: gains are positive, so the machine must move with its command"
     )]
     NoStableLoop { starts: usize },
 }
