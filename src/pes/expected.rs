@@ -33,7 +33,7 @@ pub struct NoiseWork {
 }
 
 /// Grid points a bin, between the bins: the main lobe of the window is two bins wide.
-const PER_BIN: f64 = 3.0;
+const PER_BIN: f64 = 4.0;
 /// Ratio of neighbours outside the bins.
 const STEP: f64 = 1.15;
 /// Points between two grid points on which the leakage is integrated.
