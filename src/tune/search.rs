@@ -23,6 +23,17 @@ pub(super) struct Found {
     pub feasible_starts: usize,
 }
 
+impl Found {
+    /// Takes the ends of another search in; of equals the earlier stays ahead.
+    pub fn join(&mut self, other: Found) {
+        self.ends.extend(other.ends);
+        self.ends.sort_by(|a, b| order(&a.score, &b.score));
+        self.evaluations += other.evaluations;
+        self.starts += other.starts;
+        self.feasible_starts += other.feasible_starts;
+    }
+}
+
 /// How much is searched.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effort {

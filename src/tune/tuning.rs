@@ -82,6 +82,9 @@ pub enum TuneError {
 
 /// Rounds of back-off: each removes the whole difference between quick and exact figures, to second order.
 const BACK_OFFS: usize = 5;
+/// How many times wider the search is before the limits are called infeasible, and what its seed differs by.
+const SECOND_SEARCH: usize = 5;
+const SECOND_SEED: u64 = 0x5eed_0002;
 /// Ends of the search that are judged at most.
 const ENDS: usize = 4;
 /// Violations within this share of the largest belong to the same conflict.
@@ -110,12 +113,19 @@ pub fn tune_jointly(
 ) -> Result<Outcome, TuneError> {
     let parameters = check(machines, spec, start, settings)?;
     let mut bench = Bench::new(machines, spec, parameters)?;
-    let effort = Effort {
+    let mut effort = Effort {
         starts: settings.starts * spec.search.notches.max(1),
         simplex_steps: settings.simplex_steps,
         polish_steps: settings.polish_steps,
     };
-    let mut found = search(&bench, spec.margins.gain_crossover_hz, start.is_some(), spec.search.seed, &effort);
+    let crossover = spec.margins.gain_crossover_hz;
+    let mut found = search(&bench, crossover, start.is_some(), spec.search.seed, &effort);
+    if found.feasible_starts == 0 {
+        // "Infeasible" is a grave word: it is said only after a second, wider search under a seed of its own.
+        effort.starts *= SECOND_SEARCH;
+        let wider = search(&bench, crossover, start.is_some(), spec.search.seed ^ SECOND_SEED, &effort);
+        found.join(wider);
+    }
     found.ends.retain(|e| e.score.violation < UNSTABLE);
     let before = start.map(|c| proofs(machines, c, spec)).transpose()?;
     let mut ending = Ending { machines, spec, evaluations: found.evaluations, back_offs: 0 };
