@@ -71,7 +71,11 @@ fn candidate_with_command_peak(b: Bencher) {
 #[divan::bench]
 fn candidate_on_a_response(b: Bencher) {
     let frf = paper_response();
-    candidate_of(b, &without_peak(), Machine::Response { frf: &frf, hold: servotune::tune::Hold::NotIncluded });
+    candidate_of(
+        b,
+        &without_peak(),
+        Machine::Response { frf: &frf, hold: servotune::tune::Hold::NotIncluded, continuation: None },
+    );
 }
 
 #[divan::bench(args = [1, 2], sample_count = 10, sample_size = 1)]

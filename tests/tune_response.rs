@@ -99,7 +99,7 @@ fn margins_of_the_sweep_are_those_of_the_model() {
 #[test]
 fn tuning_on_the_sweep_meets_the_limits_on_the_machine_itself() {
     let (plant, frf, spec) = (paper_plant(), paper_response(), paper_spec());
-    let machine = Machine::Response { frf: &frf, hold: Hold::NotIncluded };
+    let machine = Machine::Response { frf: &frf, hold: Hold::NotIncluded, continuation: None };
     let start = start_controller();
     let settings = TuneSettings { starts: 6, ..TuneSettings::default() };
     let Outcome::Tuned(t) = tune(&machine, &spec, Some(&start), &settings).unwrap() else { panic!("feasible") };
@@ -116,7 +116,7 @@ fn tuning_on_the_sweep_meets_the_limits_on_the_machine_itself() {
 #[test]
 fn a_sweep_too_short_is_refused() {
     let frf = sweep(&paper_plant(), 10.0, 12_000.0, 12);
-    let machine = Machine::Response { frf: &frf, hold: Hold::NotIncluded };
+    let machine = Machine::Response { frf: &frf, hold: Hold::NotIncluded, continuation: None };
     let e = tune(&machine, &paper_spec(), None, &TuneSettings::default()).unwrap_err();
     assert!(matches!(e, TuneError::Sweep { points: 12, needed: 20, .. }), "{e}");
 }

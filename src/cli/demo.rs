@@ -59,7 +59,12 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let spec = Spec::read(&file("spec.toml")).map_err(TuneError::from)?;
     let settings = TuneSettings::default();
     let hold = Hold::NotIncluded;
-    let outcome = tune(&Machine::Response { frf: &sweep.frf, hold }, &spec, Some(&start), &settings)?;
+    let outcome = tune(
+        &Machine::Response { frf: &sweep.frf, hold, continuation: Some(&id.plant) },
+        &spec,
+        Some(&start),
+        &settings,
+    )?;
     let over_model = tune(&Machine::Model(&id.plant), &spec, Some(&start), &settings)?;
     let digest = |role: &str, sha256: String| InputDigest { role: role.into(), sha256 };
     let controller_text = read_text(&file("controller.toml"))?;

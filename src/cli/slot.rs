@@ -151,7 +151,7 @@ fn gain_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
     blocks.push(Block::Details("Gain table (gains.toml)".into(), vec![Block::Code(slot.table.text()?)]));
     let mut sections = vec![Section { heading: "Gains".into(), blocks }];
     if let (Some(over_model), Some((sweep, hold))) = (slot.over_model, slot.sweep) {
-        let on_response = Machine::Response { frf: &sweep.frf, hold };
+        let on_response = Machine::Response { frf: &sweep.frf, hold, continuation: Some(slot.plant) };
         let on_model = Machine::Model(slot.plant);
         let judged = |machine: &Machine<'_>, o: &Outcome| judge(machine, o.controller(), slot.spec).map(|p| p.judged);
         let first = (judged(&on_response, slot.outcome)?, judged(&on_model, slot.outcome)?);

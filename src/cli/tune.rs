@@ -5,7 +5,7 @@ use super::slot::{self, Slot};
 use super::{Ending, Failure, Screen, load};
 use crate::document::{read_text, sha256_hex, write_text};
 use crate::frf::Sweep;
-use crate::identify::{Identified, identify};
+use crate::identify::{self, Identified, IdentifySettings, identify};
 use crate::lti::Plant;
 use crate::report::tuned::{Units, conflicts_table, gains_table, limits_table};
 use crate::tune::{GainTable, Hold, InputDigest, Machine, Outcome, Spec, TuneSettings, tune};
@@ -23,7 +23,12 @@ struct Document<'a> {
 /// What is tuned, as files gave it.
 enum Given {
     Model(Box<Plant>),
-    Response { sweep: Box<Sweep>, hold: Hold },
+    /// With the model that continues it outside the sweep.
+    Response {
+        sweep: Box<Sweep>,
+        hold: Hold,
+        identified: Box<Identified>,
+    },
 }
 
 impl Given {
@@ -38,7 +43,9 @@ impl Given {
     fn machine(&self) -> Machine<'_> {
         match self {
             Given::Model(plant) => Machine::Model(plant),
-            Given::Response { sweep, hold } => Machine::Response { frf: &sweep.frf, hold: *hold },
+            Given::Response { sweep, hold, identified } => {
+                Machine::Response { frf: &sweep.frf, hold: *hold, continuation: Some(&identified.plant) }
+            }
         }
     }
 }
@@ -58,7 +65,9 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
             let sweep = load::sweep(file, &a.reading, screen)?;
             input("frf", sweep.source_digest.clone());
             let hold = if a.hold_included { Hold::Included } else { Hold::NotIncluded };
-            Given::Response { sweep: Box::new(sweep), hold }
+            let identified = identify(&sweep.frf, &model_settings(a))
+                .map_err(|source| Failure::Identify { file: file.clone(), source })?;
+            Given::Response { sweep: Box::new(sweep), hold, identified: Box::new(identified) }
         }
         (None, None) => return Err(Failure::NoMachine),
     };
@@ -92,6 +101,16 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     Ok(if tuned { Ending::Accepted } else { Ending::Rejected })
 }
 
+/// Settings of the model that continues the sweep: a sweep with the hold in it has it divided out first.
+fn model_settings(a: &TuneArguments) -> IdentifySettings {
+    let asked = a.model.settings();
+    let hold = match (a.hold_included, asked.hold) {
+        (true, identify::Hold::NotIncluded) => identify::Hold::Included { sample_time_s: a.sample_time_s },
+        (_, hold) => hold,
+    };
+    IdentifySettings { hold, ..asked }
+}
+
 fn report(
     a: &TuneArguments,
     given: &Given,
@@ -101,25 +120,19 @@ fn report(
     outcome: &Outcome,
     table: &GainTable,
 ) -> Result<String, Failure> {
-    let mut identified: Option<Identified> = None;
-    let mut over_model: Option<Outcome> = None;
-    if let (Given::Response { sweep, .. }, Some(file)) = (given, &a.frf) {
-        let id = identify(&sweep.frf, &a.model.settings())
-            .map_err(|source| Failure::Identify { file: file.clone(), source })?;
-        over_model = Some(tune(&Machine::Model(&id.plant), spec, start, settings)?);
-        identified = Some(id);
-    }
-    let (plant, sweep) = match (given, &identified) {
-        (Given::Model(plant), _) => (plant.as_ref(), None),
-        (Given::Response { sweep, hold }, Some(id)) => (&id.plant, Some((sweep.as_ref(), *hold))),
-        (Given::Response { .. }, None) => return Err(Failure::NoMachine),
+    let (plant, sweep, identified, over_model) = match given {
+        Given::Model(plant) => (plant.as_ref(), None, None, None),
+        Given::Response { sweep, hold, identified } => {
+            let over_model = tune(&Machine::Model(&identified.plant), spec, start, settings)?;
+            (&identified.plant, Some((sweep.as_ref(), *hold)), Some(identified.as_ref()), Some(over_model))
+        }
     };
     let name = a.plant.as_ref().or(a.frf.as_ref()).map(|f| f.display().to_string()).unwrap_or_default();
     let slot = Slot {
         name: &name,
         plant,
         sweep,
-        identified: identified.as_ref(),
+        identified,
         spec,
         start,
         outcome,

@@ -6,7 +6,7 @@
 use super::cubic::Cubic;
 use super::{FeedbackError, SampledPlant};
 use crate::frf::Frf;
-use crate::lti::FrequencyResponse;
+use crate::lti::{DiscretePlant, FrequencyResponse};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
@@ -18,8 +18,10 @@ pub struct ResponseCurve {
     ln_w: Vec<f64>,
     /// ln|P| + j phase, unwrapped from the first point.
     ln_p: Vec<Complex<f64>>,
-    /// Poles of the plant at rest, from the slope of the first points: |P| goes on as w^-integrators below the sweep.
+    /// Poles of the plant at rest: the model's, or from the slope of the first points, |P| then going on as w^-integrators.
     integrators: usize,
+    /// What goes on outside the sweep, with the factors that join it to the first and to the last point.
+    continuation: Option<(DiscretePlant, [Complex<f64>; 2])>,
 }
 
 /// Octaves at the start of the sweep from which the slope below it is taken.
@@ -44,7 +46,17 @@ impl ResponseCurve {
         let last = ln_w.partition_point(|x| *x <= ln_w[0] + SLOPE_OCTAVES * 2f64.ln()).max(2) - 1;
         let slope = (ln_p[last].re - ln_p[0].re) / (ln_w[last] - ln_w[0]);
         let integrators = (-slope).round().clamp(0.0, 2.0) as usize;
-        Ok(ResponseCurve { sample_time_s, w, ln_w, ln_p, integrators })
+        Ok(ResponseCurve { sample_time_s, w, ln_w, ln_p, integrators, continuation: None })
+    }
+
+    /// The same curve, going on outside the sweep as a model does: scaled to meet the first and the last point.
+    ///
+    /// The position error of a move lies mostly below the first point of a sweep, where the slope of the first points says nothing
+    /// about the phase.
+    pub fn continued(self, model: DiscretePlant) -> ResponseCurve {
+        let n = self.w.len();
+        let join = [0, n - 1].map(|i| self.ln_p[i].exp() / model.at(self.w[i]));
+        ResponseCurve { integrators: model.integrators(), continuation: Some((model, join)), ..self }
     }
 
     /// Sample time (s).
@@ -85,14 +97,17 @@ impl ResponseCurve {
 }
 
 impl FrequencyResponse for ResponseCurve {
-    /// The plant at `w`: between points by a cubic, below them along the slope, above them 0.
+    /// The plant at `w`: between points by a cubic; outside them by the continuation, else below along the slope and above 0.
     fn at(&self, w: f64) -> Complex<f64> {
         let n = self.w.len();
         let x = w.ln();
         if w > self.w[n - 1] * (1.0 + 1e-12) {
-            return Complex::new(0.0, 0.0);
+            return self.continuation.as_ref().map_or(Complex::new(0.0, 0.0), |(m, join)| join[1] * m.at(w));
         }
         if x <= self.ln_w[0] {
+            if let Some((m, join)) = &self.continuation {
+                return join[0] * m.at(w);
+            }
             return (self.ln_p[0] - self.integrators as f64 * (x - self.ln_w[0])).exp();
         }
         let i = self.ln_w.partition_point(|k| *k < x).clamp(1, n - 1) - 1;

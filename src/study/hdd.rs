@@ -61,7 +61,7 @@ pub fn hdd(data: &Path) -> Result<Study, StudyError> {
     let spec = Spec::parse(include_str!("specs/hdd.toml"), include_str!("specs/hdd_profile.toml"))?;
     let settings = TuneSettings { sample_time_s: 1.0 / RATE_HZ, ..TuneSettings::default() };
     let machines: Vec<Machine<'_>> =
-        cases.iter().map(|c| Machine::Response { frf: &c.frf, hold: Hold::Included }).collect();
+        cases.iter().map(|c| Machine::Response { frf: &c.frf, hold: Hold::Included, continuation: None }).collect();
     let alone = tune(&machines[0], &spec, None, &settings)?;
     let jointly = tune_jointly(&machines, &spec, None, &settings)?;
     let mut study = Study::default();

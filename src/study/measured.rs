@@ -47,7 +47,11 @@ pub(super) fn tune_axis(axis: &Axis, spec: &str, profile: &str, sample_time_s: f
     } else {
         axis.frf.clone()
     };
-    let machine = Machine::Response { frf: &frf, hold: Hold::Included };
+    let mut model = axis.identified.plant.clone();
+    if turned {
+        model.resonance_gain = -model.resonance_gain;
+    }
+    let machine = Machine::Response { frf: &frf, hold: Hold::Included, continuation: Some(&model) };
     let outcome = tune(&machine, &spec, None, &TuneSettings { sample_time_s, ..TuneSettings::default() })?;
     let sections = outcome.controller().sections()?;
     let margins = measured_margins(&MeasuredLoop::new(&frf, &sections, true)?);

@@ -34,11 +34,11 @@ pub fn judge(machine: &Machine<'_>, controller: &Controller, spec: &Spec) -> Res
             found.command_peak = write.command.iter().fold(0.0, |a, u| u.abs().max(a));
             margins(&ModelLoop::new(&sampled, &sections)?)
         }
-        Machine::Response { frf, hold } => {
+        Machine::Response { frf, hold, continuation } => {
             let loop_ = measured_loop(frf, *hold, &sections)?;
             let bins =
                 super::machine::bins(&spec.profile, &spec.limits.harmonics.iter().map(|h| h.k).collect::<Vec<_>>());
-            let plant = curve(frf, *hold, controller.sample_time_s)?;
+            let plant = curve(frf, *hold, *continuation, controller.sample_time_s)?;
             let s = SpectralPes::new(&spec.profile, &plant, controller, bins, true)?;
             let mut amplitude = Vec::new();
             found.command_peak = s.write(&sections.chain, &mut SpectralWork::default(), &mut amplitude);

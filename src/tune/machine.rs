@@ -32,6 +32,8 @@ pub enum Machine<'a> {
         frf: &'a Frf,
         /// What it contains.
         hold: Hold,
+        /// How the plant goes on outside the sweep, for the PES only; without it, along the slope of the first points.
+        continuation: Option<&'a Plant>,
     },
 }
 
@@ -59,12 +61,15 @@ impl Machine<'_> {
 const POINTS: usize = 20;
 
 /// The plant of a sweep with its hold.
-pub(super) fn curve(frf: &Frf, taken: Hold, t: f64) -> Result<ResponseCurve, TuneError> {
+pub(super) fn curve(frf: &Frf, taken: Hold, continuation: Option<&Plant>, t: f64) -> Result<ResponseCurve, TuneError> {
     let held = |w: f64| match taken {
         Hold::Included => Complex::new(1.0, 0.0),
         Hold::NotIncluded => hold(w * t),
     };
-    let curve = ResponseCurve::of(frf, t, held)?;
+    let mut curve = ResponseCurve::of(frf, t, held)?;
+    if let Some(plant) = continuation {
+        curve = curve.continued(DiscretePlant::of(plant, t)?);
+    }
     let points = curve.w_rad_s().len();
     if points < POINTS {
         return Err(TuneError::Sweep { points, half_rate_hz: 0.5 / t, needed: POINTS });
@@ -137,8 +142,8 @@ impl Prepared {
                 let source = Source::Model { scene: Box::new(QuickScene::of(scene, &plant)), dft, noise, peak };
                 Ok(Prepared { sampled, source })
             }
-            Machine::Response { frf, hold } => {
-                let curve = curve(frf, *hold, t)?;
+            Machine::Response { frf, hold, continuation } => {
+                let curve = curve(frf, *hold, *continuation, t)?;
                 let source = Source::Response(Box::new(SpectralPes::new(profile, &curve, base, bins, peak)?));
                 Ok(Prepared { sampled: curve.sampled(), source })
             }
