@@ -49,6 +49,8 @@ pub mod identify;
 
 pub mod pes;
 
+pub mod tune;
+
 pub mod twin;
 
 pub mod report;

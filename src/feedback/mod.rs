@@ -10,6 +10,8 @@
 //! ```
 
 mod crossing;
+mod cubic;
+mod curve;
 mod gang;
 mod grid;
 mod margins;
@@ -17,14 +19,17 @@ mod measured;
 mod nyquist;
 mod open_loop;
 mod poles;
+mod sampled;
 mod trace;
 
 pub use crossing::Crossing;
+pub use curve::ResponseCurve;
 pub use gang::{GangOfFour, gang_of_four};
 pub use grid::frequency_grid;
 pub use margins::{Margins, margins};
-pub use measured::{Interval, MarginIntervals, MeasuredLoop, MeasuredMargins, measured_margins};
+pub use measured::{Interval, MarginIntervals, MeasuredLoop, MeasuredMargins, hold, measured_margins};
 pub use nyquist::{NyquistCount, nyquist_count};
 pub use open_loop::{FeedbackError, ModelLoop, OpenLoop, angle_from_rest};
 pub use poles::closed_loop_poles;
+pub use sampled::{Event, LoopOnGrid, QuickMargins, SampledPlant};
 pub use trace::Trace;

@@ -9,9 +9,11 @@ mod noise;
 mod profile;
 mod reference;
 mod simulation;
+mod spectral;
 
 pub use dft::{Harmonic, WindowDft};
 pub use figures::{HIGH_BAND_HZ, LOW_BAND_HZ, PesFigures, figures};
 pub use profile::{Noise, PesClock, Profile, ProfileError, Runout, Spiral};
 pub use reference::Reference;
 pub use simulation::{ClosedLoop, PesError, Scene, Workspace, simulate};
+pub use spectral::{SpectralPes, SpectralWork};

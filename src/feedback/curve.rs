@@ -1,0 +1,98 @@
+//! A measured response as a curve for the search: the plant on its points, between them and below them.
+//!
+//! In: a response, ascending. Out: the plant between its points (cubic in ln w of ln P, phase unwrapped) and below them.
+//! Above the last point nothing is claimed. What the search finds is judged over the sweep by [`super::MeasuredLoop`]. Spec: `specs/tuning.md`, "The measured route".
+
+use super::cubic::Cubic;
+use super::{FeedbackError, SampledPlant};
+use crate::frf::Frf;
+use crate::lti::FrequencyResponse;
+use nalgebra::Complex;
+use std::f64::consts::{PI, TAU};
+
+/// The plant of a sweep, hold included, up to half the sample rate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ResponseCurve {
+    sample_time_s: f64,
+    w: Vec<f64>,
+    ln_w: Vec<f64>,
+    /// ln|P| + j phase, unwrapped from the first point.
+    ln_p: Vec<Complex<f64>>,
+    /// Poles of the plant at rest, from the slope of the first points: |P| goes on as w^-integrators below the sweep.
+    integrators: usize,
+}
+
+/// Octaves at the start of the sweep from which the slope below it is taken.
+const SLOPE_OCTAVES: f64 = 1.0;
+
+impl ResponseCurve {
+    /// The points of `frf` below half the sample rate, times `hold` at each frequency.
+    pub fn of(frf: &Frf, sample_time_s: f64, hold: impl Fn(f64) -> Complex<f64>) -> Result<Self, FeedbackError> {
+        let end = PI / sample_time_s;
+        let n = frf.w_rad_s().partition_point(|w| *w < end);
+        if n < 2 {
+            let from_hz = frf.w_rad_s()[0] / TAU;
+            return Err(FeedbackError::Band { from_hz, half_rate_hz: end / TAU });
+        }
+        let w: Vec<f64> = frf.w_rad_s()[..n].to_vec();
+        let ln_w: Vec<f64> = w.iter().map(|w| w.ln()).collect();
+        let p: Vec<Complex<f64>> = w.iter().zip(frf.value()).map(|(w, p)| p * hold(*w)).collect();
+        let mut ln_p = vec![p[0].ln()];
+        for i in 1..n {
+            ln_p.push(ln_p[i - 1] + (p[i] / p[i - 1]).ln());
+        }
+        let last = ln_w.partition_point(|x| *x <= ln_w[0] + SLOPE_OCTAVES * 2f64.ln()).max(2) - 1;
+        let slope = (ln_p[last].re - ln_p[0].re) / (ln_w[last] - ln_w[0]);
+        let integrators = (-slope).round().clamp(0.0, 2.0) as usize;
+        Ok(ResponseCurve { sample_time_s, w, ln_w, ln_p, integrators })
+    }
+
+    /// Sample time (s).
+    pub fn sample_time_s(&self) -> f64 {
+        self.sample_time_s
+    }
+
+    /// Points of the sweep that are used (rad/s).
+    pub fn w_rad_s(&self) -> &[f64] {
+        &self.w
+    }
+
+    /// Poles at rest that the slope of the first points says.
+    pub fn integrators(&self) -> usize {
+        self.integrators
+    }
+
+    /// The curve on its own points.
+    pub fn sampled(&self) -> SampledPlant {
+        let value: Vec<Complex<f64>> = self.ln_p.iter().map(|p| p.exp()).collect();
+        SampledPlant::of_points(self.sample_time_s, self.integrators, self.w.clone(), &value)
+    }
+
+    /// Whether a frequency (rad/s) lies within the sweep.
+    pub fn covers(&self, w: f64) -> bool {
+        w >= self.w[0] && w <= self.w[self.w.len() - 1]
+    }
+}
+
+impl FrequencyResponse for ResponseCurve {
+    /// The plant at `w`: between points by a cubic, below them along the slope, above them 0.
+    fn at(&self, w: f64) -> Complex<f64> {
+        let n = self.w.len();
+        let x = w.ln();
+        if w > self.w[n - 1] * (1.0 + 1e-12) {
+            return Complex::new(0.0, 0.0);
+        }
+        if x <= self.ln_w[0] {
+            return (self.ln_p[0] - self.integrators as f64 * (x - self.ln_w[0])).exp();
+        }
+        let i = self.ln_w.partition_point(|k| *k < x).clamp(1, n - 1) - 1;
+        if n < 4 {
+            let share = (x - self.ln_w[i]) / (self.ln_w[i + 1] - self.ln_w[i]);
+            return (self.ln_p[i] * (1.0 - share) + self.ln_p[i + 1] * share).exp();
+        }
+        let first = i.saturating_sub(1).min(n - 4);
+        let xs = std::array::from_fn(|k| self.ln_w[first + k]);
+        let ys = std::array::from_fn(|k| self.ln_p[first + k]);
+        Cubic::through(xs, ys).at(x).0.exp()
+    }
+}

@@ -1,0 +1,372 @@
+//! Margins on a fixed grid: the hot path of a search, where the plant stays and only the sections change.
+//!
+//! In: the plant's response on a grid chosen once, a chain of sections. Out: crossings, dips of |1 + L| and the count of
+//! unstable poles, interpolated between grid points (cubic in ln w of ln L, so that L = 1 + small keeps its digits).
+//! What is shipped is judged again by [`super::margins`]; spec: `specs/tuning.md`.
+
+use super::cubic::Cubic;
+use super::frequency_grid;
+use crate::lti::{DiscretePlant, FrequencyResponse, Section, Sections};
+use nalgebra::Complex;
+use std::f64::consts::{PI, TAU};
+
+/// Numbers handled side by side.
+const LANES: usize = 4;
+
+/// A plant's response on a fixed ascending grid, each quantity in an array of its own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampledPlant {
+    sample_time_s: f64,
+    integrators: usize,
+    /// True points; the arrays below are filled up to whole lanes with copies of the last one.
+    points: usize,
+    w: Vec<f64>,
+    ln_w: Vec<f64>,
+    re: Vec<[f64; LANES]>,
+    im: Vec<[f64; LANES]>,
+    /// z⁻¹ = cos - j sin, and z⁻².
+    cos: Vec<[f64; LANES]>,
+    sin: Vec<[f64; LANES]>,
+    cos2: Vec<[f64; LANES]>,
+    sin2: Vec<[f64; LANES]>,
+}
+
+/// The open loop on the grid of one plant, and what was read off it. Made once, used for every candidate.
+#[derive(Clone, Debug, Default)]
+pub struct LoopOnGrid {
+    /// L, real and imaginary part.
+    pub re: Vec<f64>,
+    /// L, imaginary part.
+    pub im: Vec<f64>,
+    /// |L|².
+    gain: Vec<f64>,
+    /// |1 + L|².
+    distance: Vec<f64>,
+    /// What was read off.
+    pub quick: QuickMargins,
+}
+
+/// One event of the curve with what its derivatives need.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// Where (rad/s).
+    pub w_rad_s: f64,
+    /// Phase margin (deg), gain margin (dB) or |1 + L|.
+    pub value: f64,
+    /// L there.
+    pub l: Complex<f64>,
+    /// d ln L / d ln w there; 0 where the event cannot move (half the sample rate).
+    pub slope: Complex<f64>,
+}
+
+/// Margins read off the grid.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct QuickMargins {
+    /// Closed-loop poles outside the unit circle.
+    pub unstable_poles: i64,
+    /// |L| = 1, value: phase margin (deg).
+    pub gain_crossings: Vec<Event>,
+    /// L real and negative, value: gain margin (dB).
+    pub phase_crossings: Vec<Event>,
+    /// Local minima of |1 + L| below 1 and the lowest of all, value: |1 + L|.
+    pub dips: Vec<Event>,
+    /// Largest |L|, for loops that never reach 1.
+    pub largest_gain: f64,
+}
+
+impl QuickMargins {
+    fn smallest(events: &[Event]) -> Option<Event> {
+        events.iter().copied().min_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))
+    }
+
+    /// The gain crossing whose phase margin is smallest in absolute value.
+    pub fn worst_gain_crossing(&self) -> Option<Event> {
+        Self::smallest(&self.gain_crossings)
+    }
+
+    /// The phase crossing whose gain margin is smallest in absolute value.
+    pub fn worst_phase_crossing(&self) -> Option<Event> {
+        Self::smallest(&self.phase_crossings)
+    }
+
+    /// Ms, the largest |1/(1 + L)|.
+    pub fn max_sensitivity(&self) -> f64 {
+        1.0 / self.dips.iter().map(|d| d.value).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Largest ratio between neighbours of the model's grid above 20 Hz: fine enough that a notch of 0.05 spans four steps.
+const STEP: f64 = 1.03;
+
+impl SampledPlant {
+    /// A model on a grid that resolves its modes: the grid of the exact margins, filled up where filters may come to lie.
+    pub fn of_model(plant: &DiscretePlant) -> SampledPlant {
+        let none = Sections { chain: vec![], sample_time_s: plant.sample_time_s() };
+        let mut w = Vec::new();
+        let mut last = 0.0;
+        for x in frequency_grid(plant.terms(), &none) {
+            if last > TAU * 20.0 && x > STEP * last {
+                w.push((last * x).sqrt());
+            }
+            // Far below any crossover a loop needs few points; its integrators draw a straight line there.
+            if x > TAU * 20.0 || x > 1.15 * last {
+                w.push(x);
+                last = x;
+            }
+        }
+        let value: Vec<Complex<f64>> = w.iter().map(|&w| plant.at(w)).collect();
+        SampledPlant::of_points(plant.sample_time_s(), plant.integrators(), w, &value)
+    }
+
+    /// Ascending frequencies (rad/s) and the plant at each, hold included; `integrators`: poles of the plant on z = 1.
+    pub fn of_points(sample_time_s: f64, integrators: usize, w: Vec<f64>, value: &[Complex<f64>]) -> SampledPlant {
+        let points = w.len().min(value.len());
+        let lanes = |f: &dyn Fn(usize) -> f64| -> Vec<[f64; LANES]> {
+            let at = |chunk: usize, lane: usize| f((chunk * LANES + lane).min(points - 1));
+            (0..points.div_ceil(LANES)).map(|c| std::array::from_fn(|lane| at(c, lane))).collect()
+        };
+        let angle = |i: usize| w[i] * sample_time_s;
+        SampledPlant {
+            sample_time_s,
+            integrators,
+            points,
+            re: lanes(&|i| value[i].re),
+            im: lanes(&|i| value[i].im),
+            cos: lanes(&|i| angle(i).cos()),
+            sin: lanes(&|i| angle(i).sin()),
+            cos2: lanes(&|i| (2.0 * angle(i)).cos()),
+            sin2: lanes(&|i| (2.0 * angle(i)).sin()),
+            ln_w: w.iter().map(|w| w.ln()).collect(),
+            w,
+        }
+    }
+
+    /// Sample time (s).
+    pub fn sample_time_s(&self) -> f64 {
+        self.sample_time_s
+    }
+
+    /// The grid (rad/s).
+    pub fn w_rad_s(&self) -> &[f64] {
+        &self.w
+    }
+
+    /// The plant at grid point `i`.
+    pub fn value(&self, i: usize) -> Complex<f64> {
+        Complex::new(self.re[i / LANES][i % LANES], self.im[i / LANES][i % LANES])
+    }
+
+    /// L = P C on the grid, into `on`.
+    pub fn close(&self, chain: &[Section], on: &mut LoopOnGrid) {
+        let chunks = self.re.len();
+        for a in [&mut on.re, &mut on.im, &mut on.gain, &mut on.distance] {
+            a.resize(chunks * LANES, 0.0);
+        }
+        let (re, _) = on.re.as_chunks_mut::<LANES>();
+        let (im, _) = on.im.as_chunks_mut::<LANES>();
+        let (gain, _) = on.gain.as_chunks_mut::<LANES>();
+        let (distance, _) = on.distance.as_chunks_mut::<LANES>();
+        for c in 0..chunks {
+            let (cos, sin, cos2, sin2) = (&self.cos[c], &self.sin[c], &self.cos2[c], &self.sin2[c]);
+            let (mut nr, mut ni) = (self.re[c], self.im[c]);
+            let (mut dr, mut di) = ([1.0; LANES], [0.0; LANES]);
+            for s in chain {
+                for j in 0..LANES {
+                    let (br, bi) = (s.b0 + s.b1 * cos[j] + s.b2 * cos2[j], -(s.b1 * sin[j] + s.b2 * sin2[j]));
+                    let (ar, ai) = (1.0 + s.a1 * cos[j] + s.a2 * cos2[j], -(s.a1 * sin[j] + s.a2 * sin2[j]));
+                    (nr[j], ni[j]) = (nr[j] * br - ni[j] * bi, nr[j] * bi + ni[j] * br);
+                    (dr[j], di[j]) = (dr[j] * ar - di[j] * ai, dr[j] * ai + di[j] * ar);
+                }
+            }
+            for j in 0..LANES {
+                let scale = 1.0 / (dr[j] * dr[j] + di[j] * di[j]);
+                let (x, y) = ((nr[j] * dr[j] + ni[j] * di[j]) * scale, (ni[j] * dr[j] - nr[j] * di[j]) * scale);
+                re[c][j] = x;
+                im[c][j] = y;
+                gain[c][j] = x * x + y * y;
+                distance[c][j] = (1.0 + x) * (1.0 + x) + y * y;
+            }
+        }
+    }
+
+    /// Closes the loop and reads off crossings, dips and the count. Allocates nothing once `on` has been used.
+    pub fn judge(&self, chain: &[Section], on: &mut LoopOnGrid) {
+        self.close(chain, on);
+        let n = self.points;
+        let mut quick = std::mem::take(&mut on.quick);
+        quick.gain_crossings.clear();
+        quick.phase_crossings.clear();
+        quick.dips.clear();
+        let (re, im, gain, distance) = (&on.re[..n], &on.im[..n], &on.gain[..n], &on.distance[..n]);
+        quick.largest_gain = gain.iter().copied().fold(0.0, f64::max).sqrt();
+        let (mut lowest, mut lowest_at) = (f64::INFINITY, 0);
+        for i in 0..n {
+            if distance[i] < lowest {
+                (lowest, lowest_at) = (distance[i], i);
+            }
+            if i + 1 < n {
+                if (gain[i] < 1.0) != (gain[i + 1] < 1.0) {
+                    quick.gain_crossings.push(self.gain_event(on, i));
+                }
+                if (im[i] < 0.0) != (im[i + 1] < 0.0) && crossing_side(re[i], im[i], re[i + 1], im[i + 1]) < 0.0 {
+                    quick.phase_crossings.extend(self.phase_event(on, i));
+                }
+            }
+        }
+        for i in 1..n.saturating_sub(1) {
+            let low = distance[i] <= distance[i - 1] && distance[i] < distance[i + 1];
+            if low && (distance[i] < 1.0 || i == lowest_at) {
+                quick.dips.push(self.dip_event(on, i));
+            }
+        }
+        if lowest_at == 0 || lowest_at + 1 == n {
+            let l = Complex::new(re[lowest_at], im[lowest_at]);
+            let slope = Complex::new(0.0, 0.0);
+            quick.dips.push(Event { w_rad_s: self.w[lowest_at], value: lowest.sqrt(), l, slope });
+        }
+        if self.w[n - 1] * self.sample_time_s > PI * (1.0 - 1e-9) && re[n - 1] < 0.0 {
+            let l = Complex::new(re[n - 1], 0.0);
+            let slope = Complex::new(0.0, 0.0);
+            // The crossing on the last interval is this same point, seen through rounding of Im L = 0.
+            quick.phase_crossings.retain(|e| e.w_rad_s < self.w[n - 2]);
+            quick.phase_crossings.push(Event { w_rad_s: self.w[n - 1], value: -20.0 * l.norm().log10(), l, slope });
+        }
+        quick.unstable_poles = self.unstable_poles(chain, on);
+        on.quick = quick;
+    }
+
+    /// The Nyquist count of [`super::nyquist_count`], by crossings of the real axis instead of angles.
+    fn unstable_poles(&self, chain: &[Section], on: &LoopOnGrid) -> i64 {
+        let (mut m, mut outside) = (self.integrators, 0);
+        for pole in chain.iter().flat_map(|s| s.poles()) {
+            if (pole - 1.0).norm() < 1e-10 {
+                m += 1;
+            } else if pole.norm() > 1.0 {
+                outside += 1;
+            }
+        }
+        let mut half_turns = 0;
+        let mut before: Option<(f64, f64)> = None;
+        let mut side = 1.0;
+        for i in 0..self.points {
+            let (c, j) = (i / LANES, i % LANES);
+            let (lift_re, lift_im) = (1.0 - self.cos[c][j], self.sin[c][j]);
+            let (mut x, mut y) = (1.0 + on.re[i], on.im[i]);
+            for _ in 0..m {
+                (x, y) = (x * lift_re - y * lift_im, x * lift_im + y * lift_re);
+            }
+            visit((x, y), &mut before, &mut side, &mut half_turns);
+        }
+        // Beyond a sweep |L| < 1 is taken for granted: F goes over to its lifting factor and along it to half the sample rate.
+        let reached = self.w[self.points - 1] * self.sample_time_s;
+        if reached < PI * (1.0 - 1e-9) {
+            for step in 0..=BEYOND {
+                let angle = reached + (PI - reached) * f64::from(step) / f64::from(BEYOND);
+                let lift = Complex::new(1.0 - angle.cos(), angle.sin()).powu(m as u32);
+                visit((lift.re, lift.im), &mut before, &mut side, &mut half_turns);
+            }
+        }
+        if let Some((x, y)) = before {
+            half_turns += passage(side, if x >= 0.0 { 1.0 } else { -1.0 }, y);
+        }
+        outside - half_turns
+    }
+
+    fn gain_event(&self, on: &LoopOnGrid, i: usize) -> Event {
+        let curve = self.cubic(on, i, 0.0);
+        let at = curve.root(|v| v.re, self.ln_w[i], self.ln_w[i + 1]);
+        let (ln_l, slope) = curve.at(at);
+        Event { w_rad_s: at.exp(), value: wrapped(ln_l.im - PI).to_degrees(), l: ln_l.exp(), slope }
+    }
+
+    fn phase_event(&self, on: &LoopOnGrid, i: usize) -> Option<Event> {
+        let curve = self.cubic(on, i, 0.0);
+        let from = curve.at(self.ln_w[i]).0.im;
+        let target = ((from / PI - 1.0) / 2.0).round() * TAU + PI;
+        let at = curve.root(|v| v.im - target, self.ln_w[i], self.ln_w[i + 1]);
+        let (ln_l, slope) = curve.at(at);
+        let value = -20.0 * std::f64::consts::LOG10_E * ln_l.re;
+        value.is_finite().then_some(Event { w_rad_s: at.exp(), value, l: ln_l.exp(), slope })
+    }
+
+    fn dip_event(&self, on: &LoopOnGrid, i: usize) -> Event {
+        // The parabola of ln|1 + L| through three points says where, the cubic of ln(1 + L) says how low.
+        let x = [self.ln_w[i - 1], self.ln_w[i], self.ln_w[i + 1]];
+        let y = [on.distance[i - 1].ln(), on.distance[i].ln(), on.distance[i + 1].ln()];
+        let (left, right) = ((y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1]));
+        let bend = (right - left) / (x[2] - x[0]);
+        let middle = if bend > 0.0 { 0.5 * (x[0] + x[1]) - 0.5 * left / bend } else { x[1] };
+        let at = middle.clamp(x[0], x[2]);
+        let first = if at < x[1] { i - 1 } else { i };
+        let one_plus = self.cubic(on, first, 1.0);
+        // One Newton step on the cubic itself would need its bend; the parabola's is enough for the value.
+        let (ln_f, slope_f) = one_plus.at(at);
+        let f = ln_f.exp();
+        let l = f - 1.0;
+        Event { w_rad_s: at.exp(), value: f.norm(), l, slope: slope_f * f / l }
+    }
+
+    /// ln(L + add) around the interval from point i to i + 1, unwrapped from point i.
+    fn cubic(&self, on: &LoopOnGrid, i: usize, add: f64) -> Cubic {
+        let first = i.saturating_sub(1).min(self.points.saturating_sub(4));
+        let x: [f64; 4] = std::array::from_fn(|k| self.ln_w[(first + k).min(self.points - 1)]);
+        let value = |k: usize| {
+            let at = (first + k).min(self.points - 1);
+            Complex::new(on.re[at] + add, on.im[at])
+        };
+        let mut y = [value(0).ln(); 4];
+        for k in 1..4 {
+            y[k] = y[k - 1] + (value(k) / value(k - 1)).ln();
+        }
+        Cubic::through(x, y)
+    }
+}
+
+/// Steps from the end of a sweep to half the sample rate: three lifting factors turn by less than 0.6 rad in each.
+const BEYOND: u32 = 8;
+
+/// Takes the next point of F: counts the half turn that ends where the curve meets the real axis.
+#[inline]
+fn visit((x, y): (f64, f64), before: &mut Option<(f64, f64)>, side: &mut f64, half_turns: &mut i64) {
+    match *before {
+        None => *side = if x >= 0.0 { 1.0 } else { -1.0 },
+        Some((bx, by)) if (by < 0.0) != (y < 0.0) => {
+            let now = crossing_side(bx, by, x, y);
+            *half_turns += passage(*side, now, by);
+            *side = now;
+        }
+        Some(_) => {}
+    }
+    *before = Some((x, y));
+}
+
+/// Half turns of a piece of curve between two visits of the real axis, within the half-plane of `im`.
+fn passage(from: f64, to: f64, im: f64) -> i64 {
+    match (from > 0.0, to > 0.0) {
+        (true, false) => {
+            if im < 0.0 {
+                -1
+            } else {
+                1
+            }
+        }
+        (false, true) => {
+            if im < 0.0 {
+                1
+            } else {
+                -1
+            }
+        }
+        _ => 0,
+    }
+}
+
+/// The sign of the real part where the chord between two points on either side of the real axis meets it.
+fn crossing_side(ax: f64, ay: f64, bx: f64, by: f64) -> f64 {
+    if (ax * by - bx * ay) * (by - ay) < 0.0 { -1.0 } else { 1.0 }
+}
+
+fn wrapped(angle: f64) -> f64 {
+    let a = (angle + PI).rem_euclid(TAU) - PI;
+    if a == -PI { PI } else { a }
+}

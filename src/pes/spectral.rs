@@ -1,0 +1,278 @@
+//! The PES of a write from the spectrum: what a measured response says without any model.
+//!
+//! The move there and the same move back, half a period later, make the reference periodic; E = S (1 - P F) R on its lines.
+//! Between its lines nothing is left out; what is neglected: images above half the sample rate, the output limit, and the rest
+//! of one move that the next one still sees. Noise enters as expected power. Spec: `specs/tuning.md`, "The measured route".
+
+use super::{PesError, Profile, Reference, WindowDft};
+use crate::controller::{Controller, Feedforward};
+use crate::feedback::{LoopOnGrid, ResponseCurve, SampledPlant};
+use crate::lti::{FrequencyResponse, Section};
+use nalgebra::Complex;
+use std::f64::consts::{PI, TAU};
+
+/// Everything of a write that does not depend on the gains.
+#[derive(Clone, Debug)]
+pub struct SpectralPes {
+    lines: SampledPlant,
+    bins: SampledPlant,
+    dft: WindowDft,
+    /// For every bin, the weights of Re S and Im S of every line, to Re X and Im X: X = sum S A + conj(S) B.
+    weight: Vec<[Vec<f64>; 4]>,
+    /// Run-out of every bin, added at the head.
+    runout: Vec<Complex<f64>>,
+    /// Expected |X|² of every bin per |T|² and per |P S|².
+    encoder_power: f64,
+    windage_power: Vec<f64>,
+    command: Option<Box<CommandLines>>,
+    /// Which lines lie outside the sweep.
+    outside: Vec<bool>,
+}
+
+/// What the command's peak needs.
+#[derive(Clone, Debug)]
+struct CommandLines {
+    /// Reference of every line, (1 - P F) included, and the feed-forward's share of the command.
+    error: Vec<Complex<f64>>,
+    forward: Vec<Complex<f64>>,
+    /// Angle steps: instants (s) at which the command is looked at.
+    instants: Vec<f64>,
+    /// Encoder and windage power density times line spacing, each counted for both signs.
+    encoder: f64,
+    windage: Vec<f64>,
+    samples: f64,
+}
+
+/// Buffers for one thread.
+#[derive(Clone, Debug, Default)]
+pub struct SpectralWork {
+    lines: LoopOnGrid,
+    bins: LoopOnGrid,
+    s_re: Vec<f64>,
+    s_im: Vec<f64>,
+}
+
+/// Rest after the move before the way back, where the record itself leaves less (s).
+const REST_S: f64 = 0.02;
+/// Instants at which the command is looked at, spread over the move and a little beyond.
+const INSTANTS: usize = 400;
+
+impl SpectralPes {
+    /// The write of `profile` on a measured plant; `bins` of the window are read.
+    pub fn new(
+        profile: &Profile,
+        plant: &ResponseCurve,
+        controller: &Controller,
+        bins: Vec<usize>,
+        command: bool,
+    ) -> Result<SpectralPes, PesError> {
+        profile.check()?;
+        controller.check()?;
+        let t = plant.sample_time_s();
+        let spiral = &profile.spiral;
+        let end_s = Reference::of(spiral).end_s();
+        let period = 2.0 * spiral.duration_s.max(end_s + REST_S);
+        // Half-wave symmetry leaves the odd lines.
+        let count = ((period * 0.5 / t) as usize).div_ceil(2);
+        let w: Vec<f64> = (0..count).map(|i| TAU * (2 * i + 1) as f64 / period).filter(|w| w * t < PI).collect();
+        let p: Vec<Complex<f64>> = w.iter().map(|w| plant.at(*w)).collect();
+        let forward: Vec<Complex<f64>> =
+            w.iter().map(|w| feedforward(controller.feedforward.as_ref(), w * t, t)).collect();
+        let reference: Vec<Complex<f64>> = w.iter().map(|w| line(profile, end_s, *w, period)).collect();
+        let error: Vec<Complex<f64>> =
+            reference.iter().zip(&p).zip(&forward).map(|((r, p), f)| r * (1.0 - p * f)).collect();
+
+        let [first, last] = profile.pes.window;
+        let (n, rate) = (last - first, profile.pes.sample_rate_hz);
+        let from_s = (profile.first_servo_sample() + first) as f64 / rate;
+        let dft = WindowDft::new(n, rate, bins);
+        let mut weight = Vec::with_capacity(dft.bins().len());
+        for &k in dft.bins() {
+            let bin = TAU * k as f64 / n as f64;
+            let mut rows: [Vec<f64>; 4] = std::array::from_fn(|_| Vec::with_capacity(w.len()));
+            for (w, e) in w.iter().zip(&error) {
+                let a = e * Complex::from_polar(1.0, w * from_s) * kernel(w / rate - bin, n);
+                let b = e.conj() * Complex::from_polar(1.0, -w * from_s) * kernel(-w / rate - bin, n);
+                let (sum, difference) = (a + b, (a - b) * Complex::i());
+                rows[0].push(sum.re);
+                rows[1].push(difference.re);
+                rows[2].push(sum.im);
+                rows[3].push(difference.im);
+            }
+            weight.push(rows);
+        }
+        let noise = &profile.noise;
+        let keep = (-TAU * noise.windage_corner_hz * t).exp();
+        let coloured = |w: f64| {
+            let back = Complex::new(1.0, 0.0) - keep * Complex::from_polar(1.0, -w * t);
+            noise.windage_rms.powi(2) * t * (1.0 - keep * keep) / back.norm_sqr()
+        };
+        let bin_w: Vec<f64> = dft.bins().iter().map(|&k| TAU * dft.hz(k)).collect();
+        let bin_p: Vec<Complex<f64>> = bin_w.iter().map(|w| plant.at(*w)).collect();
+        // Density (per hertz, both signs) times rate over N: the power of one bin of a white sequence is its variance over N.
+        let per_bin = rate / n as f64;
+        let runout = runout(profile, &dft, from_s, n);
+        let command = command.then(|| {
+            Box::new(CommandLines {
+                forward: forward.iter().zip(&reference).map(|(f, r)| f * r).collect(),
+                error,
+                instants: (0..INSTANTS)
+                    .map(|i| spiral.start_s + (end_s + 0.5 * REST_S - spiral.start_s) * i as f64 / INSTANTS as f64)
+                    .collect(),
+                encoder: noise.encoder_rms.powi(2) * t * 4.0 / period,
+                windage: w.iter().map(|w| coloured(*w) * 4.0 / period).collect(),
+                samples: spiral.duration_s / t,
+            })
+        });
+        Ok(SpectralPes {
+            outside: w.iter().map(|w| !plant.covers(*w)).collect(),
+            lines: SampledPlant::of_points(t, plant.integrators(), w, &p),
+            windage_power: bin_w.iter().map(|w| coloured(*w) * per_bin).collect(),
+            bins: SampledPlant::of_points(t, plant.integrators(), bin_w, &bin_p),
+            dft,
+            weight,
+            runout,
+            encoder_power: noise.encoder_rms.powi(2) * t * per_bin,
+            command,
+        })
+    }
+
+    /// The window's bins.
+    pub fn dft(&self) -> &WindowDft {
+        &self.dft
+    }
+
+    /// Root of the expected |X_k|²/N² for every bin, into `amplitude`; returns the command's peak, 0 where it is not asked for.
+    pub fn write(&self, chain: &[Section], work: &mut SpectralWork, amplitude: &mut Vec<f64>) -> f64 {
+        self.sensitivities(chain, work);
+        self.bins.close(chain, &mut work.bins);
+        amplitude.clear();
+        for (k, rows) in self.weight.iter().enumerate() {
+            let [a, b, c, d] = rows;
+            let re = dot(a, &work.s_re) + dot(b, &work.s_im) + self.runout[k].re;
+            let im = dot(c, &work.s_re) + dot(d, &work.s_im) + self.runout[k].im;
+            let l = Complex::new(work.bins.re[k], work.bins.im[k]);
+            let s = 1.0 / (1.0 + l);
+            let noise =
+                self.encoder_power * (l * s).norm_sqr() + self.windage_power[k] * (self.bins.value(k) * s).norm_sqr();
+            amplitude.push((re * re + im * im + noise).sqrt());
+        }
+        self.command.as_ref().map_or(0.0, |c| self.command_peak(c, work))
+    }
+
+    /// Share of the energy in the bins that comes from lines outside the sweep, where the plant is a continuation.
+    pub fn continuation_share(&self, chain: &[Section], work: &mut SpectralWork) -> f64 {
+        self.sensitivities(chain, work);
+        let (mut outside, mut all) = (0.0, 0.0);
+        for [a, b, c, d] in &self.weight {
+            for (i, out) in self.outside.iter().enumerate() {
+                let (re, im) = (work.s_re[i], work.s_im[i]);
+                let energy = (a[i] * re + b[i] * im).powi(2) + (c[i] * re + d[i] * im).powi(2);
+                all += energy;
+                outside += if *out { energy } else { 0.0 };
+            }
+        }
+        if all > 0.0 { outside / all } else { 0.0 }
+    }
+
+    /// S on every line.
+    fn sensitivities(&self, chain: &[Section], work: &mut SpectralWork) {
+        self.lines.close(chain, &mut work.lines);
+        let n = self.outside.len();
+        work.s_re.resize(n, 0.0);
+        work.s_im.resize(n, 0.0);
+        let l = work.lines.re[..n].iter().zip(&work.lines.im[..n]);
+        for ((s_re, s_im), (x, y)) in work.s_re.iter_mut().zip(&mut work.s_im).zip(l) {
+            let scale = 1.0 / ((1.0 + x) * (1.0 + x) + y * y);
+            *s_re = (1.0 + x) * scale;
+            *s_im = -y * scale;
+        }
+    }
+
+    /// The largest command of the move, and the expected largest of its noise on top.
+    fn command_peak(&self, c: &CommandLines, work: &SpectralWork) -> f64 {
+        let n = self.outside.len();
+        let mut power = 0.0;
+        // U = C E + F R; C from L = P C, and outside the sweep, where P is 0, nothing is known of it: the lines end there.
+        let mut command = Vec::with_capacity(n);
+        for i in 0..n {
+            let (p, l) = (self.lines.value(i), Complex::new(work.lines.re[i], work.lines.im[i]));
+            let s = Complex::new(work.s_re[i], work.s_im[i]);
+            let gain = if p.norm_sqr() > 0.0 { l / p } else { Complex::new(0.0, 0.0) };
+            command.push(gain * s * c.error[i] + c.forward[i]);
+            power += c.encoder * (gain * s).norm_sqr() + c.windage[i] * (l * s).norm_sqr();
+        }
+        let at = |time: f64| {
+            // The lines are odd multiples of the first: one rotation steps from each to the next.
+            let first = self.lines.w_rad_s()[0] * time;
+            let (mut turn, step) = (Complex::from_polar(1.0, first), Complex::from_polar(1.0, 2.0 * first));
+            let mut sum = 0.0;
+            for u in &command {
+                sum += u.re * turn.re - u.im * turn.im;
+                turn *= step;
+            }
+            (2.0 * sum).abs()
+        };
+        let peak = c.instants.iter().map(|t| at(*t)).fold(0.0, f64::max);
+        peak + (power * 2.0 * c.samples.max(2.0).ln()).sqrt()
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (a4, a1) = a.as_chunks::<4>();
+    let (b4, b1) = b.as_chunks::<4>();
+    let mut sum = [0.0; 4];
+    for (a, b) in a4.iter().zip(b4) {
+        for j in 0..4 {
+            sum[j] += a[j] * b[j];
+        }
+    }
+    let rest: f64 = a1.iter().zip(b1).map(|(a, b)| a * b).sum();
+    (sum[0] + sum[1]) + (sum[2] + sum[3]) + rest
+}
+
+/// Mean of exp(j angle i) over i = 0..n.
+fn kernel(angle: f64, n: usize) -> Complex<f64> {
+    let half = 0.5 * angle;
+    let n = n as f64;
+    let size =
+        if half.sin().abs() < 1e-12 { (n * half).cos() / half.cos() } else { (n * half).sin() / (n * half.sin()) };
+    Complex::from_polar(1.0, (n - 1.0) * half) * size
+}
+
+/// The feed-forward's response: central differences of the reference.
+fn feedforward(f: Option<&Feedforward>, angle: f64, t: f64) -> Complex<f64> {
+    let velocity = Complex::new(0.0, angle.sin() / t);
+    let half = (0.5 * angle).sin();
+    let acceleration = -4.0 * half * half / (t * t);
+    f.map_or(Complex::new(0.0, 0.0), |f| f.factor * (f.velocity_s * velocity + f.acceleration_s2 * acceleration))
+}
+
+/// Fourier coefficient of the there-and-back reference at line `w`, in closed form from its steps of acceleration.
+fn line(profile: &Profile, end_s: f64, w: f64, period: f64) -> Complex<f64> {
+    let s = &profile.spiral;
+    let speed = s.velocity.abs();
+    let acceleration = (speed / s.acceleration_time_s).copysign(s.velocity);
+    let whole = end_s - s.start_s;
+    // A move too short for the full speed is two ramps; otherwise the ramps are as long as the profile says.
+    let ramp = s.acceleration_time_s.min(0.5 * whole);
+    let steps = [(0.0, 1.0), (ramp, -1.0), (whole - ramp, -1.0), (whole, 1.0)];
+    let sum: Complex<f64> = steps.iter().map(|(at, size)| size * Complex::from_polar(1.0, -w * (s.start_s + at))).sum();
+    // Each step of acceleration contributes 1/(jw)³; the way back, half a period later and negative, doubles odd lines.
+    2.0 * acceleration * sum / Complex::new(0.0, -w * w * w) / period
+}
+
+/// The run-out's part of every bin.
+fn runout(profile: &Profile, dft: &WindowDft, from_s: f64, n: usize) -> Vec<Complex<f64>> {
+    let (noise, rate) = (&profile.noise, profile.pes.sample_rate_hz);
+    let of = |k: &usize| {
+        let bin = TAU * *k as f64 / n as f64;
+        let line = |r: &super::Runout| {
+            let w = TAU * f64::from(r.order) * noise.spindle_hz;
+            let phase = Complex::from_polar(0.5 * r.amplitude, w * from_s + r.phase_deg.to_radians());
+            phase * kernel(w / rate - bin, n) + phase.conj() * kernel(-w / rate - bin, n)
+        };
+        noise.runout.iter().map(line).sum()
+    };
+    dft.bins().iter().map(of).collect()
+}

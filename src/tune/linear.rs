@@ -1,0 +1,196 @@
+//! A candidate with its derivatives: objective and limits as straight lines around one decision vector.
+//!
+//! Margins: analytic, from d ln L = d ln C at the events of the curve, whose frequencies move along with the slope of ln L.
+//! The write: forward differences of the exact simulation, one run a parameter; an adjoint would cost as much.
+
+use super::bench::figure_of_write;
+use super::machine::PesScore;
+use super::parameters::chain_of;
+use super::requirements::Requirement;
+use super::{Bench, Desk, Score, Side, What};
+use crate::feedback::Event;
+use crate::lti::Section;
+use nalgebra::Complex;
+use std::f64::consts::{LOG10_E, TAU};
+
+/// One limit near one candidate: value + gradient d, good where at most 0.
+#[derive(Clone, Debug)]
+pub(super) struct Row {
+    machine: usize,
+    /// Index of the requirement.
+    wanted: usize,
+    /// Where on the curve (rad/s); 0 for a figure of the write.
+    w_rad_s: f64,
+    from: From,
+    /// Violation as a share of the limit.
+    pub value: f64,
+    pub gradient: Vec<f64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum From {
+    Margin(Event),
+    Write,
+}
+
+/// Objectives (one a machine) and limits around one candidate.
+#[derive(Clone, Debug)]
+pub(super) struct Linear {
+    pub score: Score,
+    pub objectives: Vec<(f64, Vec<f64>)>,
+    pub rows: Vec<Row>,
+}
+
+/// Step of the differences in ln of a parameter: the square root of rounding, scaled to a record of a thousand samples.
+const STEP: f64 = 1e-6;
+/// Step for the logarithm of a section's response, central: errors of 1e-10 by curvature and 1e-11 by rounding.
+const SECTION_STEP: f64 = 1e-5;
+
+impl Row {
+    /// Whether two rows, of neighbouring candidates, speak of the same thing.
+    pub fn same(&self, other: &Row) -> bool {
+        self.machine == other.machine
+            && self.wanted == other.wanted
+            && (self.w_rad_s - other.w_rad_s).abs() <= 0.15 * self.w_rad_s
+    }
+}
+
+/// The limits at the candidate whose figures lie in the desk, without gradients.
+pub(super) fn rows(bench: &Bench, desk: &Desk) -> Vec<Row> {
+    let mut all = Vec::new();
+    for (machine, aimed) in bench.aimed.iter().enumerate() {
+        let q = &desk.buffers[machine].on.quick;
+        let found = &desk.scores[machine].found;
+        let mut harmonic = 0;
+        for (wanted, w) in aimed.iter().enumerate() {
+            let mut push = |e: Event, value: f64| {
+                let gradient = Vec::new();
+                all.push(Row { machine, wanted, w_rad_s: e.w_rad_s, from: From::Margin(e), value, gradient });
+            };
+            // A crossing on the other side of -1 keeps its distance by its absolute value, unless it is the one named.
+            let distance = |e: &Event, named: Option<f64>| {
+                let value = if named == Some(e.value) { e.value } else { e.value.abs() };
+                w.violation(value)
+            };
+            match w.what {
+                What::PhaseMargin => {
+                    q.gain_crossings.iter().for_each(|e| push(*e, distance(e, found.phase_margin_deg)));
+                }
+                What::GainMargin => {
+                    q.phase_crossings.iter().for_each(|e| push(*e, distance(e, found.gain_margin_db)));
+                }
+                What::MaxSensitivity => q.dips.iter().for_each(|e| push(*e, w.violation(1.0 / e.value))),
+                What::GainCrossover => {
+                    q.worst_gain_crossing().iter().for_each(|e| push(*e, w.violation(e.w_rad_s / TAU)));
+                }
+                _ => {
+                    if let Some(x) = figure_of_write(w.what, &desk.scores[machine].pes, &mut harmonic) {
+                        let (value, gradient) = (w.violation(x), Vec::new());
+                        all.push(Row { machine, wanted, w_rad_s: 0.0, from: From::Write, value, gradient });
+                    }
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Scores `x` and takes all derivatives there; none where the loop is unstable.
+pub(super) fn linearise(bench: &Bench, x: &[f64], desk: &mut Desk) -> Option<Linear> {
+    let score = bench.score(x, desk);
+    if score.violation >= super::bench::UNSTABLE {
+        return None;
+    }
+    let n = x.len();
+    let mut rows = rows(bench, desk);
+    let mut objectives: Vec<(f64, Vec<f64>)> =
+        desk.scores.iter().map(|s| (s.objective, Vec::with_capacity(n))).collect();
+    let base: Vec<PesScore> = desk.scores.iter().map(|s| s.pes.clone()).collect();
+    let sections: Vec<[Section; 2]> = sections_around(bench, x, desk);
+    for row in &mut rows {
+        if let From::Margin(e) = row.from {
+            let w = &bench.aimed[row.machine][row.wanted];
+            let t = bench.machines[row.machine].sampled.sample_time_s();
+            let back = Complex::from_polar(1.0, -e.w_rad_s * t);
+            let named = row.value == w.violation(e.value);
+            row.gradient = sections
+                .iter()
+                .map(|[minus, plus]| {
+                    let pull = (plus.at_delay(back) / minus.at_delay(back)).ln() / (2.0 * SECTION_STEP);
+                    margin_slope(w, &e, pull, named)
+                })
+                .collect();
+        }
+    }
+    let mut moved = x.to_vec();
+    for j in 0..n {
+        moved[j] = x[j] + STEP;
+        bench.parameters.put(&moved, &mut desk.controller);
+        chain_of(&desk.controller, &mut desk.chain);
+        bench.judge_writes(desk);
+        moved[j] = x[j];
+        for ((value, gradient), s) in objectives.iter_mut().zip(&desk.scores) {
+            gradient.push((s.objective - *value) / STEP);
+        }
+        for row in rows.iter_mut().filter(|r| matches!(r.from, From::Write)) {
+            let aimed = &bench.aimed[row.machine];
+            let before = aimed[..row.wanted].iter().filter(|w| matches!(w.what, What::Harmonic { .. })).count();
+            let w = &aimed[row.wanted];
+            let figure = |p: &PesScore| figure_of_write(w.what, p, &mut { before }).unwrap_or(0.0);
+            let difference =
+                w.violation(figure(&desk.scores[row.machine].pes)) - w.violation(figure(&base[row.machine]));
+            row.gradient.push(difference / STEP);
+        }
+    }
+    desk.evaluations += n;
+    Some(Linear { score, objectives, rows })
+}
+
+/// The section that each parameter acts on, a little to either side.
+fn sections_around(bench: &Bench, x: &[f64], desk: &mut Desk) -> Vec<[Section; 2]> {
+    let p = &bench.parameters;
+    let mut moved = x.to_vec();
+    let mut around = Vec::with_capacity(x.len());
+    for j in 0..x.len() {
+        let mut side = |h: f64| {
+            moved[j] = x[j] + h;
+            p.put(&moved, &mut desk.controller);
+            chain_of(&desk.controller, &mut desk.chain);
+            moved[j] = x[j];
+            desk.chain.get(p.section_of(j)).copied()
+        };
+        let still = Section { b0: 1.0, b1: 0.0, b2: 0.0, a1: 0.0, a2: 0.0 };
+        around.push(match (side(-SECTION_STEP), side(SECTION_STEP)) {
+            (Some(minus), Some(plus)) => [minus, plus],
+            // Outside the range of a filter nothing moves.
+            _ => [still, still],
+        });
+    }
+    p.put(x, &mut desk.controller);
+    chain_of(&desk.controller, &mut desk.chain);
+    around
+}
+
+/// d violation for d ln C = `pull` at an event.
+fn margin_slope(w: &Requirement, e: &Event, pull: Complex<f64>, named: bool) -> f64 {
+    // Near a slope of 0 the event has no speed of its own worth following.
+    let ratio = |a: f64, b: f64| if b.abs() > 1e-6 { a / b } else { 0.0 };
+    let change = match w.what {
+        What::PhaseMargin => (pull.im - pull.re * ratio(e.slope.im, e.slope.re)).to_degrees(),
+        What::GainMargin => -20.0 * LOG10_E * (pull.re - pull.im * ratio(e.slope.re, e.slope.im)),
+        What::GainCrossover => -ratio(pull.re, e.slope.re) * e.w_rad_s / TAU,
+        // |1 + L| falls with the part of dL along 1 + L; at the dip its own frequency does not matter.
+        What::MaxSensitivity => {
+            let one_plus = 1.0 + e.l;
+            let fall = (one_plus.conj() * e.l * pull).re / one_plus.norm();
+            -fall / (e.value * e.value)
+        }
+        _ => 0.0,
+    };
+    let sign = match w.what {
+        What::PhaseMargin | What::GainMargin if !named && e.value < 0.0 => -1.0,
+        _ => 1.0,
+    };
+    let direction = if w.side == Side::AtLeast { -1.0 } else { 1.0 };
+    sign * direction * change / w.limit
+}

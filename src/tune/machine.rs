@@ -1,0 +1,182 @@
+//! What is tuned: a plant model or a measured response, prepared once for thousands of candidates.
+
+use super::TuneError;
+use crate::controller::Controller;
+use crate::feedback::{LoopOnGrid, MeasuredLoop, ResponseCurve, SampledPlant, hold};
+use crate::frf::Frf;
+use crate::lti::{DiscretePlant, Plant, Section, Sections};
+use crate::pes::{HIGH_BAND_HZ, LOW_BAND_HZ, Profile, Scene, SpectralPes, SpectralWork, WindowDft, Workspace};
+use nalgebra::Complex;
+use serde::{Deserialize, Serialize};
+
+/// Whether a measured response already contains the zero-order hold of the command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hold {
+    /// Measured from the held command: nothing is to be added.
+    Included,
+    /// Measured from a continuous excitation: (1 - e^{-jwT})/(jwT) is multiplied in.
+    NotIncluded,
+}
+
+/// A machine to be tuned.
+#[derive(Clone, Copy, Debug)]
+pub enum Machine<'a> {
+    /// By its model: exact margins, exact simulation.
+    Model(&'a Plant),
+    /// By its measured response: margins from the points of the sweep, PES from the spectrum.
+    Response {
+        /// The sweep, position over command.
+        frf: &'a Frf,
+        /// What it contains.
+        hold: Hold,
+    },
+}
+
+/// By which way a result was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Route {
+    /// Over a plant model.
+    Model,
+    /// Straight on the measured response.
+    Response,
+}
+
+impl Machine<'_> {
+    /// The way that this machine takes.
+    pub fn route(&self) -> Route {
+        match self {
+            Machine::Model(_) => Route::Model,
+            Machine::Response { .. } => Route::Response,
+        }
+    }
+}
+
+/// Points of a sweep below half the sample rate that a search needs at least.
+const POINTS: usize = 20;
+
+/// The plant of a sweep with its hold.
+pub(super) fn curve(frf: &Frf, taken: Hold, t: f64) -> Result<ResponseCurve, TuneError> {
+    let held = |w: f64| match taken {
+        Hold::Included => Complex::new(1.0, 0.0),
+        Hold::NotIncluded => hold(w * t),
+    };
+    let curve = ResponseCurve::of(frf, t, held)?;
+    let points = curve.w_rad_s().len();
+    if points < POINTS {
+        return Err(TuneError::Sweep { points, half_rate_hz: 0.5 / t, needed: POINTS });
+    }
+    Ok(curve)
+}
+
+/// The loop of a sweep and the firmware's sections.
+pub(super) fn measured_loop<'a>(frf: &Frf, taken: Hold, sections: &'a Sections) -> Result<MeasuredLoop<'a>, TuneError> {
+    Ok(MeasuredLoop::new(frf, sections, taken == Hold::Included)?)
+}
+
+/// A machine made ready: its response on the grid, its write, the bins that count.
+#[derive(Clone, Debug)]
+pub(super) struct Prepared {
+    pub sampled: SampledPlant,
+    source: Source,
+}
+
+#[derive(Clone, Debug)]
+enum Source {
+    Model { plant: Box<DiscretePlant>, scene: Box<Scene>, dft: WindowDft, whole: bool },
+    Response(Box<SpectralPes>),
+}
+
+/// Buffers for one machine and one thread.
+#[derive(Clone, Debug)]
+pub(super) struct Buffers {
+    pub on: LoopOnGrid,
+    simulation: Option<Box<Workspace>>,
+    spectral: SpectralWork,
+    amplitude: Vec<f64>,
+}
+
+/// The figures of one write that a search needs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct PesScore {
+    pub dft_low: f64,
+    pub dft_high: f64,
+    pub harmonics: Vec<f64>,
+    pub command_peak: f64,
+}
+
+impl Prepared {
+    /// `harmonics`: the limited ones; `peak`: whether the command's peak counts, which needs the whole write.
+    pub fn of(
+        machine: &Machine<'_>,
+        profile: &Profile,
+        harmonics: &[usize],
+        peak: bool,
+        base: &Controller,
+    ) -> Result<Prepared, TuneError> {
+        let t = base.sample_time_s;
+        let bins = bins(profile, harmonics);
+        match machine {
+            Machine::Model(plant) => {
+                if let Some(p) = plant.physics.first() {
+                    return Err(TuneError::Physics { effect: p.effect.clone() });
+                }
+                let plant = DiscretePlant::of(plant, t)?;
+                let scene = if peak { Scene::new(profile, &plant)? } else { Scene::of_window(profile, &plant)? };
+                let [first, last] = profile.pes.window;
+                let dft = WindowDft::new(last - first, profile.pes.sample_rate_hz, bins);
+                let sampled = SampledPlant::of_model(&plant);
+                let source = Source::Model { plant: Box::new(plant), scene: Box::new(scene), dft, whole: peak };
+                Ok(Prepared { sampled, source })
+            }
+            Machine::Response { frf, hold } => {
+                let curve = curve(frf, *hold, t)?;
+                let source = Source::Response(Box::new(SpectralPes::new(profile, &curve, base, bins, peak)?));
+                Ok(Prepared { sampled: curve.sampled(), source })
+            }
+        }
+    }
+
+    /// Buffers for this machine.
+    pub fn buffers(&self, sections: usize) -> Buffers {
+        let simulation = match &self.source {
+            Source::Model { plant, scene, .. } => Some(Box::new(scene.workspace(plant, sections))),
+            Source::Response(_) => None,
+        };
+        Buffers { on: LoopOnGrid::default(), simulation, spectral: SpectralWork::default(), amplitude: Vec::new() }
+    }
+
+    /// Simulates the write with these sections, or reads it off the spectrum.
+    pub fn write(&self, c: &Controller, chain: &[Section], b: &mut Buffers, harmonics: &[usize], out: &mut PesScore) {
+        let dft = match (&self.source, &mut b.simulation) {
+            (Source::Model { plant, scene, dft, whole }, Some(work)) => {
+                scene.run(plant, chain, c.feedforward.as_ref(), c.output_limit, work);
+                dft.amplitudes(scene.window(work), &mut b.amplitude);
+                out.command_peak = if *whole { work.command.iter().fold(0.0, |a, u| u.abs().max(a)) } else { 0.0 };
+                dft
+            }
+            (Source::Response(s), _) => {
+                out.command_peak = s.write(chain, &mut b.spectral, &mut b.amplitude);
+                s.dft()
+            }
+            _ => return,
+        };
+        out.dft_low = dft.band(&b.amplitude, LOW_BAND_HZ);
+        out.dft_high = dft.band(&b.amplitude, HIGH_BAND_HZ);
+        out.harmonics.clear();
+        let at = |k: &usize| dft.bins().iter().position(|b| b == k).map_or(0.0, |i| b.amplitude[i]);
+        out.harmonics.extend(harmonics.iter().map(at));
+    }
+}
+
+/// The bins of both bands and the limited harmonics, ascending.
+pub(super) fn bins(profile: &Profile, harmonics: &[usize]) -> Vec<usize> {
+    let [first, last] = profile.pes.window;
+    let n = last - first;
+    let hz = |k: usize| k as f64 * profile.pes.sample_rate_hz / n as f64;
+    let inside = |k: usize| {
+        let within = |[low, high]: [f64; 2]| (low..=high).contains(&hz(k));
+        within(LOW_BAND_HZ) || within(HIGH_BAND_HZ) || harmonics.contains(&k)
+    };
+    (1..=n / 2).filter(|&k| inside(k)).collect()
+}

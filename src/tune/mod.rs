@@ -1,0 +1,28 @@
+//! Tuning: the smallest DFT of the PES under margins, limits, bounds and command effort.
+//!
+//! In: machines (models or measured responses), `spec.toml`, optionally the controller to start from. Out: an [`Outcome`]:
+//! the tuned controller, or the limits in conflict and the smallest relaxation; a gain table that ties it to its inputs.
+//! Convention: requirements are wanted ([`Requirement`]), then found ([`Found`]), then judged ([`Judged`]); spec: `specs/tuning.md`.
+
+mod bench;
+mod judge;
+mod linear;
+mod machine;
+mod outcome;
+mod parameters;
+mod polish;
+mod quadratic;
+mod requirements;
+mod search;
+mod spec;
+mod starts;
+mod tuning;
+
+pub use bench::{Bench, Desk, Score};
+pub use judge::{Proof, judge};
+pub use machine::{Hold, Machine, Route};
+pub use outcome::{AtBound, Infeasible, Outcome, RelaxedLimit, Tuned, Work};
+pub use parameters::{Parameter, Parameters};
+pub use requirements::{Found, Judged, JudgedLimit, Requirement, Side, What};
+pub use spec::{Bounds, HarmonicLimit, Limits, MarginLimits, Search, Spec, SpecError};
+pub use tuning::{TuneError, TuneSettings, tune, tune_jointly};

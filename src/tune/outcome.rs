@@ -1,0 +1,113 @@
+//! What tuning says: a controller that meets every limit, or the limits in conflict and what would have to give.
+
+use super::judge::Proof;
+use super::{Parameter, Route, Side, What};
+use crate::controller::Controller;
+use serde::Serialize;
+
+/// The verdict.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "verdict", rename_all = "snake_case")]
+pub enum Outcome {
+    /// Every limit is met.
+    Tuned(Tuned),
+    /// The search found nothing that meets every limit.
+    Infeasible(Infeasible),
+}
+
+/// A controller that meets every limit on every machine, by the exact judgement.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Tuned {
+    /// The controller.
+    pub controller: Controller,
+    /// The start controller, machine by machine; none without one.
+    pub before: Option<Vec<Proof>>,
+    /// The tuned controller, machine by machine.
+    pub after: Vec<Proof>,
+    /// Parameters that ended on a bound: the box, not the machine, sets them.
+    pub at_bounds: Vec<AtBound>,
+    /// What it cost.
+    pub work: Work,
+}
+
+/// No controller within the bounds was found that meets every limit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Infeasible {
+    /// The best compromise: the one whose largest miss, as a share of its limit, is smallest.
+    pub controller: Controller,
+    /// The start controller, machine by machine; none without one.
+    pub before: Option<Vec<Proof>>,
+    /// The compromise, machine by machine.
+    pub after: Vec<Proof>,
+    /// The limits that the compromise misses by (nearly) the same share: lifting one costs another.
+    pub conflicts: Vec<RelaxedLimit>,
+    /// The smallest common share by which the limits in conflict must give.
+    pub share: f64,
+    /// Whether tuning again with the relaxed limits met all of them.
+    pub confirmed: bool,
+    /// Bounds that the compromise lies on: widening one may also help.
+    pub at_bounds: Vec<AtBound>,
+    /// What it cost.
+    pub work: Work,
+}
+
+/// One limit in conflict.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RelaxedLimit {
+    /// Of what.
+    pub what: What,
+    /// Which side is good.
+    pub side: Side,
+    /// The limit of the spec, in its unit.
+    pub limit: f64,
+    /// What the compromise reaches on the worst machine; none where the loop has no such crossing.
+    pub found: Option<f64>,
+    /// By how much it misses, in the limit's unit, at least 0.
+    pub missed_by: Option<f64>,
+    /// The limit that the compromise meets, in its unit.
+    pub feasible_limit: f64,
+}
+
+/// A parameter on its bound.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AtBound {
+    /// Which.
+    pub parameter: Parameter,
+    /// Its value.
+    pub value: f64,
+    /// Whether it is the upper one.
+    pub upper: bool,
+}
+
+/// What a tuning cost and by which way it went.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Work {
+    /// Over a model or on the measured response.
+    pub route: Route,
+    /// Starts searched.
+    pub starts: usize,
+    /// Candidates scored, derivatives included.
+    pub evaluations: usize,
+    /// Starts whose search ended with every limit met.
+    pub feasible_starts: usize,
+    /// Rounds in which the exact judgement moved a limit inside.
+    pub back_offs: usize,
+}
+
+impl Outcome {
+    /// The controller, tuned or compromise.
+    pub fn controller(&self) -> &Controller {
+        match self {
+            Outcome::Tuned(t) => &t.controller,
+            Outcome::Infeasible(i) => &i.controller,
+        }
+    }
+
+    /// The exact judgement of that controller, machine by machine.
+    pub fn after(&self) -> &[Proof] {
+        match self {
+            Outcome::Tuned(t) => &t.after,
+            Outcome::Infeasible(i) => &i.after,
+        }
+    }
+}

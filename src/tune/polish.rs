@@ -1,0 +1,238 @@
+//! The polish: from a good candidate to the optimum, by sequential quadratic programming in a trust region.
+//!
+//! Exact penalty on the largest violation; Hessian of the Lagrangian by damped BFGS; a second-order correction where the
+//! limits bend away (Nocedal & Wright, Numerical Optimization, ch. 18). Worst case over machines through one bound for all.
+
+use super::bench::UNSTABLE;
+use super::linear::{Linear, Row, linearise, rows};
+use super::quadratic::Quadratic;
+use super::{Bench, Desk, Score};
+
+/// What the polish is after.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Goal {
+    /// The smallest objective that meets the limits.
+    Best,
+    /// The smallest largest violation, whatever the objective; ends where all limits are met.
+    Reach,
+}
+
+/// Where a polish ended.
+#[derive(Clone, Debug)]
+pub(super) struct Polished {
+    pub x: Vec<f64>,
+    pub score: Score,
+}
+
+/// Trust region at the start and at the end (ln of a parameter).
+const FIRST_RADIUS: f64 = 0.3;
+const LAST_RADIUS: f64 = 1e-6;
+/// Largest radius: a factor of e in every parameter.
+const WIDEST_RADIUS: f64 = 1.0;
+/// Predicted gain (ln of the objective) at which a polish is done: a millionth.
+const WORTHLESS: f64 = 1e-7;
+/// Price of a violation at first, and at most.
+const PRICE: f64 = 10.0;
+const HIGHEST_PRICE: f64 = 1e5;
+
+struct Step {
+    d: Vec<f64>,
+    /// Fall of the merit that the straight lines promise.
+    promised: f64,
+    objective_share: Vec<f64>,
+    multiplier: Vec<f64>,
+    violation_left: f64,
+}
+
+/// Polishes from `x` within the bounds, `steps` linearisations at most.
+pub(super) fn polish(bench: &Bench, x: &[f64], goal: Goal, steps: usize, desk: &mut Desk) -> Option<Polished> {
+    let n = x.len();
+    let mut x = x.to_vec();
+    let mut here = linearise(bench, &x, desk)?;
+    let mut hessian = identity(n);
+    let (mut radius, mut price) = (FIRST_RADIUS, PRICE);
+    let merit = |s: &Score, price: f64| match goal {
+        Goal::Best => s.merit(price),
+        Goal::Reach => s.violation.max(0.0),
+    };
+    let mut taken = 0;
+    let mut refused = 0;
+    while taken + refused < steps && radius > LAST_RADIUS {
+        if goal == Goal::Reach && here.score.violation <= 0.0 {
+            break;
+        }
+        let mut step = plan(bench, &x, &here, &hessian, radius, price, goal, None);
+        if goal == Goal::Best && step.violation_left > 1e-9 && price < HIGHEST_PRICE {
+            // The price may be too low to pay for feasibility: try whether a higher one buys some.
+            price *= 4.0;
+            step = plan(bench, &x, &here, &hessian, radius, price, goal, None);
+        }
+        if step.promised <= WORTHLESS {
+            break;
+        }
+        let now = merit(&here.score, price);
+        let mut trial: Vec<f64> = x.iter().zip(&step.d).map(|(x, d)| x + d).collect();
+        inside(bench, &mut trial);
+        let mut score = bench.score(&trial, desk);
+        if merit(&score, price) >= now && score.violation < UNSTABLE && score.violation > here.score.violation.max(0.0)
+        {
+            let bent = rows(bench, desk);
+            let again = plan(bench, &x, &here, &hessian, radius, price, goal, Some((&bent, &step.d)));
+            let mut second: Vec<f64> = x.iter().zip(&again.d).map(|(x, d)| x + d).collect();
+            inside(bench, &mut second);
+            let better = bench.score(&second, desk);
+            if merit(&better, price) < now {
+                (trial, score) = (second, better);
+            }
+        }
+        let ratio = (now - merit(&score, price)) / step.promised;
+        if ratio > 1e-4 {
+            taken += 1;
+            let Some(there) = linearise(bench, &trial, desk) else { break };
+            let d: Vec<f64> = trial.iter().zip(&x).map(|(a, b)| a - b).collect();
+            if goal == Goal::Best {
+                update(&mut hessian, &d, &lagrangian_change(&here, &there, &step));
+            }
+            let size = d.iter().fold(0.0f64, |a, d| a.max(d.abs()));
+            if ratio > 0.7 && size > 0.8 * radius {
+                radius = (2.0 * radius).min(WIDEST_RADIUS);
+            } else if ratio < 0.2 {
+                radius = 0.5 * size.min(radius);
+            }
+            (x, here) = (trial, there);
+        } else {
+            refused += 1;
+            let size = step.d.iter().fold(0.0f64, |a, d| a.max(d.abs()));
+            radius = 0.3 * size.min(radius);
+        }
+    }
+    Some(Polished { x, score: here.score })
+}
+
+fn identity(n: usize) -> Vec<f64> {
+    (0..n * n).map(|i| if i % (n + 1) == 0 { 1.0 } else { 0.0 }).collect()
+}
+
+fn inside(bench: &Bench, x: &mut [f64]) {
+    for (x, [from, to]) in x.iter_mut().zip(bench.parameters().bounds()) {
+        *x = x.clamp(*from, *to);
+    }
+}
+
+/// The step over d, the bound s of all objectives and the violation t.
+#[allow(clippy::too_many_arguments, reason = "one call site's locals, named; a struct would hide them")]
+fn plan(
+    bench: &Bench,
+    x: &[f64],
+    here: &Linear,
+    hessian: &[f64],
+    radius: f64,
+    price: f64,
+    goal: Goal,
+    bent: Option<(&[Row], &[f64])>,
+) -> Step {
+    let n = x.len();
+    let size = n + 2;
+    let mut p = Quadratic { h: vec![0.0; size * size], q: vec![0.0; size], a: Vec::new(), b: Vec::new() };
+    for j in 0..n {
+        for k in 0..n {
+            // When only limits count, a little convexity picks the shortest of equal steps.
+            p.h[j * size + k] = if goal == Goal::Best {
+                hessian[j * n + k]
+            } else if j == k {
+                1e-3
+            } else {
+                0.0
+            };
+        }
+    }
+    p.h[n * size + n] = 1e-9;
+    p.h[(n + 1) * size + n + 1] = 1e-9;
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    let mut row = vec![0.0; size];
+    let objectives = if goal == Goal::Best { here.objectives.as_slice() } else { &[] };
+    p.q[n] = if goal == Goal::Best { 1.0 } else { 0.0 };
+    p.q[n + 1] = if goal == Goal::Best { price } else { 1.0 };
+    for (value, gradient) in objectives {
+        row[..n].copy_from_slice(gradient);
+        (row[n], row[n + 1]) = (-1.0, 0.0);
+        p.row(&row, here.score.objective - value);
+    }
+    for r in &here.rows {
+        row[..n].copy_from_slice(&r.gradient);
+        (row[n], row[n + 1]) = (0.0, -1.0);
+        let bend = bent.and_then(|(there, d)| {
+            let value = there.iter().find(|other| r.same(other))?.value;
+            Some((value - r.value - dot(&r.gradient, d)).max(0.0))
+        });
+        p.row(&row, -r.value - bend.unwrap_or(0.0));
+    }
+    row.fill(0.0);
+    row[n + 1] = -1.0;
+    p.row(&row, 0.0);
+    row.fill(0.0);
+    for (j, (x, [from, to])) in x.iter().zip(bench.parameters().bounds()).enumerate() {
+        row[j] = 1.0;
+        p.row(&row, radius.min(to - x).max(0.0));
+        row[j] = -1.0;
+        p.row(&row, radius.min(x - from).max(0.0));
+        row[j] = 0.0;
+    }
+    let (z, multiplier) = p.solve();
+    let d = z[..n].to_vec();
+    let left = here.rows.iter().map(|r| r.value + dot(&r.gradient, &d)).fold(0.0, f64::max);
+    let curved: f64 = 0.5 * (0..n).map(|j| d[j] * dot(&p.h[j * size..j * size + n], &d)).sum::<f64>();
+    let promised = match goal {
+        Goal::Best => {
+            let objective = objectives.iter().map(|(v, g)| v + dot(g, &d)).fold(f64::NEG_INFINITY, f64::max);
+            here.score.objective - objective + price * (here.score.violation.max(0.0) - left) - curved
+        }
+        Goal::Reach => here.score.violation.max(0.0) - left,
+    };
+    let count = objectives.len();
+    Step {
+        d,
+        promised,
+        objective_share: multiplier[..count].to_vec(),
+        multiplier: multiplier[count..count + here.rows.len()].to_vec(),
+        violation_left: left,
+    }
+}
+
+/// Change of the Lagrangian's gradient between two candidates; limits without a counterpart are left out of both.
+fn lagrangian_change(here: &Linear, there: &Linear, step: &Step) -> Vec<f64> {
+    let mut y = vec![0.0; step.d.len()];
+    let mut add = |share: f64, before: &[f64], after: &[f64]| {
+        for ((y, b), a) in y.iter_mut().zip(before).zip(after) {
+            *y += share * (a - b);
+        }
+    };
+    for ((share, before), after) in step.objective_share.iter().zip(&here.objectives).zip(&there.objectives) {
+        add(*share, &before.1, &after.1);
+    }
+    for (share, before) in step.multiplier.iter().zip(&here.rows) {
+        if let Some(after) = there.rows.iter().find(|r| before.same(r)) {
+            add(*share, &before.gradient, &after.gradient);
+        }
+    }
+    y
+}
+
+/// Damped BFGS (Powell 1978): stays positive definite whatever the curvature.
+fn update(b: &mut [f64], d: &[f64], y: &[f64]) {
+    let n = d.len();
+    let bd: Vec<f64> = (0..n).map(|j| (0..n).map(|k| b[j * n + k] * d[k]).sum()).collect();
+    let dbd: f64 = d.iter().zip(&bd).map(|(a, b)| a * b).sum();
+    let dy: f64 = d.iter().zip(y).map(|(a, b)| a * b).sum();
+    if dbd <= 1e-24 {
+        return;
+    }
+    let keep = if dy >= 0.2 * dbd { 1.0 } else { 0.8 * dbd / (dbd - dy) };
+    let r: Vec<f64> = y.iter().zip(&bd).map(|(y, b)| keep * y + (1.0 - keep) * b).collect();
+    let dr: f64 = d.iter().zip(&r).map(|(a, b)| a * b).sum();
+    for j in 0..n {
+        for k in 0..n {
+            b[j * n + k] += r[j] * r[k] / dr - bd[j] * bd[k] / dbd;
+        }
+    }
+}

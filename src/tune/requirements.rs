@@ -1,0 +1,202 @@
+//! Requirements: wanted, found, judged. Three types, so that none can be taken for another.
+
+use super::spec::{Limits, MarginLimits};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// The quantity that a requirement speaks of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[allow(missing_docs, reason = "the names are those of the contract")]
+pub enum What {
+    PhaseMargin,
+    GainMargin,
+    MaxSensitivity,
+    GainCrossover,
+    DftLow,
+    DftHigh,
+    Harmonic { k: usize },
+    CommandPeak,
+}
+
+/// Which side of the limit is good.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// The found value must not be below.
+    AtLeast,
+    /// The found value must not be above.
+    AtMost,
+}
+
+/// Wanted: one limit of one quantity.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Requirement {
+    /// Of what.
+    pub what: What,
+    /// Which side is good.
+    pub side: Side,
+    /// The limit, in the quantity's unit ([`What::unit`]), above 0.
+    pub limit: f64,
+}
+
+/// Found: the figures of one controller on one machine, in the units of [`What::unit`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Found {
+    /// Closed-loop poles outside the unit circle.
+    pub unstable_poles: i64,
+    /// None without a gain crossing.
+    pub phase_margin_deg: Option<f64>,
+    /// None without a phase crossing.
+    pub gain_margin_db: Option<f64>,
+    /// Ms (ratio).
+    pub max_sensitivity: f64,
+    /// None without a gain crossing.
+    pub gain_crossover_hz: Option<f64>,
+    /// Norm over 600 to 1500 Hz (position_unit).
+    pub dft_low: f64,
+    /// Norm over 1500 to 3000 Hz (position_unit).
+    pub dft_high: f64,
+    /// Amplitudes of the limited harmonics, in the order of the spec (position_unit).
+    pub harmonics: Vec<f64>,
+    /// Largest |command| (command_unit).
+    pub command_peak: f64,
+}
+
+/// Judged: one requirement with what was found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct JudgedLimit {
+    /// The requirement.
+    pub wanted: Requirement,
+    /// What was found; none where the loop has no such crossing.
+    pub found: Option<f64>,
+    /// Room left, in the quantity's unit; negative where the limit is missed; none where nothing was found.
+    pub slack: Option<f64>,
+    /// How far the limit is missed, as a share of it; at most 0 where it is met.
+    pub violation: f64,
+}
+
+/// Judged: all requirements of one controller on one machine.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Judged {
+    /// What was found.
+    pub found: Found,
+    /// Every limit, in the order of the spec.
+    pub limits: Vec<JudgedLimit>,
+}
+
+/// Violation of a requirement that nothing was found for: as bad as a limit missed by the whole of itself.
+const NOTHING: f64 = 1.0;
+
+impl What {
+    /// The unit in which limit and found value stand.
+    pub fn unit(self) -> &'static str {
+        match self {
+            What::PhaseMargin => "deg",
+            What::GainMargin => "dB",
+            What::MaxSensitivity => "ratio",
+            What::GainCrossover => "Hz",
+            What::DftLow | What::DftHigh | What::Harmonic { .. } => "position_unit",
+            What::CommandPeak => "command_unit",
+        }
+    }
+}
+
+impl fmt::Display for What {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            What::PhaseMargin => f.write_str("phase_margin_deg"),
+            What::GainMargin => f.write_str("gain_margin_db"),
+            What::MaxSensitivity => f.write_str("max_sensitivity"),
+            What::GainCrossover => f.write_str("gain_crossover_hz"),
+            What::DftLow => f.write_str("dft_low"),
+            What::DftHigh => f.write_str("dft_high"),
+            What::Harmonic { k } => write!(f, "harmonic {k}"),
+            What::CommandPeak => f.write_str("command_peak"),
+        }
+    }
+}
+
+impl Requirement {
+    /// Every requirement of a spec, margins first.
+    pub fn list(m: &MarginLimits, l: &Limits) -> Vec<Requirement> {
+        let at_least = |what, limit| Requirement { what, side: Side::AtLeast, limit };
+        let at_most = |what, limit| Requirement { what, side: Side::AtMost, limit };
+        let mut all = Vec::new();
+        all.extend(m.phase_margin_deg.map(|x| at_least(What::PhaseMargin, x)));
+        all.extend(m.gain_margin_db.map(|x| at_least(What::GainMargin, x)));
+        all.extend(m.max_sensitivity.map(|x| at_most(What::MaxSensitivity, x)));
+        if let Some([from, to]) = m.gain_crossover_hz {
+            all.extend([at_least(What::GainCrossover, from), at_most(What::GainCrossover, to)]);
+        }
+        all.extend(l.dft_low.map(|x| at_most(What::DftLow, x)));
+        all.extend(l.dft_high.map(|x| at_most(What::DftHigh, x)));
+        all.extend(l.harmonics.iter().map(|h| at_most(What::Harmonic { k: h.k }, h.amplitude)));
+        all.extend(l.command_peak.map(|x| at_most(What::CommandPeak, x)));
+        all
+    }
+
+    /// How far `found` misses the limit, as a share of it; at most 0 where it is met.
+    pub fn violation(&self, found: f64) -> f64 {
+        match self.side {
+            Side::AtLeast => 1.0 - found / self.limit,
+            Side::AtMost => found / self.limit - 1.0,
+        }
+    }
+
+    /// The violation of the figures; a margin without its crossing is unlimited, a crossover without one is missed.
+    pub fn violation_of(&self, found: &Found, harmonic: &mut usize) -> f64 {
+        match self.found_in(found, harmonic) {
+            Some(x) if x.is_nan() => f64::INFINITY,
+            Some(x) => self.violation(x),
+            None if self.what == What::GainCrossover => NOTHING,
+            None => f64::NEG_INFINITY,
+        }
+    }
+
+    /// The figure that this requirement speaks of; `harmonic` counts the harmonics met so far.
+    fn found_in(&self, found: &Found, harmonic: &mut usize) -> Option<f64> {
+        match self.what {
+            What::PhaseMargin => found.phase_margin_deg,
+            What::GainMargin => found.gain_margin_db,
+            What::MaxSensitivity => Some(found.max_sensitivity),
+            What::GainCrossover => found.gain_crossover_hz,
+            What::DftLow => Some(found.dft_low),
+            What::DftHigh => Some(found.dft_high),
+            What::Harmonic { .. } => {
+                *harmonic += 1;
+                found.harmonics.get(*harmonic - 1).copied()
+            }
+            What::CommandPeak => Some(found.command_peak),
+        }
+    }
+}
+
+impl Judged {
+    /// Judges what was found.
+    pub fn of(wanted: &[Requirement], found: Found) -> Judged {
+        let (mut a, mut b) = (0, 0);
+        let limits = wanted
+            .iter()
+            .map(|w| {
+                let value = w.found_in(&found, &mut a);
+                let slack = value.map(|x| if w.side == Side::AtLeast { x - w.limit } else { w.limit - x });
+                JudgedLimit { wanted: *w, found: value, slack, violation: w.violation_of(&found, &mut b) }
+            })
+            .collect();
+        Judged { found, limits }
+    }
+
+    /// The loop is stable and every limit is met.
+    pub fn passes(&self) -> bool {
+        self.found.unstable_poles == 0 && self.limits.iter().all(|l| l.violation <= 0.0)
+    }
+
+    /// The largest violation; infinite for an unstable loop.
+    pub fn worst(&self) -> f64 {
+        if self.found.unstable_poles != 0 {
+            return f64::INFINITY;
+        }
+        self.limits.iter().map(|l| l.violation).fold(f64::NEG_INFINITY, f64::max)
+    }
+}

@@ -1,0 +1,156 @@
+//! The search itself: a simplex from every start (argmin), a polish from each, the best of all.
+//!
+//! Starts are split over threads by rayon; each has its own buffers and its own random numbers, and the best is taken by
+//! merit and then by index, so the result has the same bytes for any number of threads.
+
+use super::bench::UNSTABLE;
+use super::polish::{Goal, Polished, polish};
+use super::starts::starts;
+use super::{Bench, Desk, Score};
+use argmin::core::{CostFunction, Error, Executor};
+use argmin::solver::neldermead::NelderMead;
+use rayon::prelude::*;
+use std::cell::RefCell;
+
+/// The best candidate of a search, and what it cost.
+#[derive(Clone, Debug)]
+pub(super) struct Best {
+    pub x: Vec<f64>,
+    pub score: Score,
+    pub evaluations: usize,
+    pub starts: usize,
+    pub feasible_starts: usize,
+}
+
+/// How much is searched.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort {
+    pub starts: usize,
+    /// Reflections of the simplex from each start.
+    pub simplex_steps: u64,
+    /// Linearisations of a polish.
+    pub polish_steps: usize,
+}
+
+/// Edge of the first simplex (ln of a parameter).
+const EDGE: f64 = 0.25;
+/// Spread of the simplex's merits at which it ends: the polish is faster from there.
+const SPREAD: f64 = 1e-3;
+/// Price of a violation for the simplex: a limit missed by a hundredth weighs a tenth of the objective.
+const PRICE: f64 = 10.0;
+
+/// Searches from every start.
+pub(super) fn search(
+    bench: &Bench,
+    crossover_hz: Option<[f64; 2]>,
+    given: bool,
+    seed: u64,
+    effort: &Effort,
+) -> Option<Best> {
+    let from = starts(bench, crossover_hz, given, seed, effort.starts);
+    let count = from.len();
+    let ends: Vec<(Option<Polished>, usize)> = from
+        .into_par_iter()
+        .map(|x| {
+            let mut desk = bench.desk();
+            let x = simplex(bench, x, effort.simplex_steps, &mut desk);
+            let end = refine(bench, &x, effort.polish_steps, &mut desk);
+            (end, desk.evaluations)
+        })
+        .collect();
+    let evaluations = ends.iter().map(|(_, e)| e).sum();
+    let feasible_starts = ends.iter().filter(|(p, _)| p.as_ref().is_some_and(|p| p.score.violation <= 0.0)).count();
+    let best = ends.into_iter().filter_map(|(p, _)| p).reduce(|a, b| if better(&b.score, &a.score) { b } else { a })?;
+    Some(Best { x: best.x, score: best.score, evaluations, starts: count, feasible_starts })
+}
+
+/// Feasible before infeasible, then the smaller objective or the smaller violation.
+fn better(a: &Score, b: &Score) -> bool {
+    match (a.violation <= 0.0, b.violation <= 0.0) {
+        (true, true) => a.objective < b.objective,
+        (false, false) => a.violation < b.violation,
+        (feasible, _) => feasible,
+    }
+}
+
+/// Polishes for the objective; where limits stay missed, first for the limits alone.
+pub(super) fn refine(bench: &Bench, x: &[f64], steps: usize, desk: &mut Desk) -> Option<Polished> {
+    let first = polish(bench, x, Goal::Best, steps, desk)?;
+    if first.score.violation <= 0.0 {
+        return Some(first);
+    }
+    let reached = polish(bench, &first.x, Goal::Reach, steps, desk)?;
+    if reached.score.violation > 0.0 {
+        return Some(reached);
+    }
+    let again = polish(bench, &reached.x, Goal::Best, steps, desk)?;
+    Some(if better(&again.score, &reached.score) { again } else { reached })
+}
+
+/// The merit as argmin wants it. It offers no bounds: a point outside is scored on the box and pays for its distance.
+struct Merit<'a> {
+    bench: &'a Bench,
+    desk: RefCell<&'a mut Desk>,
+}
+
+impl CostFunction for Merit<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
+        let mut outside = 0.0;
+        let on_box: Vec<f64> = x
+            .iter()
+            .zip(self.bench.parameters().bounds())
+            .map(|(x, [from, to])| {
+                let inside = x.clamp(*from, *to);
+                outside += (x - inside).abs();
+                inside
+            })
+            .collect();
+        let score = self.bench.score(&on_box, &mut self.desk.borrow_mut());
+        Ok(score.merit(PRICE).min(1e9) + outside)
+    }
+}
+
+/// A simplex around `x`; the best vertex, moved into the bounds.
+fn simplex(bench: &Bench, x: Vec<f64>, steps: u64, desk: &mut Desk) -> Vec<f64> {
+    let x = walk_back(bench, x, desk);
+    if steps == 0 {
+        return x;
+    }
+    let bounds = bench.parameters().bounds();
+    let mut vertices = vec![x.clone()];
+    for (j, [from, to]) in bounds.iter().enumerate() {
+        let mut vertex = x.clone();
+        // Away from the nearer bound, so that no vertex starts outside.
+        let sign = if to - x[j] >= x[j] - from { 1.0 } else { -1.0 };
+        vertex[j] += sign * EDGE.min(0.5 * (to - from));
+        vertices.push(vertex);
+    }
+    let merit = Merit { bench, desk: RefCell::new(desk) };
+    let Ok(solver) = NelderMead::new(vertices).with_sd_tolerance(SPREAD) else { return x };
+    let run = Executor::new(merit, solver).configure(|s| s.max_iters(steps)).timer(false).run();
+    let found = run.ok().and_then(|r| r.state.best_param);
+    let mut found = found.unwrap_or(x);
+    for (x, [from, to]) in found.iter_mut().zip(bounds) {
+        *x = x.clamp(*from, *to);
+    }
+    found
+}
+
+/// Lowers the loop's gain until it is stable: an unstable start tells a simplex nothing.
+fn walk_back(bench: &Bench, mut x: Vec<f64>, desk: &mut Desk) -> Vec<f64> {
+    let gains = |p: &super::Parameter| matches!(p, super::Parameter::Kp | super::Parameter::Ki | super::Parameter::Kd);
+    for _ in 0..12 {
+        if bench.score(&x, desk).violation < UNSTABLE {
+            break;
+        }
+        for ((x, p), [from, _]) in x.iter_mut().zip(bench.parameters().free()).zip(bench.parameters().bounds()) {
+            if gains(p) {
+                *x = (*x - 0.3).max(*from);
+            }
+        }
+    }
+    x
+}

@@ -1,0 +1,266 @@
+//! `tune`: search, exact judgement, back-off, verdict.
+
+use super::bench::UNSTABLE;
+use super::judge::Proof;
+use super::outcome::{AtBound, Infeasible, Outcome, RelaxedLimit, Tuned, Work};
+use super::requirements::Requirement;
+use super::search::{Best, Effort, refine, search};
+use super::{Bench, Machine, Parameters, Side, Spec, SpecError, judge};
+use crate::controller::{Controller, ControllerError};
+use crate::feedback::FeedbackError;
+use crate::lti::LtiError;
+use crate::pes::{PesError, ProfileError};
+use thiserror::Error;
+
+/// How the search is run; what it looks for stands in the spec.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TuneSettings {
+    /// Sample time where no start controller names one (s). The paper's controller runs at 39.6 us.
+    pub sample_time_s: f64,
+    /// Starts, at least 1.
+    pub starts: usize,
+    /// Reflections of the simplex from each start.
+    pub simplex_steps: u64,
+    /// Linearisations of the polish from each start.
+    pub polish_steps: usize,
+}
+
+impl Default for TuneSettings {
+    fn default() -> Self {
+        TuneSettings { sample_time_s: 39.6e-6, starts: 12, simplex_steps: 100, polish_steps: 40 }
+    }
+}
+
+/// Why there is nothing to tune. That no controller meets the limits is no error but an [`Outcome`].
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "each field is named in the message")]
+pub enum TuneError {
+    /// The spec is none.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    /// The plant is none.
+    #[error("plant: {0}")]
+    Plant(#[from] LtiError),
+    /// The start controller is none.
+    #[error("start controller: {0}")]
+    Controller(#[from] ControllerError),
+    /// The loop cannot be closed.
+    #[error(transparent)]
+    Loop(#[from] FeedbackError),
+    /// The write cannot be simulated.
+    #[error(transparent)]
+    Write(#[from] PesError),
+    /// The profile is none.
+    #[error("profile: {0}")]
+    Profile(#[from] ProfileError),
+    /// There is no machine.
+    #[error("no machine to tune: expected at least one plant or response")]
+    NoMachine,
+    /// The plant carries physics that a linear tuning would ignore.
+    #[error("the plant has the effect \"{effect}\", which tuning cannot take into account; expected a linear plant")]
+    Physics { effect: String },
+    /// The sweep is too short for a search.
+    #[error(
+        "the response has {points} points below half the sample rate, {half_rate_hz} Hz: expected at least {needed}"
+    )]
+    Sweep { points: usize, half_rate_hz: f64, needed: usize },
+    /// The bounds leave nothing to search.
+    #[error("every parameter is fixed: expected at least one bound with from < to")]
+    NothingFree,
+    /// A filter cannot lie where its bounds are.
+    #[error("search.bounds.{key} starts at {from_hz} Hz: expected below half the sample rate, {half_rate_hz} Hz")]
+    AboveHalfRate { key: &'static str, from_hz: f64, half_rate_hz: f64 },
+    /// A setting is out of its range.
+    #[error("{key} = {found}: expected {expected}")]
+    Setting { key: &'static str, found: f64, expected: &'static str },
+    /// No start could be brought to a stable loop.
+    #[error(
+        "none of {starts} starts could be brought to a stable loop within the bounds; lower the gains' lower bounds"
+    )]
+    NoStableLoop { starts: usize },
+}
+
+/// Rounds of back-off: each removes the whole difference between quick and exact figures, to second order.
+const BACK_OFFS: usize = 5;
+/// Violations within this share of the largest belong to the same conflict.
+const SAME_MISS: f64 = 0.02;
+/// Room given to a relaxed limit, as a share of it: more than the polish leaves, far less than anybody can measure.
+const ROOM: f64 = 1e-4;
+/// Distance from a bound (ln) that counts as on it.
+const ON_BOUND: f64 = 1e-3;
+
+/// Tunes one machine. See [`tune_jointly`].
+pub fn tune(
+    machine: &Machine<'_>,
+    spec: &Spec,
+    start: Option<&Controller>,
+    settings: &TuneSettings,
+) -> Result<Outcome, TuneError> {
+    tune_jointly(std::slice::from_ref(machine), spec, start, settings)
+}
+
+/// One controller for all machines: the worst machine's DFT is made smallest, every limit holds on every machine.
+pub fn tune_jointly(
+    machines: &[Machine<'_>],
+    spec: &Spec,
+    start: Option<&Controller>,
+    settings: &TuneSettings,
+) -> Result<Outcome, TuneError> {
+    let parameters = check(machines, spec, start, settings)?;
+    let mut bench = Bench::new(machines, spec, parameters)?;
+    let effort =
+        Effort { starts: settings.starts, simplex_steps: settings.simplex_steps, polish_steps: settings.polish_steps };
+    let best = search(&bench, spec.margins.gain_crossover_hz, start.is_some(), spec.search.seed, &effort)
+        .filter(|b| b.score.violation < UNSTABLE)
+        .ok_or(TuneError::NoStableLoop { starts: settings.starts })?;
+    let before = start.map(|c| proofs(machines, c, spec)).transpose()?;
+    let mut ending = Ending { machines, spec, route: machines[0].route(), best, back_offs: 0 };
+    let after = ending.settle(&mut bench, settings.polish_steps)?;
+    let controller = bench.parameters.controller(&ending.best.x);
+    let at_bounds = at_bounds(&bench, &ending.best.x);
+    let work = ending.work();
+    if after.iter().all(|p| p.judged.passes()) {
+        return Ok(Outcome::Tuned(Tuned { controller, before, after, at_bounds, work }));
+    }
+    let share = after.iter().map(|p| p.judged.worst()).fold(0.0, f64::max);
+    let relaxed = relaxed_spec(&bench.wanted, &after, share);
+    let conflicts = relaxed.iter().filter_map(|(_, limit)| *limit).collect();
+    // Confirmation: the same polish against the relaxed limits, from the compromise, judged exactly.
+    let wanted: Vec<Requirement> = relaxed.iter().map(|(r, _)| *r).collect();
+    bench.wanted = wanted.clone();
+    let confirmed = ending
+        .settle(&mut bench, settings.polish_steps)?
+        .iter()
+        .all(|p| super::Judged::of(&wanted, p.judged.found.clone()).passes());
+    Ok(Outcome::Infeasible(Infeasible { controller, before, after, conflicts, share, confirmed, at_bounds, work }))
+}
+
+fn check(
+    machines: &[Machine<'_>],
+    spec: &Spec,
+    start: Option<&Controller>,
+    settings: &TuneSettings,
+) -> Result<Parameters, TuneError> {
+    spec.check()?;
+    if machines.is_empty() {
+        return Err(TuneError::NoMachine);
+    }
+    if settings.starts == 0 {
+        return Err(TuneError::Setting { key: "starts", found: 0.0, expected: "at least 1" });
+    }
+    let t = start.map_or(settings.sample_time_s, |c| c.sample_time_s);
+    if !(t.is_finite() && t > 0.0) {
+        return Err(TuneError::Setting { key: "sample_time_s", found: t, expected: "a finite time above 0 s" });
+    }
+    if let Some(c) = start {
+        c.check()?;
+    }
+    let half_rate_hz = 0.5 / t;
+    let b = &spec.search.bounds;
+    for (key, used, [from_hz, _]) in
+        [("lowpass_hz", spec.search.lowpasses > 0, b.lowpass_hz), ("notch_hz", spec.search.notches > 0, b.notch_hz)]
+    {
+        if used && from_hz >= 0.99 * half_rate_hz {
+            return Err(TuneError::AboveHalfRate { key, from_hz, half_rate_hz });
+        }
+    }
+    let parameters = Parameters::of(spec, start, t);
+    if parameters.free().is_empty() {
+        return Err(TuneError::NothingFree);
+    }
+    Ok(parameters)
+}
+
+fn proofs(machines: &[Machine<'_>], c: &Controller, spec: &Spec) -> Result<Vec<Proof>, TuneError> {
+    machines.iter().map(|m| judge(m, c, spec)).collect()
+}
+
+/// The end of a tuning: the best candidate until the exact judgement agrees with it.
+struct Ending<'a> {
+    machines: &'a [Machine<'a>],
+    spec: &'a Spec,
+    route: super::Route,
+    best: Best,
+    back_offs: usize,
+}
+
+impl Ending<'_> {
+    /// Judges exactly; where the exact figure misses a limit that the grid's figure met, aims inside by the difference.
+    fn settle(&mut self, bench: &mut Bench, steps: usize) -> Result<Vec<Proof>, TuneError> {
+        let mut inside = vec![vec![0.0; bench.wanted.len()]; bench.machines.len()];
+        bench.aim(&inside);
+        let mut desk = bench.desk();
+        for round in 0..=BACK_OFFS {
+            let controller = bench.parameters.controller(&self.best.x);
+            let exact = proofs(self.machines, &controller, self.spec)?;
+            self.best.score = bench.score(&self.best.x, &mut desk);
+            let mut moved = false;
+            for ((proof, s), inside) in exact.iter().zip(&desk.scores).zip(&mut inside) {
+                let (mut a, mut b) = (0, 0);
+                for (w, inside) in bench.wanted.iter().zip(inside) {
+                    let quick = w.violation_of(&s.found, &mut a);
+                    let violation = w.violation_of(&proof.judged.found, &mut b);
+                    // A miss that the grid sees as well is a conflict, not an error of the grid.
+                    if violation > 0.0 && (violation - quick).abs() > 1e-12 && quick + *inside <= 1e-6 {
+                        *inside += 1.2 * (violation - quick).max(0.0) + violation;
+                        moved = true;
+                    }
+                }
+            }
+            if !moved || round == BACK_OFFS {
+                self.best.evaluations += desk.evaluations;
+                return Ok(exact);
+            }
+            self.back_offs += 1;
+            bench.aim(&inside);
+            if let Some(p) = refine(bench, &self.best.x, steps, &mut desk) {
+                self.best.x = p.x;
+            }
+        }
+        Ok(Vec::new())
+    }
+
+    fn work(&self) -> Work {
+        Work {
+            route: self.route,
+            starts: self.best.starts,
+            evaluations: self.best.evaluations,
+            feasible_starts: self.best.feasible_starts,
+            back_offs: self.back_offs,
+        }
+    }
+}
+
+fn at_bounds(bench: &Bench, x: &[f64]) -> Vec<AtBound> {
+    let p = bench.parameters();
+    let on = |((parameter, [from, to]), x): ((&super::Parameter, &[f64; 2]), &f64)| {
+        let (lower, upper) = (x - from < ON_BOUND, to - x < ON_BOUND);
+        (lower || upper).then(|| AtBound { parameter: *parameter, value: x.exp(), upper })
+    };
+    p.free().iter().zip(p.bounds()).zip(x).filter_map(on).collect()
+}
+
+/// Every limit, moved so far that the compromise meets it on every machine; the second is there where it is in conflict.
+fn relaxed_spec(wanted: &[Requirement], after: &[Proof], share: f64) -> Vec<(Requirement, Option<RelaxedLimit>)> {
+    let relax = |(i, w): (usize, &Requirement)| {
+        let worst = after.iter().map(|p| p.judged.limits[i]).max_by(|a, b| a.violation.total_cmp(&b.violation));
+        let Some(worst) = worst.filter(|l| l.violation > 0.0) else { return (*w, None) };
+        let limit = match (worst.found, w.side) {
+            (Some(x), Side::AtLeast) => (x * (1.0 - ROOM)).max(f64::MIN_POSITIVE),
+            (Some(x), Side::AtMost) => x * (1.0 + ROOM),
+            (None, _) => w.limit,
+        };
+        let missed_by = worst.slack.map(|s| (-s).max(0.0));
+        let relaxed = RelaxedLimit {
+            what: w.what,
+            side: w.side,
+            limit: w.limit,
+            found: worst.found,
+            missed_by,
+            feasible_limit: limit,
+        };
+        let named = worst.violation >= (1.0 - SAME_MISS) * share;
+        (Requirement { limit, ..*w }, named.then_some(relaxed))
+    };
+    wanted.iter().enumerate().map(relax).collect()
+}

@@ -1,0 +1,72 @@
+//! The machine and the spec that the tuning tests share.
+#![allow(dead_code)]
+
+use servotune::controller::{Controller, Lowpass, Notch, Pid};
+use servotune::lti::{Body, Mode, Plant};
+use servotune::pes::{Noise, PesClock, Profile, Spiral};
+use servotune::tune::{Limits, MarginLimits, Search, Spec};
+
+/// The body of the paper's eq. (20), its delay, its first mode and two above it.
+pub fn paper_plant() -> Plant {
+    let mode = |zero_rad_s: f64, zero_damping_ratio: f64, pole_rad_s: f64, pole_damping_ratio: f64| Mode {
+        zero_rad_s,
+        zero_damping_ratio,
+        pole_rad_s,
+        pole_damping_ratio,
+    };
+    Plant {
+        position_unit: "track".into(),
+        command_unit: "V".into(),
+        body: Body::SecondOrder { dc_gain: 75.0, natural_frequency_rad_s: 369.0, damping_ratio: 0.22 },
+        delay_s: 65e-6,
+        resonance_gain: 1.0,
+        modes: vec![
+            mode(7483.0, 0.038, 7681.0, 0.037),
+            mode(14_200.0, 0.03, 13_500.0, 0.025),
+            mode(27_500.0, 0.02, 26_400.0, 0.02),
+        ],
+        physics: vec![],
+    }
+}
+
+/// The write of the paper's window, with noise.
+pub fn paper_profile() -> Profile {
+    Profile {
+        spiral: Spiral { velocity: 350.0, distance: 15.0, acceleration_time_s: 2e-3, start_s: 8e-3, duration_s: 0.06 },
+        pes: PesClock { sample_rate_hz: 27_480.0, window: [200, 400] },
+        noise: Noise {
+            encoder_rms: 0.003,
+            windage_rms: 2e-4,
+            windage_corner_hz: 60.0,
+            spindle_hz: 120.0,
+            runout: vec![],
+            seed: 1,
+        },
+    }
+}
+
+pub fn paper_spec() -> Spec {
+    Spec {
+        profile: paper_profile(),
+        margins: MarginLimits {
+            phase_margin_deg: Some(35.0),
+            gain_margin_db: Some(5.0),
+            max_sensitivity: Some(2.2),
+            gain_crossover_hz: Some([400.0, 900.0]),
+        },
+        limits: Limits { dft_low: Some(0.02), dft_high: Some(0.02), harmonics: vec![], command_peak: Some(2.0) },
+        search: Search { seed: 1, notches: 1, lowpasses: 1, bounds: Default::default() },
+    }
+}
+
+/// The controller of the contract's example.
+pub fn start_controller() -> Controller {
+    Controller {
+        sample_time_s: 39.6e-6,
+        output_limit: Some(10.0),
+        pid: Pid { kp: 0.27, ki_per_s: 60.0, kd_s: 3.7e-4, derivative_filter_s: 12e-6 },
+        lowpass: vec![Lowpass { frequency_hz: 7000.0, damping_ratio: 0.7 }],
+        notch: vec![Notch { frequency_hz: 1222.0, zero_damping_ratio: 0.05, pole_damping_ratio: 0.25 }],
+        feedforward: None,
+    }
+}
