@@ -41,6 +41,7 @@ pub mod numeric;
 
 pub mod frf;
 pub mod lti;
+pub mod recording;
 
 pub mod controller;
 

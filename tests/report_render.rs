@@ -120,6 +120,7 @@ fn figures() -> Vec<(&'static str, Figure)> {
     let hz: Vec<f64> = (1..=40).map(|k| f64::from(k) * rate / 200.0).collect();
     let (dft_before, dft_after) = (dft(&before), dft(&after));
     let bars = SpectrumBars {
+        names: ["before", "after"],
         frequency_hz: &hz,
         before: Some(&dft_before),
         after: &dft_after,

@@ -20,10 +20,21 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
+    Demo(DemoArguments),
     Identify(Box<IdentifyArguments>),
     Margins(Box<MarginsArguments>),
     Simulate(SimulateArguments),
+    Tune(Box<TuneArguments>),
     Study(StudyArguments),
+}
+
+/// The whole chain on a built-in machine: sweep, identification, tuning, gain table, report
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  servotune demo --out demo")]
+pub(super) struct DemoArguments {
+    /// Folder to write to
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 /// Swept-sine file to plant model
@@ -88,6 +99,51 @@ pub(super) struct SimulateArguments {
     pub record: Option<PathBuf>,
 }
 
+/// Search PID, low-pass and notch gains that meet the limits of a spec
+#[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("machine").required(true))]
+#[command(after_help = "Examples:
+  servotune tune --plant specs/machines/tunable.toml --spec specs/limits/paper.toml --controller specs/controllers/nominal.toml --out gains.toml
+  servotune tune --frf slot07.bod --spec specs/limits/paper.toml --out gains.toml --report slot07.html
+
+With --frf the search runs straight on the measured response; the report then also tunes over an identified model and compares.")]
+pub(super) struct TuneArguments {
+    /// Plant model (plant.toml)
+    #[arg(long, value_name = "PLANT", group = "machine")]
+    pub plant: Option<PathBuf>,
+    /// Swept-sine file, tuned on directly
+    #[arg(long, value_name = "FRF", group = "machine")]
+    pub frf: Option<PathBuf>,
+    /// The sweep was taken through the controller's own hold, which is then not applied again
+    #[arg(long, requires = "frf")]
+    pub hold_included: bool,
+    /// Limits, bounds and write (spec.toml)
+    #[arg(long, value_name = "SPEC")]
+    pub spec: PathBuf,
+    /// Controller to start from and to compare with (controller.toml or gains.toml)
+    #[arg(long, value_name = "START")]
+    pub controller: Option<PathBuf>,
+    /// Gain table to write
+    #[arg(long, value_name = "GAINS")]
+    pub out: PathBuf,
+    /// Report to write, one HTML file
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// Write the best compromise even where the limits are not met
+    #[arg(long)]
+    pub keep_infeasible: bool,
+    /// Sample time where no start controller gives one (s)
+    #[arg(long, value_name = "SECONDS", default_value_t = 39.6e-6)]
+    pub sample_time_s: f64,
+    /// Starts of the search
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    pub starts: usize,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
+    #[command(flatten)]
+    pub model: ModelArguments,
+}
+
 /// Makes a table or picture of results/ again
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  servotune study classes --out results")]
@@ -108,4 +164,14 @@ pub(super) struct StudyArguments {
 pub(super) enum StudyName {
     /// The four machine classes under one controller (figures 16-22)
     Classes,
+    /// The ladder of Table 1 and figures 6, 9, 12-14
+    Ladder,
+    /// 200 random plants of order 22: response, frequency and margin errors
+    Plants,
+    /// The nine measured responses of a fast steering mirror
+    Mirror,
+    /// The motor bench with flexible coupling, measured
+    Motor,
+    /// The nine cases of the public HDD benchmark plant
+    Hdd,
 }

@@ -3,12 +3,14 @@
 use crate::controller::ControllerError;
 use crate::document::DocumentError;
 use crate::feedback::FeedbackError;
-use crate::frf::FrfError;
+use crate::frf::{FrfError, FrfShapeError};
 use crate::identify::IdentifyError;
 use crate::lti::LtiError;
 use crate::pes::{PesError, ProfileError};
 use crate::report::ReportError;
 use crate::study::StudyError;
+use crate::tune::{GainTableError, TuneError};
+use crate::twin::TwinError;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -40,6 +42,16 @@ pub enum Failure {
     Lti(#[from] LtiError),
     #[error(transparent)]
     Report(#[from] ReportError),
+    #[error(transparent)]
+    Tune(#[from] TuneError),
+    #[error(transparent)]
+    GainTable(#[from] GainTableError),
+    #[error("no machine: expected --plant PLANT or --frf FRF")]
+    NoMachine,
+    #[error(transparent)]
+    Twin(#[from] TwinError),
+    #[error(transparent)]
+    Sweep(#[from] FrfShapeError),
     #[error(transparent)]
     Study(#[from] StudyError),
     /// Two algorithms that share no code disagree: no answer can be trusted.

@@ -7,6 +7,7 @@ use crate::document::{parse_toml, read_text};
 use crate::frf::{Sweep, read_file};
 use crate::lti::{Plant, PlantFile};
 use crate::pes::Profile;
+use crate::tune::GainTable;
 use std::path::Path;
 
 /// A plant. `command` names who asks: effects beyond linear are refused by name.
@@ -19,9 +20,14 @@ pub(super) fn plant(file: &Path, command: &'static str) -> Result<Plant, Failure
     }
 }
 
-/// A controller.
+/// A controller, from controller.toml or from the gain table that holds one.
 pub(super) fn controller(file: &Path) -> Result<Controller, Failure> {
-    let controller: Controller = parse_toml(file, &read_text(file)?)?;
+    let text = read_text(file)?;
+    // Only a gain table carries the sections that the firmware runs.
+    if text.lines().any(|l| l.trim_start().starts_with("[[section]]")) {
+        return Ok(GainTable::parse(file, &text)?.controller());
+    }
+    let controller: Controller = parse_toml(file, &text)?;
     controller.check().map_err(|source| Failure::Controller { file: file.into(), source })?;
     Ok(controller)
 }

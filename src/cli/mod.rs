@@ -4,14 +4,17 @@
 //! 1 (done, something was rejected) or 2 (could not do it). Commands: `specs/files.md` and `servotune --help`.
 
 mod arguments;
+mod demo;
 mod failure;
 mod identify;
 mod load;
 mod margins;
 mod screen;
 mod simulate;
+mod slot;
 mod study;
 mod sweep_arguments;
+mod tune;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -40,9 +43,11 @@ pub fn main() -> ExitCode {
     };
     let mut screen = Screen::new(arguments.json);
     let ending = match arguments.command {
+        Command::Demo(a) => demo::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),
         Command::Simulate(a) => simulate::run(&a, &mut screen),
+        Command::Tune(a) => tune::run(&a, &mut screen),
         Command::Study(a) => study::run(&a, &mut screen),
     };
     match ending {

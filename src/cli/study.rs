@@ -14,6 +14,11 @@ struct Written {
 pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     let made = match a.study {
         StudyName::Classes => study::classes()?,
+        StudyName::Ladder => study::ladder()?,
+        StudyName::Plants => study::plants()?,
+        StudyName::Mirror => study::mirror(&a.data)?,
+        StudyName::Motor => study::motor(&a.data)?,
+        StudyName::Hdd => study::hdd(&a.data)?,
     };
     let mut written = Written { files: Vec::new() };
     for (name, content) in &made.files {

@@ -124,10 +124,10 @@ pub(super) struct ModelArguments {
     band_hz: Option<(f64, f64)>,
     /// Unit of position for the plant file
     #[arg(long, value_name = "WORD", default_value = "track")]
-    position_unit: String,
+    pub position_unit: String,
     /// Unit of the command for the plant file
     #[arg(long, value_name = "WORD", default_value = "V")]
-    command_unit: String,
+    pub command_unit: String,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -31,5 +31,5 @@ pub use measured::{Interval, MarginIntervals, MeasuredLoop, MeasuredMargins, hol
 pub use nyquist::{NyquistCount, nyquist_count};
 pub use open_loop::{FeedbackError, ModelLoop, OpenLoop, angle_from_rest};
 pub use poles::closed_loop_poles;
-pub use sampled::{Event, LoopOnGrid, QuickMargins, SampledPlant};
+pub use sampled::{Event, GRAZE, Graze, LoopOnGrid, QuickMargins, SampledPlant};
 pub use trace::Trace;

@@ -10,6 +10,11 @@ use crate::lti::{DiscretePlant, FrequencyResponse, Section, Sections};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
+/// Phase crossings this much (ln|L|²) beyond the smallest gain margin are read: 6.5 dB, several times what a step changes.
+const NEARLY: f64 = 1.5;
+/// Dips of |1 + L|² up to this factor above the lowest are read: twice the lowest distance.
+const DEEP: f64 = 4.0;
+
 /// Numbers handled side by side.
 const LANES: usize = 4;
 
@@ -29,6 +34,8 @@ pub struct SampledPlant {
     sin: Vec<[f64; LANES]>,
     cos2: Vec<[f64; LANES]>,
     sin2: Vec<[f64; LANES]>,
+    /// (1 - z⁻¹)^m for m of the plant alone and for one more in the chain.
+    lift: [[Vec<[f64; LANES]>; 2]; 2],
 }
 
 /// The open loop on the grid of one plant, and what was read off it. Made once, used for every candidate.
@@ -42,6 +49,10 @@ pub struct LoopOnGrid {
     gain: Vec<f64>,
     /// |1 + L|².
     distance: Vec<f64>,
+    /// (1 + L)(1 - z⁻¹)^m, whose turns are counted.
+    lifted: [Vec<f64>; 2],
+    /// Candidates for phase crossings: point before, ln|L|² there.
+    passes: Vec<(usize, f64)>,
     /// What was read off.
     pub quick: QuickMargins,
 }
@@ -59,6 +70,18 @@ pub struct Event {
     pub slope: Complex<f64>,
 }
 
+/// An extremum of |L| near 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Graze {
+    /// The extremum; value: the phase margin that a crossing there would have (deg).
+    pub event: Event,
+    /// Whether |L| comes down to 1 there, rather than up to it.
+    pub minimum: bool,
+}
+
+/// Extrema of |L| within this of 1 (ln) are grazes: far more than the grid's error, far less than anybody can measure.
+pub const GRAZE: f64 = 0.01;
+
 /// Margins read off the grid.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct QuickMargins {
@@ -66,9 +89,11 @@ pub struct QuickMargins {
     pub unstable_poles: i64,
     /// |L| = 1, value: phase margin (deg).
     pub gain_crossings: Vec<Event>,
-    /// L real and negative, value: gain margin (dB).
+    /// L real and negative, those near the smallest gain margin; value: gain margin (dB).
     pub phase_crossings: Vec<Event>,
-    /// Local minima of |1 + L| below 1 and the lowest of all, value: |1 + L|.
+    /// Extrema of |L| so near to 1 that a finer grid may see crossings there; value: phase margin (deg).
+    pub grazes: Vec<Graze>,
+    /// Local minima of |1 + L| up to twice the lowest, value: |1 + L|.
     pub dips: Vec<Event>,
     /// Largest |L|, for loops that never reach 1.
     pub largest_gain: f64,
@@ -102,10 +127,11 @@ impl SampledPlant {
     /// A model on a grid that resolves its modes: the grid of the exact margins, filled up where filters may come to lie.
     pub fn of_model(plant: &DiscretePlant) -> SampledPlant {
         let none = Sections { chain: vec![], sample_time_s: plant.sample_time_s() };
+        let near_mode = |x: f64| plant.terms().iter().any(|p| (x - p.im).abs() < 4.0 * p.re.abs());
         let mut w = Vec::new();
         let mut last = 0.0;
         for x in frequency_grid(plant.terms(), &none) {
-            if last > TAU * 20.0 && x > STEP * last {
+            if last > TAU * 20.0 && (x > STEP * last || near_mode(0.5 * (last + x))) {
                 w.push((last * x).sqrt());
             }
             // Far below any crossover a loop needs few points; its integrators draw a straight line there.
@@ -126,6 +152,8 @@ impl SampledPlant {
             (0..points.div_ceil(LANES)).map(|c| std::array::from_fn(|lane| at(c, lane))).collect()
         };
         let angle = |i: usize| w[i] * sample_time_s;
+        let power = |i: usize, m: usize| (Complex::new(1.0, 0.0) - Complex::from_polar(1.0, -angle(i))).powu(m as u32);
+        let lift = [integrators, integrators + 1].map(|m| [lanes(&|i| power(i, m).re), lanes(&|i| power(i, m).im)]);
         SampledPlant {
             sample_time_s,
             integrators,
@@ -136,6 +164,7 @@ impl SampledPlant {
             sin: lanes(&|i| angle(i).sin()),
             cos2: lanes(&|i| (2.0 * angle(i)).cos()),
             sin2: lanes(&|i| (2.0 * angle(i)).sin()),
+            lift,
             ln_w: w.iter().map(|w| w.ln()).collect(),
             w,
         }
@@ -197,28 +226,39 @@ impl SampledPlant {
         quick.gain_crossings.clear();
         quick.phase_crossings.clear();
         quick.dips.clear();
+        quick.grazes.clear();
+        let mut passes = std::mem::take(&mut on.passes);
+        passes.clear();
         let (re, im, gain, distance) = (&on.re[..n], &on.im[..n], &on.gain[..n], &on.distance[..n]);
         quick.largest_gain = gain.iter().copied().fold(0.0, f64::max).sqrt();
-        let (mut lowest, mut lowest_at) = (f64::INFINITY, 0);
-        for i in 0..n {
-            if distance[i] < lowest {
-                (lowest, lowest_at) = (distance[i], i);
+        let lowest = distance.iter().copied().fold(f64::INFINITY, f64::min);
+        for i in 0..n - 1 {
+            if (gain[i] < 1.0) != (gain[i + 1] < 1.0) {
+                quick.gain_crossings.push(self.gain_event(on, i));
             }
-            if i + 1 < n {
-                if (gain[i] < 1.0) != (gain[i + 1] < 1.0) {
-                    quick.gain_crossings.push(self.gain_event(on, i));
-                }
-                if (im[i] < 0.0) != (im[i + 1] < 0.0) && crossing_side(re[i], im[i], re[i + 1], im[i + 1]) < 0.0 {
-                    quick.phase_crossings.extend(self.phase_event(on, i));
-                }
+            if (im[i] < 0.0) != (im[i + 1] < 0.0) && crossing_side(re[i], im[i], re[i + 1], im[i + 1]) < 0.0 {
+                passes.push((i, gain[i].ln()));
             }
         }
+        // Only crossings that may be the worst, or nearly, are worth their interpolation.
+        let least = passes.iter().map(|(_, g)| g.abs()).fold(f64::INFINITY, f64::min);
+        for (i, _) in passes.iter().filter(|(_, g)| g.abs() <= least + NEARLY) {
+            quick.phase_crossings.extend(self.phase_event(on, *i));
+        }
         for i in 1..n.saturating_sub(1) {
+            if (gain[i] - 1.0).abs() < 2.0 * GRAZE + 0.05 && (gain[i] < gain[i - 1]) == (gain[i] < gain[i + 1]) {
+                let event = self.gain_extremum(on, i, gain[i] < gain[i - 1]);
+                if event.l.norm().ln().abs() < GRAZE {
+                    quick.grazes.push(Graze { event, minimum: gain[i] < gain[i - 1] });
+                }
+            }
             let low = distance[i] <= distance[i - 1] && distance[i] < distance[i + 1];
-            if low && (distance[i] < 1.0 || i == lowest_at) {
+            if low && distance[i] <= DEEP * lowest {
                 quick.dips.push(self.dip_event(on, i));
             }
         }
+        let lowest_at = distance.iter().position(|d| *d == lowest).unwrap_or(0);
+        on.passes = passes;
         if lowest_at == 0 || lowest_at + 1 == n {
             let l = Complex::new(re[lowest_at], im[lowest_at]);
             let slope = Complex::new(0.0, 0.0);
@@ -236,7 +276,7 @@ impl SampledPlant {
     }
 
     /// The Nyquist count of [`super::nyquist_count`], by crossings of the real axis instead of angles.
-    fn unstable_poles(&self, chain: &[Section], on: &LoopOnGrid) -> i64 {
+    fn unstable_poles(&self, chain: &[Section], on: &mut LoopOnGrid) -> i64 {
         let (mut m, mut outside) = (self.integrators, 0);
         for pole in chain.iter().flat_map(|s| s.poles()) {
             if (pole - 1.0).norm() < 1e-10 {
@@ -245,18 +285,28 @@ impl SampledPlant {
                 outside += 1;
             }
         }
-        let mut half_turns = 0;
-        let mut before: Option<(f64, f64)> = None;
-        let mut side = 1.0;
-        for i in 0..self.points {
-            let (c, j) = (i / LANES, i % LANES);
-            let (lift_re, lift_im) = (1.0 - self.cos[c][j], self.sin[c][j]);
-            let (mut x, mut y) = (1.0 + on.re[i], on.im[i]);
-            for _ in 0..m {
-                (x, y) = (x * lift_re - y * lift_im, x * lift_im + y * lift_re);
+        // The chain of a PID and its filters has one integrator at most.
+        let [lift_re, lift_im] = &self.lift[(m - self.integrators).min(1)];
+        let LoopOnGrid { re, im, lifted: [x, y], .. } = on;
+        x.resize(re.len(), 0.0);
+        y.resize(re.len(), 0.0);
+        let lanes = x.as_chunks_mut::<LANES>().0.iter_mut().zip(y.as_chunks_mut::<LANES>().0);
+        let l = re.as_chunks::<LANES>().0.iter().zip(im.as_chunks::<LANES>().0);
+        for (((x, y), (re, im)), (a, b)) in lanes.zip(l).zip(lift_re.iter().zip(lift_im)) {
+            for j in 0..LANES {
+                let f = 1.0 + re[j];
+                (x[j], y[j]) = (f * a[j] - im[j] * b[j], f * b[j] + im[j] * a[j]);
             }
-            visit((x, y), &mut before, &mut side, &mut half_turns);
         }
+        let (x, y) = (&x[..self.points], &y[..self.points]);
+        let mut half_turns = 0;
+        let mut side = if x[0] >= 0.0 { 1.0 } else { -1.0 };
+        for i in 1..self.points {
+            if (y[i - 1] < 0.0) != (y[i] < 0.0) {
+                visit((x[i], y[i]), &mut (x[i - 1], y[i - 1]), &mut side, &mut half_turns);
+            }
+        }
+        let mut before = (x[self.points - 1], y[self.points - 1]);
         // Beyond a sweep |L| < 1 is taken for granted: F goes over to its lifting factor and along it to half the sample rate.
         let reached = self.w[self.points - 1] * self.sample_time_s;
         if reached < PI * (1.0 - 1e-9) {
@@ -266,15 +316,22 @@ impl SampledPlant {
                 visit((lift.re, lift.im), &mut before, &mut side, &mut half_turns);
             }
         }
-        if let Some((x, y)) = before {
-            half_turns += passage(side, if x >= 0.0 { 1.0 } else { -1.0 }, y);
-        }
-        outside - half_turns
+        let (x, y) = before;
+        outside - half_turns - passage(side, if x >= 0.0 { 1.0 } else { -1.0 }, y)
     }
 
     fn gain_event(&self, on: &LoopOnGrid, i: usize) -> Event {
         let curve = self.cubic(on, i, 0.0);
         let at = curve.root(|v| v.re, self.ln_w[i], self.ln_w[i + 1]);
+        let (ln_l, slope) = curve.at(at);
+        Event { w_rad_s: at.exp(), value: wrapped(ln_l.im - PI).to_degrees(), l: ln_l.exp(), slope }
+    }
+
+    /// The extremum of |L| around point `i`; its place is a parabola's, its value the cubic's.
+    fn gain_extremum(&self, on: &LoopOnGrid, i: usize, minimum: bool) -> Event {
+        let curve = self.cubic(on, if on.gain[i - 1] < on.gain[i + 1] { i - 1 } else { i }, 0.0);
+        let sign = if minimum { 1.0 } else { -1.0 };
+        let at = curve.level(sign, self.ln_w[i - 1], self.ln_w[i + 1]).unwrap_or(self.ln_w[i]);
         let (ln_l, slope) = curve.at(at);
         Event { w_rad_s: at.exp(), value: wrapped(ln_l.im - PI).to_degrees(), l: ln_l.exp(), slope }
     }
@@ -290,16 +347,10 @@ impl SampledPlant {
     }
 
     fn dip_event(&self, on: &LoopOnGrid, i: usize) -> Event {
-        // The parabola of ln|1 + L| through three points says where, the cubic of ln(1 + L) says how low.
-        let x = [self.ln_w[i - 1], self.ln_w[i], self.ln_w[i + 1]];
-        let y = [on.distance[i - 1].ln(), on.distance[i].ln(), on.distance[i + 1].ln()];
-        let (left, right) = ((y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1]));
-        let bend = (right - left) / (x[2] - x[0]);
-        let middle = if bend > 0.0 { 0.5 * (x[0] + x[1]) - 0.5 * left / bend } else { x[1] };
-        let at = middle.clamp(x[0], x[2]);
-        let first = if at < x[1] { i - 1 } else { i };
+        // The stencil that has the dip in its middle: towards the lower neighbour.
+        let first = if on.distance[i - 1] < on.distance[i + 1] { i - 1 } else { i };
         let one_plus = self.cubic(on, first, 1.0);
-        // One Newton step on the cubic itself would need its bend; the parabola's is enough for the value.
+        let at = one_plus.level(1.0, self.ln_w[i - 1], self.ln_w[i + 1]).unwrap_or(self.ln_w[i]);
         let (ln_f, slope_f) = one_plus.at(at);
         let f = ln_f.exp();
         let l = f - 1.0;
@@ -327,17 +378,14 @@ const BEYOND: u32 = 8;
 
 /// Takes the next point of F: counts the half turn that ends where the curve meets the real axis.
 #[inline]
-fn visit((x, y): (f64, f64), before: &mut Option<(f64, f64)>, side: &mut f64, half_turns: &mut i64) {
-    match *before {
-        None => *side = if x >= 0.0 { 1.0 } else { -1.0 },
-        Some((bx, by)) if (by < 0.0) != (y < 0.0) => {
-            let now = crossing_side(bx, by, x, y);
-            *half_turns += passage(*side, now, by);
-            *side = now;
-        }
-        Some(_) => {}
+fn visit((x, y): (f64, f64), before: &mut (f64, f64), side: &mut f64, half_turns: &mut i64) {
+    let (bx, by) = *before;
+    if (by < 0.0) != (y < 0.0) {
+        let now = crossing_side(bx, by, x, y);
+        *half_turns += passage(*side, now, by);
+        *side = now;
     }
-    *before = Some((x, y));
+    *before = (x, y);
 }
 
 /// Half turns of a piece of curve between two visits of the real axis, within the half-plane of `im`.

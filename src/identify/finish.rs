@@ -49,8 +49,11 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
         None => flat(&sweep),
     };
     let weight = match &sweep.relative_std {
-        // The file's deviation is that of the complex value: each part has 1/√2 of it.
-        Some(s) => s.iter().map(|s| std::f64::consts::SQRT_2 / s).collect(),
+        // While modes are missing, their absence is the larger error: the deviations are levelled by their median.
+        Some(s) => {
+            let middle = median(s);
+            s.iter().map(|s| std::f64::consts::SQRT_2 / s.hypot(middle)).collect()
+        }
         None => vec![1.0; n],
     };
     let target = sweep.value.iter().map(|v| v * start.sign).collect();
@@ -59,10 +62,11 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
     let (stages, last) = growth::grow(&mut joint, &start, settings);
     let (chosen, held_out) = choose(&stages, last, joint.weight[0]);
     let Stage { mut shape, mut x, .. } = stages[chosen].clone();
-    if sweep.relative_std.is_none() {
-        let local = local_noise(&joint.ratio(shape, &x));
-        joint.weight = local.iter().map(|s| 1.0 / s).collect();
-    }
+    joint.weight = match &sweep.relative_std {
+        // The file's deviation is that of the complex value: each part has 1/√2 of it.
+        Some(s) => s.iter().map(|s| std::f64::consts::SQRT_2 / s).collect(),
+        None => local_noise(&joint.ratio(shape, &x)).iter().map(|s| 1.0 / s).collect(),
+    };
     let mut out = joint.refine(shape, &mut x, LAST_STEPS, LAST_TOLERANCE);
     let body = settle_body(&mut joint, settings, &mut shape, &mut x, &mut out);
     sort_modes(shape, &mut x);

@@ -67,7 +67,8 @@ impl Joint<'_> {
         out
     }
 
-    /// Factorises the Jacobian at `x` into the workspace and returns the weighted residuals there.
+    /// Factorises the Jacobian at `x` into the workspace and returns the weighted residuals there. Parameters on a bound
+    /// count as known.
     pub fn linearise(&mut self, shape: Shape, x: &[f64]) -> Vec<f64> {
         use crate::numeric::levenberg::Residuals;
         let fit = LogFit { shape, w: &self.sweep.w, target: &self.target, weight: &self.weight, ranges: self.ranges };
@@ -75,7 +76,15 @@ impl Joint<'_> {
         let (rows, cols) = (problem.rows(), problem.cols());
         let mut r = vec![0.0; rows];
         problem.evaluate(x, &mut r);
-        self.memory.qr.factor(rows, cols, |j| problem.jacobian(x, j));
+        self.memory.qr.factor(rows, cols, |j| {
+            problem.jacobian(x, j);
+            for (i, column) in j.chunks_exact_mut(rows).enumerate() {
+                let l = problem.limit(i);
+                if x[i] <= l.low || x[i] >= l.high {
+                    column.fill(0.0);
+                }
+            }
+        });
         self.work.jacobians += 1;
         self.work.evaluations += 1;
         r

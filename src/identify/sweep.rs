@@ -14,7 +14,7 @@ pub(super) struct Sweep {
     pub w: Vec<f64>,
     /// Response without the hold.
     pub value: Vec<Complex<f64>>,
-    /// Relative standard deviations from the file, floored; `None` where the file has none.
+    /// Relative standard deviations from the file, smoothed and floored; `None` where the file has none.
     pub relative_std: Option<Vec<f64>>,
 }
 
@@ -47,6 +47,9 @@ pub(super) fn points_needed(modes: usize) -> usize {
     4 * (modes + 1)
 }
 
+/// Deviations from a few repeats scatter themselves, and the smallest ones would rule the fit: running median over this
+/// many points on each side.
+const HALF_WINDOW: usize = 5;
 /// Relative deviations below this share of their median are raised to it: a file's zero would be an infinite weight.
 const LEAST_SHARE: f64 = 0.05;
 
@@ -92,7 +95,8 @@ impl Sweep {
         let relative_std = frf.relative_std().and_then(|s| {
             let s = &s[first..=last];
             let middle = median(s);
-            (middle > 0.0).then(|| s.iter().map(|v| v.max(LEAST_SHARE * middle)).collect())
+            let around = |i: usize| median(&s[i.saturating_sub(HALF_WINDOW)..(i + HALF_WINDOW + 1).min(s.len())]);
+            (middle > 0.0).then(|| (0..s.len()).map(|i| around(i).max(LEAST_SHARE * middle)).collect())
         });
         Ok(Sweep { w, value, relative_std })
     }

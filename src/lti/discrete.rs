@@ -66,7 +66,11 @@ impl DiscretePlant {
             let expected = "a finite time above 0 s";
             return Err(LtiError::Range { key: "sample_time_s".into(), found: sample_time_s, expected });
         }
-        let modal = ModalForm::of(plant)?;
+        DiscretePlant::of_modal(&ModalForm::of(plant)?, sample_time_s)
+    }
+
+    /// Samples a sum of modes at `sample_time_s` (s, above 0).
+    pub fn of_modal(modal: &ModalForm, sample_time_s: f64) -> Result<DiscretePlant, LtiError> {
         let samples = modal.delay_s / sample_time_s;
         if samples > DELAY_LIMIT as f64 {
             let delay_s = modal.delay_s;

@@ -17,4 +17,4 @@ pub use plant::{Body, LtiError, Mode, PhysicsEntry, Plant};
 pub use plant_file::PlantFile;
 pub use response::FrequencyResponse;
 pub use section::{Section, SectionError, Sections};
-pub use state::PlantState;
+pub use state::{PlantNumbers, PlantState};

@@ -97,3 +97,43 @@ impl PlantState {
         }
     }
 }
+
+/// The numbers of a sampled plant and of one reading, for kernels that lay them out in their own way.
+#[derive(Clone, Copy, Debug)]
+pub struct PlantNumbers<'a> {
+    /// Transition of every term: real and imaginary part.
+    pub lambda: [&'a [f64]; 2],
+    /// Input gain of u[k-D]: real and imaginary part.
+    pub now: [&'a [f64]; 2],
+    /// Input gain of u[k-D-1].
+    pub before: [&'a [f64]; 2],
+    /// Whole samples of delay, D.
+    pub whole: usize,
+    /// Whether a double integrator stands beside the terms.
+    pub rigid: bool,
+}
+
+impl DiscretePlant {
+    /// The plant's numbers.
+    pub fn numbers(&self) -> PlantNumbers<'_> {
+        PlantNumbers {
+            lambda: [&self.lambda_re, &self.lambda_im],
+            now: [&self.now_re, &self.now_im],
+            before: [&self.before_re, &self.before_im],
+            whole: self.whole,
+            rigid: self.rigid2 != 0.0,
+        }
+    }
+}
+
+impl Intersample {
+    /// Propagation of the real and the imaginary state parts.
+    pub fn states(&self) -> [&[f64]; 2] {
+        [&self.re, &self.im]
+    }
+
+    /// Gains of u[k-D] and u[k-D-1].
+    pub fn inputs(&self) -> [f64; 2] {
+        [self.now, self.before]
+    }
+}

@@ -52,23 +52,21 @@ impl Qr {
             column.iter_mut().for_each(|v| *v *= inverse);
             self.scale.push(length);
         }
-        for k in 0..cols.min(rows) {
-            let (head, tail) = self.a.split_at_mut((k + 1) * rows);
-            let v = &mut head[k * rows + k..];
-            let norm = dot(v, v).sqrt();
-            if norm == 0.0 {
-                self.diagonal.push(0.0);
-                continue;
+        let mut k = 0;
+        // Four reflections at a time go over the columns behind them, which then travel through memory once, not four times.
+        while k + PANEL < cols.min(rows) && k + 2 * PANEL < rows {
+            let (panel, tail) = self.a[k * rows..].split_at_mut(PANEL * rows);
+            for i in 0..PANEL {
+                self.diagonal.push(make_reflection(panel, rows, k + i, i));
             }
-            let beta = if v[0] > 0.0 { -norm } else { norm };
-            v[0] -= beta;
-            // Scaled so that the reflection is I - v vᵀ: one multiplication less in the loop below.
-            let factor = 1.0 / (-beta * v[0]).sqrt();
-            v.iter_mut().for_each(|x| *x *= factor);
-            self.diagonal.push(beta);
+            let four = Panel::new(panel, rows, k, &self.diagonal[k..]);
             for column in tail.chunks_exact_mut(rows) {
-                reflect(v, &mut column[k..]);
+                four.apply(&mut column[k..]);
             }
+            k += PANEL;
+        }
+        for k in k..cols.min(rows) {
+            self.diagonal.push(make_reflection(&mut self.a[k * rows..], rows, k, 0));
         }
     }
 
@@ -134,10 +132,12 @@ impl Qr {
         out
     }
 
-    /// Ratio of the largest to the smallest singular value of the scaled matrix; infinite when it has no full rank.
+    /// Ratio of the largest to the smallest singular value of the scaled matrix without its zero columns; infinite when
+    /// those that are left have no full rank.
     pub fn condition(&self) -> f64 {
-        let n = self.cols;
-        let r = DMatrix::from_fn(n, n, |i, j| if i <= j { self.r(i, j) } else { 0.0 });
+        let kept: Vec<usize> = (0..self.cols).filter(|&j| self.diagonal[j] != 0.0).collect();
+        let (rows, n) = (self.cols, kept.len());
+        let r = DMatrix::from_fn(rows, n, |i, j| if i <= kept[j] { self.r(i, kept[j]) } else { 0.0 });
         let s = r.singular_values();
         if n == 0 { 1.0 } else { s.max() / s.min() }
     }
@@ -149,6 +149,93 @@ impl Qr {
         self.back_substitute(&mut x);
         x.iter_mut().zip(&self.scale).for_each(|(x, s)| *x /= s);
         x
+    }
+}
+
+/// Reflections applied together.
+const PANEL: usize = 4;
+
+/// Turns column `i` of `columns` into a Householder vector from row `k` on, applies it to the columns behind it in the
+/// slice, and returns the diagonal entry of R; 0 for a column without content, which needs no reflection.
+fn make_reflection(columns: &mut [f64], rows: usize, k: usize, i: usize) -> f64 {
+    let (head, tail) = columns.split_at_mut((i + 1) * rows);
+    let v = &mut head[i * rows + k..];
+    let norm = dot(v, v).sqrt();
+    if norm == 0.0 {
+        return 0.0;
+    }
+    let beta = if v[0] > 0.0 { -norm } else { norm };
+    v[0] -= beta;
+    // Scaled so that the reflection is I - v vᵀ: one multiplication less in every loop.
+    let factor = 1.0 / (-beta * v[0]).sqrt();
+    v.iter_mut().for_each(|x| *x *= factor);
+    for column in tail.chunks_exact_mut(rows) {
+        reflect(v, &mut column[k..]);
+    }
+    beta
+}
+
+/// Four Householder vectors as one operator: c -= Σ d_i v_i with d_i = v_i · c - Σ_(m<i) d_m v_i · v_m.
+struct Panel<'a> {
+    /// The first four rows of each vector; vector i is 0 above row i.
+    head: [[f64; PANEL]; PANEL],
+    /// The rows below.
+    tail: [&'a [f64]; PANEL],
+    /// v_i · v_m for m < i.
+    cross: [[f64; PANEL]; PANEL],
+}
+
+impl<'a> Panel<'a> {
+    fn new(columns: &'a [f64], rows: usize, k: usize, diagonal: &[f64]) -> Self {
+        let mut head = [[0.0; PANEL]; PANEL];
+        let mut tail: [&[f64]; PANEL] = [&[]; PANEL];
+        let mut cross = [[0.0; PANEL]; PANEL];
+        for i in 0..PANEL {
+            let v = &columns[i * rows + k..(i + 1) * rows];
+            // A column without content is 0 from row i on and takes no part.
+            if diagonal[i] != 0.0 {
+                head[i][i..].copy_from_slice(&v[i..PANEL]);
+            }
+            tail[i] = &v[PANEL..];
+            for m in 0..i {
+                let above: f64 = (i..PANEL).map(|l| head[i][l] * head[m][l]).sum();
+                cross[i][m] = above + dot(tail[i], tail[m]);
+            }
+        }
+        Panel { head, tail, cross }
+    }
+
+    /// Applies all four to a column from the panel's first row on.
+    #[inline]
+    fn apply(&self, column: &mut [f64]) {
+        let (top, below) = column.split_at_mut(PANEL);
+        let n = below.len();
+        let [p, q, r, s] = self.tail.map(|t| &t[..n]);
+        let whole = n - n % 4;
+        let mut sums = [[0.0; 4]; PANEL];
+        let chunks = below.chunks_exact(4).zip(p.chunks_exact(4)).zip(q.chunks_exact(4));
+        for (((c, p), q), (r, s)) in chunks.zip(r.chunks_exact(4).zip(s.chunks_exact(4))) {
+            for l in 0..4 {
+                sums[0][l] += p[l] * c[l];
+                sums[1][l] += q[l] * c[l];
+                sums[2][l] += r[l] * c[l];
+                sums[3][l] += s[l] * c[l];
+            }
+        }
+        let mut d = [0.0; PANEL];
+        for i in 0..PANEL {
+            let mut part = (sums[i][0] + sums[i][2]) + (sums[i][1] + sums[i][3]);
+            part += (whole..n).map(|l| self.tail[i][l] * below[l]).sum::<f64>();
+            part += (i..PANEL).map(|l| self.head[i][l] * top[l]).sum::<f64>();
+            part -= (0..i).map(|m| d[m] * self.cross[i][m]).sum::<f64>();
+            d[i] = part;
+        }
+        for (l, t) in top.iter_mut().enumerate() {
+            *t -= (0..=l).map(|i| d[i] * self.head[i][l]).sum::<f64>();
+        }
+        for i in 0..n {
+            below[i] -= (d[0] * p[i] + d[1] * q[i]) + (d[2] * r[i] + d[3] * s[i]);
+        }
     }
 }
 

@@ -90,7 +90,17 @@ pub fn minimise(
     let mut out = LevenbergOutcome { cost, converged: false, jacobians: 0, evaluations: 1 };
     let (mut damping, mut growth) = (1e-4, 2.0);
     while out.jacobians < settings.iterations && cost.is_finite() {
-        work.qr.factor(rows, cols, |j| problem.jacobian(x, j));
+        let r = &work.r;
+        work.qr.factor(rows, cols, |j| {
+            problem.jacobian(x, j);
+            // A parameter on its bound that would leave it stays there, and the others move as if it were known.
+            for (i, column) in j.chunks_exact_mut(rows).enumerate() {
+                let l = problem.limit(i);
+                if (x[i] <= l.low || x[i] >= l.high) && (dot(column, r) >= 0.0) == (x[i] <= l.low) {
+                    column.fill(0.0);
+                }
+            }
+        });
         out.jacobians += 1;
         work.c.clear();
         work.c.extend(work.r.iter().map(|r| -r));
@@ -100,10 +110,10 @@ pub fn minimise(
             work.solve_damped(damping);
             // What the linear model promises: |r|² - |r + J s|² = 2 cᵀ R s - |R s|².
             let promised = work.promise();
-            for i in 0..cols {
+            let steps = work.step.iter().zip(work.qr.scale());
+            for (i, ((t, x), (step, scale))) in work.trial.iter_mut().zip(x.iter()).zip(steps).enumerate() {
                 let l = problem.limit(i);
-                let change = (work.step[i] / work.qr.scale()[i]).clamp(-l.step, l.step);
-                work.trial[i] = (x[i] + change).clamp(l.low, l.high);
+                *t = (x + (step / scale).clamp(-l.step, l.step)).clamp(l.low, l.high);
             }
             problem.evaluate(&work.trial, &mut work.trial_r);
             out.evaluations += 1;

@@ -25,24 +25,24 @@ pub enum PesError {
 pub struct Scene {
     sample_time_s: f64,
     /// Reference, its central differences, and the draws, at the controller's samples.
-    reference: Vec<f64>,
-    velocity: Vec<f64>,
-    acceleration: Vec<f64>,
-    encoder: Vec<f64>,
-    windage: Vec<f64>,
+    pub(super) reference: Vec<f64>,
+    pub(super) velocity: Vec<f64>,
+    pub(super) acceleration: Vec<f64>,
+    pub(super) encoder: Vec<f64>,
+    pub(super) windage: Vec<f64>,
     /// For each servo sample: its controller sample, how to read the position, the reference plus run-out there.
-    servo: Vec<ServoSample>,
+    pub(super) servo: Vec<ServoSample>,
     /// Servo samples of the window, in the record.
-    window: [usize; 2],
+    pub(super) window: [usize; 2],
     /// The first controller sample at which anything moves: everything before it is exactly 0.
-    first: usize,
+    pub(super) first: usize,
 }
 
 #[derive(Clone, Debug)]
-struct ServoSample {
-    controller_sample: usize,
-    reading: Intersample,
-    target: f64,
+pub(super) struct ServoSample {
+    pub(super) controller_sample: usize,
+    pub(super) reading: Intersample,
+    pub(super) target: f64,
 }
 
 /// Buffers of one running simulation.

@@ -21,11 +21,14 @@ pub mod number;
 pub mod nyquist;
 pub mod page;
 pub mod pes;
+pub mod routes;
 pub mod sensitivity;
+pub mod slot;
 pub mod spectrum_bars;
 pub mod svg;
 pub mod table;
 pub mod time;
+pub mod tuned;
 
 pub use error::ReportError;
 pub use figure::Figure;

@@ -9,6 +9,8 @@ use super::figure::{Axis, Figure, Ink, Kind, Panel, Region, Series};
 /// The amplitudes to draw.
 #[derive(Clone, Copy, Debug)]
 pub struct SpectrumBars<'a> {
+    /// Names of the two for the legend.
+    pub names: [&'a str; 2],
     /// Frequency of each harmonic (Hz), evenly spaced.
     pub frequency_hz: &'a [f64],
     /// Amplitudes to compare with, in grey.
@@ -43,11 +45,11 @@ pub fn spectrum_bars(title: &str, caption: &str, bars: &SpectrumBars) -> Result<
     if let Some(before) = bars.before {
         same_length("before", "amplitudes", hz.len(), before.len())?;
         let kind = Kind::Bars { from: -edge, to: 0.0 };
-        panel.marks.push(Series::new("before", Ink::Muted, kind, &hz[..shown], &before[..shown])?.into());
+        panel.marks.push(Series::new(bars.names[0], Ink::Muted, kind, &hz[..shown], &before[..shown])?.into());
     }
     let to = if bars.before.is_some() { edge } else { 0.6 * edge };
     let kind = Kind::Bars { from, to };
-    panel.marks.push(Series::new("after", Ink::Data(0), kind, &hz[..shown], &bars.after[..shown])?.into());
+    panel.marks.push(Series::new(bars.names[1], Ink::Data(0), kind, &hz[..shown], &bars.after[..shown])?.into());
     let (at, limit): (Vec<f64>, Vec<f64>) = bars.limits.iter().copied().filter(|(f, _)| *f <= bars.until_hz).unzip();
     if !at.is_empty() {
         let kind = Kind::Caps { from: -0.5 * spacing, to: 0.5 * spacing };
@@ -67,6 +69,7 @@ mod tests {
         let (before, after) = (vec![2.0; 30], vec![1.0; 30]);
         let limits = [(137.4, 0.5), (9000.0, 0.1)];
         let bars = SpectrumBars {
+            names: ["before", "after"],
             frequency_hz: &hz,
             before: Some(&before),
             after: &after,

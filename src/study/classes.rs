@@ -82,6 +82,7 @@ pub fn classes() -> Result<Study, StudyError> {
     for other in &judged[1..] {
         let (before, after) = (amplitudes(healthy), amplitudes(other));
         let bars = SpectrumBars {
+            names: ["healthy", other.class.name()],
             frequency_hz: &bins,
             before: Some(&before),
             after: &after,

@@ -2,9 +2,13 @@
 
 use crate::controller::ControllerError;
 use crate::feedback::FeedbackError;
+use crate::frf::{FrfError, FrfShapeError};
+use crate::identify::IdentifyError;
 use crate::lti::LtiError;
 use crate::pes::PesError;
+use crate::recording::RecordingError;
 use crate::report::ReportError;
+use crate::tune::{SpecError, TuneError};
 use crate::twin::TwinError;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -21,6 +25,18 @@ pub enum StudyError {
     Controller(#[from] ControllerError),
     #[error(transparent)]
     Feedback(#[from] FeedbackError),
+    #[error(transparent)]
+    Sweep(#[from] FrfShapeError),
+    #[error(transparent)]
+    Frf(#[from] FrfError),
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    #[error(transparent)]
+    Tune(#[from] TuneError),
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
     #[error(transparent)]
     Pes(#[from] PesError),
     #[error(transparent)]

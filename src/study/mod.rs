@@ -5,9 +5,20 @@
 
 mod classes;
 mod error;
+mod hdd;
+mod ladder;
+mod measured;
+mod mirror;
+mod motor;
+mod plants;
 
 pub use classes::classes;
 pub use error::StudyError;
+pub use hdd::hdd;
+pub use ladder::ladder;
+pub use mirror::mirror;
+pub use motor::motor;
+pub use plants::plants;
 
 /// What a study hands over: files by name, relative to the results' folder.
 #[derive(Clone, Debug, Default, PartialEq)]

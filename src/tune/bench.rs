@@ -9,7 +9,9 @@ use super::requirements::{Found, Requirement};
 use super::spec::Limits;
 use super::{Machine, Parameters, Spec, TuneError, What};
 use crate::controller::Controller;
+use crate::feedback::{Event, GRAZE, Graze, QuickMargins};
 use crate::lti::Section;
+use std::f64::consts::TAU;
 
 /// Everything that a search shares between threads.
 #[derive(Clone, Debug)]
@@ -106,7 +108,7 @@ impl Bench {
         let sections = 1 + controller.lowpass.len() + controller.notch.len();
         Desk {
             chain: Vec::with_capacity(sections),
-            buffers: self.machines.iter().map(|m| m.buffers(sections)).collect(),
+            buffers: self.machines.iter().map(Prepared::buffers).collect(),
             scores: vec![MachineScore::default(); self.machines.len()],
             controller,
             evaluations: 0,
@@ -125,10 +127,17 @@ impl Bench {
         }
         self.judge_writes(desk);
         let mut score = Score { objective: f64::NEG_INFINITY, violation: f64::NEG_INFINITY };
-        for (s, aimed) in desk.scores.iter().zip(&self.aimed) {
+        for ((s, aimed), b) in desk.scores.iter().zip(&self.aimed).zip(&desk.buffers) {
             let mut harmonic = 0;
             for w in aimed {
                 score.violation = score.violation.max(w.violation_of(&s.found, &mut harmonic));
+                for g in harmful_grazes(&b.on.quick, w) {
+                    score.violation = score.violation.max(graze_violation(g));
+                }
+                if w.what == What::GainCrossover {
+                    let tied = named_crossings(&b.on.quick).map(|e| w.violation(e.w_rad_s / TAU));
+                    score.violation = tied.fold(score.violation, f64::max);
+                }
             }
             score.objective = score.objective.max(s.objective);
         }
@@ -151,7 +160,7 @@ impl Bench {
             }
             let (gain, phase) = (q.worst_gain_crossing(), q.worst_phase_crossing());
             s.found.phase_margin_deg = gain.map(|e| e.value);
-            s.found.gain_crossover_hz = gain.map(|e| e.w_rad_s / std::f64::consts::TAU);
+            s.found.gain_crossover_hz = gain.map(|e| e.w_rad_s / TAU);
             s.found.gain_margin_db = phase.map(|e| e.value);
             s.found.max_sensitivity = q.max_sensitivity();
         }
@@ -169,6 +178,35 @@ impl Bench {
             s.found.harmonics.clone_from(&p.harmonics);
         }
     }
+}
+
+/// Phase margins this close (deg) may change places between the grid and the exact judgement.
+const TIE_DEG: f64 = 0.5;
+
+/// The gain crossings that may be the one named, the one with the smallest phase margin.
+pub(super) fn named_crossings(q: &QuickMargins) -> impl Iterator<Item = &Event> {
+    let least = q.gain_crossings.iter().map(|e| e.value.abs()).fold(f64::INFINITY, f64::min);
+    q.gain_crossings.iter().filter(move |e| e.value.abs() <= least + TIE_DEG)
+}
+
+/// Grazes that would be named, and would miss this limit, if they were crossings.
+pub(super) fn harmful_grazes<'a>(q: &'a QuickMargins, w: &'a Requirement) -> impl Iterator<Item = &'a Graze> {
+    let least = q.gain_crossings.iter().map(|e| e.value.abs()).fold(f64::INFINITY, f64::min);
+    q.grazes.iter().filter(move |g| {
+        let e = &g.event;
+        let miss = match w.what {
+            What::PhaseMargin => w.violation(e.value),
+            What::GainCrossover => w.violation(e.w_rad_s / TAU),
+            _ => 0.0,
+        };
+        miss > 0.0 && e.value.abs() <= least + TIE_DEG
+    })
+}
+
+/// How far |L| has come into the forbidden zone around 1 (ln).
+pub(super) fn graze_violation(g: &Graze) -> f64 {
+    let away = g.event.l.norm().ln();
+    GRAZE - if g.minimum { away } else { -away }
 }
 
 /// Each norm is weighed by its own limit; where only one has a limit both are weighed by it; where none has, they are summed.

@@ -3,12 +3,12 @@
 //! Margins: analytic, from d ln L = d ln C at the events of the curve, whose frequencies move along with the slope of ln L.
 //! The write: forward differences of the exact simulation, one run a parameter; an adjoint would cost as much.
 
-use super::bench::figure_of_write;
+use super::bench::{figure_of_write, graze_violation, harmful_grazes, named_crossings};
 use super::machine::PesScore;
 use super::parameters::chain_of;
 use super::requirements::Requirement;
 use super::{Bench, Desk, Score, Side, What};
-use crate::feedback::Event;
+use crate::feedback::{Event, Graze};
 use crate::lti::Section;
 use nalgebra::Complex;
 use std::f64::consts::{LOG10_E, TAU};
@@ -30,6 +30,7 @@ pub(super) struct Row {
 #[derive(Clone, Copy, Debug)]
 enum From {
     Margin(Event),
+    Graze(Graze),
     Write,
 }
 
@@ -67,6 +68,12 @@ pub(super) fn rows(bench: &Bench, desk: &Desk) -> Vec<Row> {
                 let gradient = Vec::new();
                 all.push(Row { machine, wanted, w_rad_s: e.w_rad_s, from: From::Margin(e), value, gradient });
             };
+            let mut grazes: Vec<Row> = harmful_grazes(q, w)
+                .map(|g| {
+                    let (value, gradient) = (graze_violation(g), Vec::new());
+                    Row { machine, wanted, w_rad_s: g.event.w_rad_s, from: From::Graze(*g), value, gradient }
+                })
+                .collect();
             // A crossing on the other side of -1 keeps its distance by its absolute value, unless it is the one named.
             let distance = |e: &Event, named: Option<f64>| {
                 let value = if named == Some(e.value) { e.value } else { e.value.abs() };
@@ -81,7 +88,7 @@ pub(super) fn rows(bench: &Bench, desk: &Desk) -> Vec<Row> {
                 }
                 What::MaxSensitivity => q.dips.iter().for_each(|e| push(*e, w.violation(1.0 / e.value))),
                 What::GainCrossover => {
-                    q.worst_gain_crossing().iter().for_each(|e| push(*e, w.violation(e.w_rad_s / TAU)));
+                    named_crossings(q).for_each(|e| push(*e, w.violation(e.w_rad_s / TAU)));
                 }
                 _ => {
                     if let Some(x) = figure_of_write(w.what, &desk.scores[machine].pes, &mut harmonic) {
@@ -90,6 +97,7 @@ pub(super) fn rows(bench: &Bench, desk: &Desk) -> Vec<Row> {
                     }
                 }
             }
+            all.append(&mut grazes);
         }
     }
     all
@@ -108,19 +116,27 @@ pub(super) fn linearise(bench: &Bench, x: &[f64], desk: &mut Desk) -> Option<Lin
     let base: Vec<PesScore> = desk.scores.iter().map(|s| s.pes.clone()).collect();
     let sections: Vec<[Section; 2]> = sections_around(bench, x, desk);
     for row in &mut rows {
-        if let From::Margin(e) = row.from {
-            let w = &bench.aimed[row.machine][row.wanted];
-            let t = bench.machines[row.machine].sampled.sample_time_s();
-            let back = Complex::from_polar(1.0, -e.w_rad_s * t);
-            let named = row.value == w.violation(e.value);
-            row.gradient = sections
-                .iter()
-                .map(|[minus, plus]| {
-                    let pull = (plus.at_delay(back) / minus.at_delay(back)).ln() / (2.0 * SECTION_STEP);
-                    margin_slope(w, &e, pull, named)
-                })
-                .collect();
-        }
+        let (From::Margin(e) | From::Graze(Graze { event: e, .. })) = row.from else { continue };
+        let w = &bench.aimed[row.machine][row.wanted];
+        let t = bench.machines[row.machine].sampled.sample_time_s();
+        let back = Complex::from_polar(1.0, -e.w_rad_s * t);
+        let named = row.value == w.violation(e.value);
+        row.gradient = sections
+            .iter()
+            .map(|[minus, plus]| {
+                let pull = (plus.at_delay(back) / minus.at_delay(back)).ln() / (2.0 * SECTION_STEP);
+                match row.from {
+                    From::Graze(g) => {
+                        if g.minimum {
+                            -pull.re
+                        } else {
+                            pull.re
+                        }
+                    }
+                    _ => margin_slope(w, &e, pull, named),
+                }
+            })
+            .collect();
     }
     let mut moved = x.to_vec();
     for j in 0..n {

@@ -5,7 +5,9 @@ use crate::controller::Controller;
 use crate::feedback::{LoopOnGrid, MeasuredLoop, ResponseCurve, SampledPlant, hold};
 use crate::frf::Frf;
 use crate::lti::{DiscretePlant, Plant, Section, Sections};
-use crate::pes::{HIGH_BAND_HZ, LOW_BAND_HZ, Profile, Scene, SpectralPes, SpectralWork, WindowDft, Workspace};
+use crate::pes::{
+    HIGH_BAND_HZ, LOW_BAND_HZ, Profile, QuickScene, QuickWork, Scene, SpectralPes, SpectralWork, WindowDft,
+};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 
@@ -83,7 +85,7 @@ pub(super) struct Prepared {
 
 #[derive(Clone, Debug)]
 enum Source {
-    Model { plant: Box<DiscretePlant>, scene: Box<Scene>, dft: WindowDft, whole: bool },
+    Model { scene: Box<QuickScene>, dft: WindowDft },
     Response(Box<SpectralPes>),
 }
 
@@ -91,7 +93,7 @@ enum Source {
 #[derive(Clone, Debug)]
 pub(super) struct Buffers {
     pub on: LoopOnGrid,
-    simulation: Option<Box<Workspace>>,
+    simulation: QuickWork,
     spectral: SpectralWork,
     amplitude: Vec<f64>,
 }
@@ -126,7 +128,7 @@ impl Prepared {
                 let [first, last] = profile.pes.window;
                 let dft = WindowDft::new(last - first, profile.pes.sample_rate_hz, bins);
                 let sampled = SampledPlant::of_model(&plant);
-                let source = Source::Model { plant: Box::new(plant), scene: Box::new(scene), dft, whole: peak };
+                let source = Source::Model { scene: Box::new(QuickScene::of(scene, &plant)), dft };
                 Ok(Prepared { sampled, source })
             }
             Machine::Response { frf, hold } => {
@@ -138,28 +140,27 @@ impl Prepared {
     }
 
     /// Buffers for this machine.
-    pub fn buffers(&self, sections: usize) -> Buffers {
-        let simulation = match &self.source {
-            Source::Model { plant, scene, .. } => Some(Box::new(scene.workspace(plant, sections))),
-            Source::Response(_) => None,
-        };
-        Buffers { on: LoopOnGrid::default(), simulation, spectral: SpectralWork::default(), amplitude: Vec::new() }
+    pub fn buffers(&self) -> Buffers {
+        Buffers {
+            on: LoopOnGrid::default(),
+            simulation: QuickWork::default(),
+            spectral: SpectralWork::default(),
+            amplitude: Vec::new(),
+        }
     }
 
     /// Simulates the write with these sections, or reads it off the spectrum.
     pub fn write(&self, c: &Controller, chain: &[Section], b: &mut Buffers, harmonics: &[usize], out: &mut PesScore) {
-        let dft = match (&self.source, &mut b.simulation) {
-            (Source::Model { plant, scene, dft, whole }, Some(work)) => {
-                scene.run(plant, chain, c.feedforward.as_ref(), c.output_limit, work);
-                dft.amplitudes(scene.window(work), &mut b.amplitude);
-                out.command_peak = if *whole { work.command.iter().fold(0.0, |a, u| u.abs().max(a)) } else { 0.0 };
+        let dft = match &self.source {
+            Source::Model { scene, dft } => {
+                out.command_peak = scene.run(chain, c.feedforward.as_ref(), c.output_limit, &mut b.simulation);
+                dft.amplitudes(&b.simulation.window, &mut b.amplitude);
                 dft
             }
-            (Source::Response(s), _) => {
+            Source::Response(s) => {
                 out.command_peak = s.write(chain, &mut b.spectral, &mut b.amplitude);
                 s.dft()
             }
-            _ => return,
         };
         out.dft_low = dft.band(&b.amplitude, LOW_BAND_HZ);
         out.dft_high = dft.band(&b.amplitude, HIGH_BAND_HZ);

@@ -5,6 +5,7 @@
 //! Convention: requirements are wanted ([`Requirement`]), then found ([`Found`]), then judged ([`Judged`]); spec: `specs/tuning.md`.
 
 mod bench;
+mod gain_table;
 mod judge;
 mod linear;
 mod machine;
@@ -19,6 +20,7 @@ mod starts;
 mod tuning;
 
 pub use bench::{Bench, Desk, Score};
+pub use gain_table::{CrossingRow, GainTable, GainTableError, InputDigest, Provenance, Summary};
 pub use judge::{Proof, judge};
 pub use machine::{Hold, Machine, Route};
 pub use outcome::{AtBound, Infeasible, Outcome, RelaxedLimit, Tuned, Work};

@@ -11,12 +11,13 @@ use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::neldermead::NelderMead;
 use rayon::prelude::*;
 use std::cell::RefCell;
+use std::cmp::Ordering;
 
-/// The best candidate of a search, and what it cost.
+/// What the starts ended at, and what it cost.
 #[derive(Clone, Debug)]
-pub(super) struct Best {
-    pub x: Vec<f64>,
-    pub score: Score,
+pub(super) struct Found {
+    /// Best first.
+    pub ends: Vec<Polished>,
     pub evaluations: usize,
     pub starts: usize,
     pub feasible_starts: usize,
@@ -40,13 +41,7 @@ const SPREAD: f64 = 1e-3;
 const PRICE: f64 = 10.0;
 
 /// Searches from every start.
-pub(super) fn search(
-    bench: &Bench,
-    crossover_hz: Option<[f64; 2]>,
-    given: bool,
-    seed: u64,
-    effort: &Effort,
-) -> Option<Best> {
+pub(super) fn search(bench: &Bench, crossover_hz: Option<[f64; 2]>, given: bool, seed: u64, effort: &Effort) -> Found {
     let from = starts(bench, crossover_hz, given, seed, effort.starts);
     let count = from.len();
     let ends: Vec<(Option<Polished>, usize)> = from
@@ -60,16 +55,19 @@ pub(super) fn search(
         .collect();
     let evaluations = ends.iter().map(|(_, e)| e).sum();
     let feasible_starts = ends.iter().filter(|(p, _)| p.as_ref().is_some_and(|p| p.score.violation <= 0.0)).count();
-    let best = ends.into_iter().filter_map(|(p, _)| p).reduce(|a, b| if better(&b.score, &a.score) { b } else { a })?;
-    Some(Best { x: best.x, score: best.score, evaluations, starts: count, feasible_starts })
+    let mut ends: Vec<Polished> = ends.into_iter().filter_map(|(p, _)| p).collect();
+    // The sort is stable: of equals the earlier start stays ahead.
+    ends.sort_by(|a, b| order(&a.score, &b.score));
+    Found { ends, evaluations, starts: count, feasible_starts }
 }
 
-/// Feasible before infeasible, then the smaller objective or the smaller violation.
-fn better(a: &Score, b: &Score) -> bool {
+/// Feasible before infeasible, then by objective or by violation.
+fn order(a: &Score, b: &Score) -> Ordering {
     match (a.violation <= 0.0, b.violation <= 0.0) {
-        (true, true) => a.objective < b.objective,
-        (false, false) => a.violation < b.violation,
-        (feasible, _) => feasible,
+        (true, true) => a.objective.total_cmp(&b.objective),
+        (false, false) => a.violation.total_cmp(&b.violation),
+        (true, false) => Ordering::Less,
+        (false, true) => Ordering::Greater,
     }
 }
 
@@ -84,7 +82,7 @@ pub(super) fn refine(bench: &Bench, x: &[f64], steps: usize, desk: &mut Desk) ->
         return Some(reached);
     }
     let again = polish(bench, &reached.x, Goal::Best, steps, desk)?;
-    Some(if better(&again.score, &reached.score) { again } else { reached })
+    Some(if order(&again.score, &reached.score).is_le() { again } else { reached })
 }
 
 /// The merit as argmin wants it. It offers no bounds: a point outside is scored on the box and pays for its distance.

@@ -1,6 +1,6 @@
 //! spec.toml: what tuning must reach, and where it may search.
 
-use crate::document::{DocumentError, read_toml};
+use crate::document::{DocumentError, parse_toml, read_toml};
 use crate::pes::{Profile, ProfileError};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -145,6 +145,15 @@ impl Spec {
         let document: SpecFile = read_toml(file)?;
         let folder = file.parent().unwrap_or(Path::new("."));
         let profile = read_toml(&folder.join(&document.profile))?;
+        let spec = Spec { profile, margins: document.margins, limits: document.limits, search: document.search };
+        spec.check()?;
+        Ok(spec)
+    }
+
+    /// The spec in a text whose profile stands in another one; its `profile` key names that one in errors.
+    pub fn parse(text: &str, profile: &str) -> Result<Spec, SpecError> {
+        let document: SpecFile = parse_toml(Path::new("spec"), text)?;
+        let profile = parse_toml(&document.profile, profile)?;
         let spec = Spec { profile, margins: document.margins, limits: document.limits, search: document.search };
         spec.check()?;
         Ok(spec)

@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 #[derive(Clone, Copy, Debug)]
 struct Shape {
     crossover_hz: f64,
-    /// Phase that the derivative adds at the crossover (rad).
+    /// Derivative over proportional part at the crossover, the tangent of the lead.
     lead: f64,
     /// Crossover over the integral's corner.
     integral: f64,
@@ -43,7 +43,7 @@ pub(super) fn starts(
     }
     let plain = Shape {
         crossover_hz: (low * high).sqrt(),
-        lead: 0.9,
+        lead: 1.3,
         integral: 8.0,
         lowpass: 0.8,
         notch_depth: 0.2,
@@ -67,7 +67,7 @@ pub(super) fn starts(
         let between = |c: usize, from: f64, to: f64| from + (to - from) * columns[c][i];
         let shape = Shape {
             crossover_hz: low * (high / low).powf(columns[0][i]),
-            lead: between(1, 0.5, 1.3),
+            lead: 10f64.powf(between(1, -0.3, 1.5)),
             integral: 10f64.powf(between(2, 0.5, 1.7)),
             lowpass: columns[3][i],
             notch_depth: 10f64.powf(between(4, -1.3, -0.05)),
@@ -125,9 +125,9 @@ fn shaped(bench: &Bench, machine: usize, s: &Shape, notch: &dyn Fn(&SampledPlant
     }
     let w = s.crossover_hz * TAU;
     let plant = nearest(m, w);
-    // kp (1 + tan(lead) j - j/integral) at the crossover, then the size from |L| = 1.
+    // kp (1 + j lead - j/integral) at the crossover, then the size from |L| = 1.
     let unit = Controller {
-        pid: crate::controller::Pid { kp: 1.0, ki_per_s: w / s.integral, kd_s: s.lead.tan() / w, ..c.pid },
+        pid: crate::controller::Pid { kp: 1.0, ki_per_s: w / s.integral, kd_s: s.lead / w, ..c.pid },
         ..c
     };
     let mut chain = Vec::new();

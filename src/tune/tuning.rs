@@ -4,7 +4,7 @@ use super::bench::UNSTABLE;
 use super::judge::Proof;
 use super::outcome::{AtBound, Infeasible, Outcome, RelaxedLimit, Tuned, Work};
 use super::requirements::Requirement;
-use super::search::{Best, Effort, refine, search};
+use super::search::{Effort, refine, search};
 use super::{Bench, Machine, Parameters, Side, Spec, SpecError, judge};
 use crate::controller::{Controller, ControllerError};
 use crate::feedback::FeedbackError;
@@ -82,6 +82,8 @@ pub enum TuneError {
 
 /// Rounds of back-off: each removes the whole difference between quick and exact figures, to second order.
 const BACK_OFFS: usize = 5;
+/// Ends of the search that are judged at most.
+const ENDS: usize = 4;
 /// Violations within this share of the largest belong to the same conflict.
 const SAME_MISS: f64 = 0.02;
 /// Room given to a relaxed limit, as a share of it: more than the polish leaves, far less than anybody can measure.
@@ -110,16 +112,35 @@ pub fn tune_jointly(
     let mut bench = Bench::new(machines, spec, parameters)?;
     let effort =
         Effort { starts: settings.starts, simplex_steps: settings.simplex_steps, polish_steps: settings.polish_steps };
-    let best = search(&bench, spec.margins.gain_crossover_hz, start.is_some(), spec.search.seed, &effort)
-        .filter(|b| b.score.violation < UNSTABLE)
-        .ok_or(TuneError::NoStableLoop { starts: settings.starts })?;
+    let mut found = search(&bench, spec.margins.gain_crossover_hz, start.is_some(), spec.search.seed, &effort);
+    found.ends.retain(|e| e.score.violation < UNSTABLE);
     let before = start.map(|c| proofs(machines, c, spec)).transpose()?;
-    let mut ending = Ending { machines, spec, route: machines[0].route(), best, back_offs: 0 };
-    let after = ending.settle(&mut bench, settings.polish_steps)?;
-    let controller = bench.parameters.controller(&ending.best.x);
-    let at_bounds = at_bounds(&bench, &ending.best.x);
-    let work = ending.work();
+    let mut ending = Ending { machines, spec, evaluations: found.evaluations, back_offs: 0 };
+    // Where the exact judgement refuses the best end for good, the next one may still pass.
+    let mut best: Option<(Vec<f64>, Vec<Proof>)> = None;
+    for end in found.ends.iter().take(ENDS) {
+        let settled = ending.settle(&mut bench, &end.x, settings.polish_steps)?;
+        let miss =
+            |proofs: &[Proof]| proofs.iter().map(|p| p.judged.worst()).fold(f64::NEG_INFINITY, f64::max).max(0.0);
+        if best.as_ref().is_none_or(|(_, b)| miss(&settled.1) < miss(b)) {
+            best = Some(settled);
+        }
+        if best.as_ref().is_some_and(|(_, b)| miss(b) == 0.0) || end.score.violation > 0.0 {
+            break;
+        }
+    }
+    let (x, after) = best.ok_or(TuneError::NoStableLoop { starts: settings.starts })?;
+    let controller = bench.parameters.controller(&x);
+    let at_bounds = at_bounds(&bench, &x);
+    let work = |ending: &Ending<'_>| Work {
+        route: machines[0].route(),
+        starts: found.starts,
+        evaluations: ending.evaluations,
+        feasible_starts: found.feasible_starts,
+        back_offs: ending.back_offs,
+    };
     if after.iter().all(|p| p.judged.passes()) {
+        let work = work(&ending);
         return Ok(Outcome::Tuned(Tuned { controller, before, after, at_bounds, work }));
     }
     let share = after.iter().map(|p| p.judged.worst()).fold(0.0, f64::max);
@@ -128,10 +149,9 @@ pub fn tune_jointly(
     // Confirmation: the same polish against the relaxed limits, from the compromise, judged exactly.
     let wanted: Vec<Requirement> = relaxed.iter().map(|(r, _)| *r).collect();
     bench.wanted = wanted.clone();
-    let confirmed = ending
-        .settle(&mut bench, settings.polish_steps)?
-        .iter()
-        .all(|p| super::Judged::of(&wanted, p.judged.found.clone()).passes());
+    let (_, again) = ending.settle(&mut bench, &x, settings.polish_steps)?;
+    let confirmed = again.iter().all(|p| super::Judged::of(&wanted, p.judged.found.clone()).passes());
+    let work = work(&ending);
     Ok(Outcome::Infeasible(Infeasible { controller, before, after, conflicts, share, confirmed, at_bounds, work }))
 }
 
@@ -175,25 +195,26 @@ fn proofs(machines: &[Machine<'_>], c: &Controller, spec: &Spec) -> Result<Vec<P
     machines.iter().map(|m| judge(m, c, spec)).collect()
 }
 
-/// The end of a tuning: the best candidate until the exact judgement agrees with it.
+/// The end of a tuning: a candidate, moved until the exact judgement agrees with the grid's.
 struct Ending<'a> {
     machines: &'a [Machine<'a>],
     spec: &'a Spec,
-    route: super::Route,
-    best: Best,
+    evaluations: usize,
     back_offs: usize,
 }
 
 impl Ending<'_> {
     /// Judges exactly; where the exact figure misses a limit that the grid's figure met, aims inside by the difference.
-    fn settle(&mut self, bench: &mut Bench, steps: usize) -> Result<Vec<Proof>, TuneError> {
+    fn settle(&mut self, bench: &mut Bench, x: &[f64], steps: usize) -> Result<(Vec<f64>, Vec<Proof>), TuneError> {
         let mut inside = vec![vec![0.0; bench.wanted.len()]; bench.machines.len()];
         bench.aim(&inside);
         let mut desk = bench.desk();
-        for round in 0..=BACK_OFFS {
-            let controller = bench.parameters.controller(&self.best.x);
+        let mut x = x.to_vec();
+        let mut round = 0;
+        loop {
+            let controller = bench.parameters.controller(&x);
             let exact = proofs(self.machines, &controller, self.spec)?;
-            self.best.score = bench.score(&self.best.x, &mut desk);
+            bench.score(&x, &mut desk);
             let mut moved = false;
             for ((proof, s), inside) in exact.iter().zip(&desk.scores).zip(&mut inside) {
                 let (mut a, mut b) = (0, 0);
@@ -201,32 +222,27 @@ impl Ending<'_> {
                     let quick = w.violation_of(&s.found, &mut a);
                     let violation = w.violation_of(&proof.judged.found, &mut b);
                     // A miss that the grid sees as well is a conflict, not an error of the grid.
-                    if violation > 0.0 && (violation - quick).abs() > 1e-12 && quick + *inside <= 1e-6 {
-                        *inside += 1.2 * (violation - quick).max(0.0) + violation;
+                    if violation > 0.0 && quick + *inside <= 1e-6 {
+                        *inside += 1.2 * (violation - quick).max(0.0);
                         moved = true;
                     }
                 }
             }
-            if !moved || round == BACK_OFFS {
-                self.best.evaluations += desk.evaluations;
-                return Ok(exact);
+            round += 1;
+            let next = if moved && round <= BACK_OFFS {
+                self.back_offs += 1;
+                bench.aim(&inside);
+                refine(bench, &x, steps, &mut desk).filter(|p| p.score.violation <= 0.0)
+            } else {
+                None
+            };
+            match next {
+                Some(p) => x = p.x,
+                None => {
+                    self.evaluations += desk.evaluations;
+                    return Ok((x, exact));
+                }
             }
-            self.back_offs += 1;
-            bench.aim(&inside);
-            if let Some(p) = refine(bench, &self.best.x, steps, &mut desk) {
-                self.best.x = p.x;
-            }
-        }
-        Ok(Vec::new())
-    }
-
-    fn work(&self) -> Work {
-        Work {
-            route: self.route,
-            starts: self.best.starts,
-            evaluations: self.best.evaluations,
-            feasible_starts: self.best.feasible_starts,
-            back_offs: self.back_offs,
         }
     }
 }

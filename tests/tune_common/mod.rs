@@ -1,10 +1,12 @@
 //! The machine and the spec that the tuning tests share.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::unwrap_used)]
 
 use servotune::controller::{Controller, Lowpass, Notch, Pid};
-use servotune::lti::{Body, Mode, Plant};
+use servotune::frf::Frf;
+use servotune::lti::{Body, FrequencyResponse, Mode, Plant};
 use servotune::pes::{Noise, PesClock, Profile, Spiral};
 use servotune::tune::{Limits, MarginLimits, Search, Spec};
+use std::f64::consts::TAU;
 
 /// The body of the paper's eq. (20), its delay, its first mode and two above it.
 pub fn paper_plant() -> Plant {
@@ -69,4 +71,17 @@ pub fn start_controller() -> Controller {
         notch: vec![Notch { frequency_hz: 1222.0, zero_damping_ratio: 0.05, pole_damping_ratio: 0.25 }],
         feedforward: None,
     }
+}
+
+/// The continuous plant on a sweep of `points` from `from_hz` to `to_hz`, equal steps in ln f.
+pub fn sweep(plant: &Plant, from_hz: f64, to_hz: f64, points: usize) -> Frf {
+    let at = |i: usize| TAU * from_hz * (to_hz / from_hz).powf(i as f64 / (points - 1) as f64);
+    let w: Vec<f64> = (0..points).map(at).collect();
+    let value = w.iter().map(|w| plant.at(*w)).collect();
+    Frf::new(w, value, None).unwrap()
+}
+
+/// A sweep like the positioner's own: 10 Hz to 12 kHz.
+pub fn paper_response() -> Frf {
+    sweep(&paper_plant(), 10.0, 12_000.0, 600)
 }

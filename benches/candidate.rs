@@ -1,0 +1,84 @@
+//! What one candidate of a tuning costs, and a whole tuning. Run: `cargo bench --bench candidate`.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+#[path = "../tests/tune_common/mod.rs"]
+mod tune_common;
+
+use divan::{Bencher, black_box};
+use servotune::controller::Controller;
+use servotune::feedback::{LoopOnGrid, SampledPlant};
+use servotune::lti::DiscretePlant;
+use servotune::pes::{Scene, WindowDft};
+use servotune::tune::{Bench, Machine, Parameters, Spec, TuneSettings, tune};
+use tune_common::{paper_plant, paper_response, paper_spec, start_controller};
+
+fn main() {
+    divan::main();
+}
+
+fn without_peak() -> Spec {
+    let mut spec = paper_spec();
+    spec.limits.command_peak = None;
+    spec
+}
+
+fn controller() -> Controller {
+    start_controller()
+}
+
+#[divan::bench]
+fn margins(b: Bencher) {
+    let plant = SampledPlant::of_model(&DiscretePlant::of(&paper_plant(), 39.6e-6).unwrap());
+    let chain = controller().sections().unwrap().chain;
+    let mut on = LoopOnGrid::default();
+    b.bench_local(|| plant.judge(black_box(&chain), &mut on));
+}
+
+#[divan::bench]
+fn dft(b: Bencher) {
+    let plant = DiscretePlant::of(&paper_plant(), 39.6e-6).unwrap();
+    let spec = without_peak();
+    let scene = Scene::of_window(&spec.profile, &plant).unwrap();
+    let dft = WindowDft::new(200, 27_480.0, (5..=21).collect());
+    let chain = controller().sections().unwrap().chain;
+    let mut work = scene.workspace(&plant, chain.len());
+    let mut amplitude = Vec::new();
+    b.bench_local(|| {
+        scene.run(&plant, black_box(&chain), None, Some(10.0), &mut work);
+        dft.amplitudes(scene.window(&work), &mut amplitude);
+    });
+}
+
+fn candidate_of(b: Bencher, spec: &Spec, machine: Machine<'_>) {
+    let start = controller();
+    let p = Parameters::of(spec, Some(&start), start.sample_time_s);
+    let bench = Bench::new(&[machine], spec, p).unwrap();
+    let x = bench.parameters().vector(&start);
+    let mut desk = bench.desk();
+    b.bench_local(|| bench.score(black_box(&x), &mut desk));
+}
+
+#[divan::bench]
+fn candidate(b: Bencher) {
+    candidate_of(b, &without_peak(), Machine::Model(&paper_plant()));
+}
+
+#[divan::bench]
+fn candidate_with_command_peak(b: Bencher) {
+    candidate_of(b, &paper_spec(), Machine::Model(&paper_plant()));
+}
+
+#[divan::bench]
+fn candidate_on_a_response(b: Bencher) {
+    let frf = paper_response();
+    candidate_of(b, &without_peak(), Machine::Response { frf: &frf, hold: servotune::tune::Hold::NotIncluded });
+}
+
+#[divan::bench(args = [1, 2], sample_count = 10, sample_size = 1)]
+fn whole_tuning(b: Bencher, threads: usize) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let (plant, spec, start) = (paper_plant(), without_peak(), controller());
+    b.bench_local(|| {
+        pool.install(|| tune(&Machine::Model(&plant), &spec, Some(&start), &TuneSettings::default()).unwrap())
+    });
+}

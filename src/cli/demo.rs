@@ -1,0 +1,92 @@
+//! `servotune demo`: the whole chain on a built-in machine, from a sweep to a report.
+
+use super::arguments::DemoArguments;
+use super::slot::{self, Slot};
+use super::tune::{provenance, text};
+use super::{Ending, Failure, Screen};
+use crate::document::{read_text, sha256_hex, write_text, write_whole};
+use crate::frf::{PhaseDisplay, ReadSettings, read_file, write_bod_as};
+use crate::identify::{IdentifySettings, identify};
+use crate::lti::PlantFile;
+use crate::numeric::random::Random;
+use crate::report::identified::identified_sentences;
+use crate::tune::{GainTable, Hold, InputDigest, Machine, Outcome, Spec, TuneError, TuneSettings, tune};
+use crate::twin::plants::{log_grid, measure};
+use crate::twin::{MachineClass, nominal_controller, paper_machine};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Noise of the sweep (ratio) and its seed.
+const NOISE: f64 = 0.01;
+
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    outcome: &'a Outcome,
+    gain_table: PathBuf,
+    report: PathBuf,
+}
+
+pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let file = |name: &str| a.out.join(name);
+    let machine = paper_machine(MachineClass::Tunable)?;
+    let start = nominal_controller()?;
+    write_text(&file("controller.toml"), include_str!("../../specs/controllers/nominal.toml"))?;
+    write_text(&file("profile.toml"), include_str!("../../specs/profiles/spiral.toml"))?;
+    let spec_text = include_str!("../../specs/limits/paper.toml").replace("../profiles/spiral.toml", "profile.toml");
+    write_text(&file("spec.toml"), &spec_text)?;
+
+    screen.say(&format!("1/4 sweep of the paper's tunable machine, 40-5000 Hz, 400 points, {} % noise", 100.0 * NOISE));
+    let taken = measure(&machine, &log_grid(40.0, 5000.0, 400), NOISE, &mut Random::new(1))?;
+    let mut bod = Vec::new();
+    write_bod_as(&taken, PhaseDisplay::Margin, &mut bod)?;
+    write_whole(&file("response.bod"), &bod)?;
+    let sweep = read_file(&file("response.bod"), &ReadSettings::default())?;
+    for note in &sweep.notes {
+        screen.say(&format!("    {note}"));
+    }
+
+    screen.say("2/4 identification");
+    let id = identify(&sweep.frf, &IdentifySettings::default())
+        .map_err(|source| Failure::Identify { file: file("response.bod"), source })?;
+    for sentence in identified_sentences(&id) {
+        screen.say(&format!("    {sentence}"));
+    }
+    let plant = toml::to_string(&PlantFile::from(&id.plant)).map_err(|source| Failure::Toml { source })?;
+    write_text(&file("plant.toml"), &plant)?;
+
+    screen.say("3/4 tuning, straight on the measured response and over the model");
+    let spec = Spec::read(&file("spec.toml")).map_err(TuneError::from)?;
+    let settings = TuneSettings::default();
+    let hold = Hold::NotIncluded;
+    let outcome = tune(&Machine::Response { frf: &sweep.frf, hold }, &spec, Some(&start), &settings)?;
+    let over_model = tune(&Machine::Model(&id.plant), &spec, Some(&start), &settings)?;
+    let digest = |role: &str, sha256: String| InputDigest { role: role.into(), sha256 };
+    let controller_text = read_text(&file("controller.toml"))?;
+    let inputs =
+        vec![digest("frf", sweep.source_digest.clone()), digest("controller", sha256_hex(controller_text.as_bytes()))];
+    let table = GainTable::of(&outcome, spec.search.seed, sha256_hex(spec_text.as_bytes()), inputs)?;
+    let gain_table = file("gains.toml");
+    table.write(&gain_table)?;
+
+    screen.say("4/4 report");
+    let page = slot::page(&Slot {
+        name: "demo, the paper's tunable machine",
+        plant: &id.plant,
+        sweep: Some((&sweep, hold)),
+        identified: Some(&id),
+        spec: &spec,
+        start: Some(&start),
+        outcome: &outcome,
+        over_model: Some(&over_model),
+        table: &table,
+        provenance: provenance(&table),
+    })?;
+    let report = file("report.html");
+    write_text(&report, &page.html())?;
+    let words = text(&outcome, Some(&start), slot::units(&id.plant))?;
+    let ending = if matches!(outcome, Outcome::Tuned(_)) { Ending::Accepted } else { Ending::Rejected };
+    let shown = format!("{words}\nGain table: {}\nOpen this report: {}\n", gain_table.display(), report.display());
+    screen.result(&Document { outcome: &outcome, gain_table, report }, &shown)?;
+    Ok(ending)
+}

@@ -1,0 +1,180 @@
+//! One slot tuned: what `tune` and `demo` share, from the machine to the gain table and the page.
+
+use super::{Failure, margins};
+use crate::controller::Controller;
+use crate::feedback::{ModelLoop, OpenLoop};
+use crate::frf::Sweep;
+use crate::identify::Identified;
+use crate::lti::{DiscretePlant, Plant};
+use crate::pes::{figures, simulate};
+use crate::report::identified::{identified_figure, identified_sentences, ladder_table, order_table, parameter_table};
+use crate::report::page::{Block, Page, Section};
+use crate::report::routes::{RouteView, routes_table};
+use crate::report::slot::{LoopView, SlotView, slot_page};
+use crate::report::table::Verdict;
+use crate::report::tuned::{Units, conflicts_table, gains_table, sections_table};
+use crate::tune::{GainTable, Hold, Judged, Machine, Outcome, Spec, judge};
+use std::f64::consts::TAU;
+
+/// A slot with everything that is known of it.
+pub(super) struct Slot<'a> {
+    pub name: &'a str,
+    /// The model: given, or identified from the sweep.
+    pub plant: &'a Plant,
+    /// The sweep with the hold it contains, where there is one.
+    pub sweep: Option<(&'a Sweep, Hold)>,
+    pub identified: Option<&'a Identified>,
+    pub spec: &'a Spec,
+    pub start: Option<&'a Controller>,
+    /// The outcome that the gain table holds.
+    pub outcome: &'a Outcome,
+    /// The outcome of the other way, over the model, where the first one went straight on the response.
+    pub over_model: Option<&'a Outcome>,
+    pub table: &'a GainTable,
+    pub provenance: Vec<(String, String)>,
+}
+
+/// The units of a plant file.
+pub(super) fn units(plant: &Plant) -> Units<'_> {
+    Units { position: &plant.position_unit, command: &plant.command_unit }
+}
+
+/// Points of the drawn curves for each decade.
+const DRAWN_PER_DECADE: f64 = 400.0;
+
+/// All that is drawn of one controller on the model.
+fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Result<LoopView, Failure> {
+    let sections = c.sections().map_err(crate::tune::TuneError::from)?;
+    let sampled = DiscretePlant::of(slot.plant, c.sample_time_s)?;
+    let l = ModelLoop::new(&sampled, &sections)?;
+    let judged_margins = margins::judge(&l)?;
+    let (from, to) = (TAU * 10.0, l.end_rad_s());
+    let n = (DRAWN_PER_DECADE * (to / from).log10()).ceil() as usize;
+    let mut w: Vec<f64> = (0..=n).map(|i| from * (to / from).powf(i as f64 / n as f64)).collect();
+    w.extend(l.grid().into_iter().filter(|w| *w > from));
+    w.sort_by(f64::total_cmp);
+    w.dedup();
+    let write = simulate(slot.plant, c, &slot.spec.profile)?;
+    let stable = judged_margins.stable && write.pes.iter().all(|p| p.is_finite());
+    let found = stable.then(|| figures(&write.pes, &slot.spec.profile));
+    Ok(LoopView {
+        name: name.to_owned(),
+        open_loop: w.iter().map(|&w| l.at(w)).collect(),
+        hz: w.into_iter().map(|w| w / TAU).collect(),
+        margins: judged_margins,
+        write: found.map(|f| (write, f)),
+        judged: Some(judged),
+    })
+}
+
+/// The page of the slot.
+pub(super) fn page(slot: &Slot<'_>) -> Result<Page, Failure> {
+    let on_model = Machine::Model(slot.plant);
+    let after_controller = slot.outcome.controller();
+    let after = loop_view("after", slot, after_controller, slot.outcome.after()[0].judged.clone())?;
+    let before = match slot.start {
+        Some(c) => Some(loop_view("before", slot, c, judge(&on_model, c, slot.spec)?.judged)?),
+        None => None,
+    };
+    let view = SlotView {
+        name: slot.name,
+        verdict: verdict(slot.outcome),
+        plant: plant_sections(slot)?,
+        before: before.as_ref(),
+        after: &after,
+        spec: slot.spec,
+        units: units(slot.plant),
+        gains: gain_sections(slot)?,
+        provenance: slot.provenance.clone(),
+    };
+    Ok(slot_page(&view)?)
+}
+
+/// The verdict in a sentence.
+pub(super) fn verdict(outcome: &Outcome) -> (Verdict, String) {
+    match outcome {
+        Outcome::Tuned(t) if t.at_bounds.is_empty() => (Verdict::Ok, "Every limit is met.".to_owned()),
+        Outcome::Tuned(t) => {
+            let names: Vec<String> = t.at_bounds.iter().map(|b| b.parameter.to_string()).collect();
+            (
+                Verdict::Warn,
+                format!("Every limit is met, but the bounds set {}: widening them may do better.", names.join(", ")),
+            )
+        }
+        Outcome::Infeasible(i) => {
+            let names: Vec<String> = i.conflicts.iter().map(|c| c.what.to_string()).collect();
+            let confirmed = if i.confirmed {
+                "tuning again with the relaxed limits met them"
+            } else {
+                "not confirmed by tuning again"
+            };
+            (
+                Verdict::Fail,
+                format!(
+                    "No gains within the bounds were found that meet every limit. In conflict: {}. The best compromise misses by {:.3} % of each; {confirmed}.",
+                    names.join(", "),
+                    100.0 * i.share
+                ),
+            )
+        }
+    }
+}
+
+fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
+    let (Some((sweep, _)), Some(id)) = (slot.sweep, slot.identified) else { return Ok(vec![]) };
+    let mut blocks = vec![
+        Block::Prose(identified_sentences(id).join(" ")),
+        Block::Figure(identified_figure(&sweep.frf, id, "Measured response and model")?),
+        Block::Table(ladder_table(id)?),
+    ];
+    if !id.held_out.is_empty() {
+        blocks.push(Block::Details("Choice of the order".into(), vec![Block::Table(order_table(id)?)]));
+    }
+    blocks.push(Block::Details("Parameters with 95 % intervals".into(), vec![Block::Table(parameter_table(id)?)]));
+    if !sweep.notes.is_empty() {
+        let notes = sweep.notes.iter().map(|n| Block::Prose(n.to_string())).collect();
+        blocks.push(Block::Details("What the reader decided about the sweep file".into(), notes));
+    }
+    Ok(vec![Section { heading: "Plant".into(), blocks }])
+}
+
+fn gain_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
+    let bounds = match slot.outcome {
+        Outcome::Tuned(t) => &t.at_bounds,
+        Outcome::Infeasible(i) => &i.at_bounds,
+    };
+    let mut blocks = vec![Block::Table(gains_table(slot.start, slot.outcome.controller(), bounds)?)];
+    if let Outcome::Infeasible(i) = slot.outcome {
+        blocks.push(Block::Table(conflicts_table(i, units(slot.plant))?));
+    }
+    blocks.push(Block::Details("Sections".into(), vec![Block::Table(sections_table(slot.table.sections())?)]));
+    blocks.push(Block::Details("Gain table (gains.toml)".into(), vec![Block::Code(slot.table.text()?)]));
+    let mut sections = vec![Section { heading: "Gains".into(), blocks }];
+    if let (Some(over_model), Some((sweep, hold))) = (slot.over_model, slot.sweep) {
+        let on_response = Machine::Response { frf: &sweep.frf, hold };
+        let on_model = Machine::Model(slot.plant);
+        let judged = |machine: &Machine<'_>, o: &Outcome| judge(machine, o.controller(), slot.spec).map(|p| p.judged);
+        let first = (judged(&on_response, slot.outcome)?, judged(&on_model, slot.outcome)?);
+        let second = (judged(&on_response, over_model)?, judged(&on_model, over_model)?);
+        let table = routes_table(
+            RouteView { on_response: &first.0, on_model: &first.1 },
+            RouteView { on_response: &second.0, on_model: &second.1 },
+            units(slot.plant),
+        )?;
+        let words = "The gains above were tuned straight on the measured response. The same limits were also tuned over the \
+                     identified model; each way's gains are judged by both ways.";
+        let gains = gains_table(Some(over_model.controller()), slot.outcome.controller(), &[])?;
+        sections.push(Section {
+            heading: "Model or measured response".into(),
+            blocks: vec![
+                Block::Prose(words.into()),
+                Block::Table(table),
+                Block::Details(
+                    "Gains over the model (before) and on the response (after)".into(),
+                    vec![Block::Table(gains)],
+                ),
+            ],
+        });
+    }
+    Ok(sections)
+}

@@ -1,0 +1,28 @@
+//! Why a record cannot be read.
+
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Every way a record can be refused.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "each field is named in the message")]
+pub enum RecordingError {
+    /// The file system or the decompressor refused.
+    #[error("{}: cannot read: {source}", file.display())]
+    Io { file: PathBuf, source: std::io::Error },
+    /// The rows are no table.
+    #[error("{}: {source}", file.display())]
+    Table { file: PathBuf, source: csv::Error },
+    /// A column is missing.
+    #[error("{}: no column `{wanted}`; the header has: {}", file.display(), found.join(", "))]
+    Column { file: PathBuf, wanted: String, found: Vec<String> },
+    /// A field is no number.
+    #[error("{}:{line}: column `{column}`: found `{found}`; expected a finite number", file.display())]
+    Number { file: PathBuf, line: u64, column: String, found: String },
+    /// There are too few rows.
+    #[error("{}: {rows} rows; expected at least {needed}", file.display())]
+    Short { file: PathBuf, rows: usize, needed: usize },
+    /// The clock does not tick evenly.
+    #[error("{}:{line}: the clock steps by {found_s} s; expected {expected_s} s as in the rows before", file.display())]
+    Clock { file: PathBuf, line: usize, found_s: f64, expected_s: f64 },
+}

@@ -1,0 +1,253 @@
+//! gains.toml: the controller, the sections that the firmware runs, before and after, and where it all came from.
+//!
+//! In: an outcome and the digests of its inputs. Out: a document of the same bytes for the same inputs, and a reader that
+//! refuses a table whose sections are not those of its gains.
+
+use super::judge::Proof;
+use super::{Outcome, Route};
+use crate::controller::{Controller, ControllerError, Feedforward, Lowpass, Notch, Pid};
+use crate::document::{DocumentError, parse_toml, read_text, write_text};
+use crate::feedback::Crossing;
+use crate::lti::Section;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use thiserror::Error;
+
+/// The document `gains.toml`, field by field.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GainTable {
+    sample_time_s: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    output_limit: Option<f64>,
+    pid: Pid,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    lowpass: Vec<Lowpass>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    notch: Vec<Notch>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    feedforward: Option<Feedforward>,
+    section: Vec<Section>,
+    /// Margins and DFT of the start controller.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub before: Option<Summary>,
+    /// Margins and DFT of this controller.
+    pub after: Summary,
+    /// Where it came from.
+    pub provenance: Provenance,
+}
+
+/// Margins and DFT figures of one controller, named as in the contract.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs, reason = "names, units and meanings are those of `Margins` and of the PES figures")]
+pub struct Summary {
+    pub stable: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub phase_margin_deg: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_crossover_hz: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_margin_db: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub phase_crossover_hz: Option<f64>,
+    pub max_sensitivity: f64,
+    pub max_sensitivity_hz: f64,
+    pub modulus_margin: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub delay_margin_s: Option<f64>,
+    pub disk_margin: f64,
+    pub dft_low: f64,
+    pub dft_high: f64,
+    pub command_peak: f64,
+    #[serde(default)]
+    pub gain_crossings: Vec<CrossingRow>,
+    #[serde(default)]
+    pub phase_crossings: Vec<CrossingRow>,
+}
+
+/// One crossing in a table.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CrossingRow {
+    /// Where (Hz).
+    pub hz: f64,
+    /// Phase margin (deg) or gain margin (dB).
+    pub value: f64,
+}
+
+/// What ties a table to the bytes it was made from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// Version of this program.
+    pub program: String,
+    /// Over a model or on the measured response.
+    pub route: Route,
+    /// Whether every limit of the spec is met.
+    pub feasible: bool,
+    /// Seed of the search.
+    pub seed: u64,
+    /// Candidates scored.
+    pub evaluations: usize,
+    /// SHA-256 of spec.toml.
+    pub spec_sha256: String,
+    /// Every other input by its role, in the order given.
+    pub inputs: Vec<InputDigest>,
+}
+
+/// One input file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InputDigest {
+    /// What it was used as: "plant", "frf", "controller", "profile".
+    pub role: String,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
+}
+
+/// Why a document is no gain table.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "each field is named in the message")]
+pub enum GainTableError {
+    /// The document cannot be read or written.
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    /// Its gains are no controller.
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
+    /// The number of sections is not that of the gains.
+    #[error("{found} [[section]] rows, but the gains make {expected}")]
+    Count { found: usize, expected: usize },
+    /// A section is not the one of the gains.
+    #[error("[[section]] {index}: {key} = {found}, but the gains make {expected}; the table was edited by hand?")]
+    Section { index: usize, key: &'static str, found: f64, expected: f64 },
+    /// The table could not be put into text.
+    #[error("the gain table cannot be written as TOML: {0}")]
+    Text(#[from] toml::ser::Error),
+}
+
+/// Relative difference allowed between a section read and the one recomputed: two mathematical libraries apart.
+const SAME: f64 = 1e-12;
+
+impl Summary {
+    /// The figures of a judgement.
+    pub fn of(proof: &Proof) -> Summary {
+        let (m, f) = (&proof.margins, &proof.judged.found);
+        let rows = |c: &[Crossing]| c.iter().map(|c| CrossingRow { hz: c.hz, value: c.value }).collect();
+        Summary {
+            stable: m.stable,
+            phase_margin_deg: m.phase_margin_deg,
+            gain_crossover_hz: m.gain_crossover_hz,
+            gain_margin_db: m.gain_margin_db,
+            phase_crossover_hz: m.phase_crossover_hz,
+            max_sensitivity: m.max_sensitivity,
+            max_sensitivity_hz: m.max_sensitivity_hz,
+            modulus_margin: m.modulus_margin,
+            delay_margin_s: m.delay_margin_s,
+            disk_margin: m.disk_margin,
+            dft_low: f.dft_low,
+            dft_high: f.dft_high,
+            command_peak: f.command_peak,
+            gain_crossings: rows(&m.gain_crossings),
+            phase_crossings: rows(&m.phase_crossings),
+        }
+    }
+}
+
+impl GainTable {
+    /// The table of an outcome; of several machines the one with the largest DFT is written.
+    pub fn of(
+        outcome: &Outcome,
+        seed: u64,
+        spec_sha256: String,
+        inputs: Vec<InputDigest>,
+    ) -> Result<GainTable, GainTableError> {
+        let (before, work, feasible) = match outcome {
+            Outcome::Tuned(t) => (&t.before, &t.work, true),
+            Outcome::Infeasible(i) => (&i.before, &i.work, false),
+        };
+        let size = |p: &Proof| p.judged.found.dft_low + p.judged.found.dft_high;
+        let worst =
+            (0..outcome.after().len()).max_by(|&a, &b| size(&outcome.after()[a]).total_cmp(&size(&outcome.after()[b])));
+        let worst = worst.unwrap_or(0);
+        let c = outcome.controller().clone();
+        Ok(GainTable {
+            section: c.sections()?.chain,
+            sample_time_s: c.sample_time_s,
+            output_limit: c.output_limit,
+            pid: c.pid,
+            lowpass: c.lowpass,
+            notch: c.notch,
+            feedforward: c.feedforward,
+            before: before.as_ref().and_then(|b| b.get(worst)).map(Summary::of),
+            after: Summary::of(&outcome.after()[worst]),
+            provenance: Provenance {
+                program: env!("CARGO_PKG_VERSION").into(),
+                route: work.route,
+                feasible,
+                seed,
+                evaluations: work.evaluations,
+                spec_sha256,
+                inputs,
+            },
+        })
+    }
+
+    /// The controller of the table.
+    pub fn controller(&self) -> Controller {
+        Controller {
+            sample_time_s: self.sample_time_s,
+            output_limit: self.output_limit,
+            pid: self.pid,
+            lowpass: self.lowpass.clone(),
+            notch: self.notch.clone(),
+            feedforward: self.feedforward,
+        }
+    }
+
+    /// The sections as the table has them.
+    pub fn sections(&self) -> &[Section] {
+        &self.section
+    }
+
+    /// The table in a file, its sections checked against its gains.
+    pub fn read(file: &Path) -> Result<GainTable, GainTableError> {
+        GainTable::parse(file, &read_text(file)?)
+    }
+
+    /// The table in `text`; `file` only names it in an error.
+    pub fn parse(file: &Path, text: &str) -> Result<GainTable, GainTableError> {
+        let table: GainTable = parse_toml(file, text)?;
+        let expected = table.controller().sections()?.chain;
+        if expected.len() != table.section.len() {
+            return Err(GainTableError::Count { found: table.section.len(), expected: expected.len() });
+        }
+        for (index, (found, expected)) in table.section.iter().zip(&expected).enumerate() {
+            let size = [expected.b0, expected.b1, expected.b2, expected.a1, expected.a2].map(f64::abs);
+            let size = size.into_iter().fold(1.0, f64::max);
+            for (key, found, expected) in [
+                ("b0", found.b0, expected.b0),
+                ("b1", found.b1, expected.b1),
+                ("b2", found.b2, expected.b2),
+                ("a1", found.a1, expected.a1),
+                ("a2", found.a2, expected.a2),
+            ] {
+                if (found - expected).abs() > SAME * size || found.is_nan() {
+                    return Err(GainTableError::Section { index, key, found, expected });
+                }
+            }
+        }
+        Ok(table)
+    }
+
+    /// The text of the table.
+    pub fn text(&self) -> Result<String, GainTableError> {
+        Ok(toml::to_string(self)?)
+    }
+
+    /// Writes the table, whole or not at all.
+    pub fn write(&self, file: &Path) -> Result<(), GainTableError> {
+        Ok(write_text(file, &self.text()?)?)
+    }
+}
