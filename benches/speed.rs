@@ -23,14 +23,26 @@ use std::time::Instant;
 
 type Outcomes<T> = Result<T, Box<dyn Error>>;
 
-/// Time of one call: median and fastest of `repeats` batches of `batch` calls.
+/// Time of one call: median and fastest of `repeats` batches of `batch` calls, and the processor time of all threads, as a mean,
+/// which other programs on the machine do not lengthen.
 #[derive(Serialize)]
 struct Timing {
     what: String,
     median_s: f64,
     fastest_s: f64,
+    cpu_s: Option<f64>,
     repeats: usize,
     batch: usize,
+}
+
+/// Processor time of all threads so far (s), where the system tells it; good to one tick of the scheduler.
+fn cpu_s() -> Option<f64> {
+    let mut nanoseconds = 0.0;
+    for task in std::fs::read_dir("/proc/self/task").ok()? {
+        let text = std::fs::read_to_string(task.ok()?.path().join("schedstat")).ok()?;
+        nanoseconds += text.split_whitespace().next()?.parse::<f64>().ok()?;
+    }
+    Some(nanoseconds * 1e-9)
 }
 
 /// Times `f`, which gets the running number of its call; one batch goes before as a warm-up.
@@ -45,9 +57,11 @@ fn timing(what: &str, repeats: usize, batch: usize, mut f: impl FnMut(usize)) ->
         clock.elapsed().as_secs_f64() / batch as f64
     };
     run();
+    let before = cpu_s();
     let mut seconds: Vec<f64> = (0..repeats).map(|_| run()).collect();
+    let cpu_s = before.zip(cpu_s()).map(|(before, after)| (after - before) / (repeats * batch) as f64);
     seconds.sort_by(f64::total_cmp);
-    Timing { what: what.into(), median_s: seconds[repeats / 2], fastest_s: seconds[0], repeats, batch }
+    Timing { what: what.into(), median_s: seconds[repeats / 2], fastest_s: seconds[0], cpu_s, repeats, batch }
 }
 
 #[derive(Serialize)]
@@ -94,17 +108,15 @@ fn candidate_times(plant: &Plant, controller: &Controller, spec: &Spec) -> Outco
     let bench = Bench::new(&[Machine::Model(plant)], spec, parameters)?;
     let some = candidates(&bench, controller);
     let mut desk = bench.desk();
-    let whole = timing("candidate: margins and DFT, search", 200, 64, |i| {
+    let whole = timing("candidate: margins and DFT, search", 400, 64, |i| {
         black_box(bench.score(black_box(&some[i % some.len()]), &mut desk));
     });
     let sampled = DiscretePlant::of(plant, controller.sample_time_s)?;
     let grid = SampledPlant::of_model(&sampled);
-    let chains = some
-        .iter()
-        .map(|x| Ok(bench.parameters().controller(x).sections()?.chain))
-        .collect::<Outcomes<Vec<_>>>()?;
+    let chains =
+        some.iter().map(|x| Ok(bench.parameters().controller(x).sections()?.chain)).collect::<Outcomes<Vec<_>>>()?;
     let mut on = LoopOnGrid::default();
-    let quick = timing("candidate: margins alone, search", 200, 64, |i| {
+    let quick = timing("candidate: margins alone, search", 400, 64, |i| {
         grid.judge(black_box(&chains[i % chains.len()]), &mut on);
     });
     let sections = controller.sections()?;

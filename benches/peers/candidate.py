@@ -78,7 +78,7 @@ def _loop(p: Prepared, c: Controller) -> control.StateSpace:
 
 
 def numpy_by_hand(p: Prepared, c: Controller) -> Figures:
-    """The cheapest that a careful user writes: vectorised over the grid, linear between points, poles by eigenvalues."""
+    """The cheapest that a careful user writes: vectorised, linear between points, poles by eigenvalues."""
     rows = sections(c)
     value = p.response * chain_response(rows, p.q)
     x = np.log(p.w_rad_s)

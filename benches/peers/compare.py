@@ -30,7 +30,8 @@ def pinned() -> dict[str, str]:
     for line in (Path(__file__).parent / "requirements.txt").read_text(encoding="utf-8").split():
         name, number = line.split("==")
         if version(name) != number:
-            sys.exit(f"{name} {version(name)} is installed, {number} is expected: pip install -r benches/peers/requirements.txt")
+            found = f"{name} {version(name)} is installed, {number} is expected"
+            sys.exit(f"{found}: pip install -r benches/peers/requirements.txt")
         wanted[name] = number
     return wanted
 

@@ -94,7 +94,7 @@ class ReferenceMargins:
 
 
 def margins(s: Sampled, rows: np.ndarray, points: int = 1_000_000) -> ReferenceMargins:
-    """Every crossing and both maxima: a grid of a million points, half even in frequency and half in its logarithm, then roots and minima."""
+    """Every crossing and both maxima: a million points, half even in frequency, half in its logarithm; then roots."""
 
     def loop(w: np.ndarray) -> np.ndarray:
         return block_response(s, w) * chain_response(rows, np.exp(-1j * w * s.sample_time_s))

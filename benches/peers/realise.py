@@ -1,7 +1,7 @@
 """State-space forms built by hand, the best-conditioned way into scipy and python-control.
 
-The plant is block-diagonal, one 2 x 2 block for each pair of poles; it is sampled by scipy's matrix exponential with the
-fractional delay kept exact (Åström & Wittenmark, Computer-Controlled Systems, ch. 2).
+The plant is block-diagonal, one 2 x 2 block for each pair of poles; it is sampled by scipy's matrix exponential with
+the fractional delay kept exact (Åström & Wittenmark, Computer-Controlled Systems, ch. 2).
 """
 
 from __future__ import annotations
