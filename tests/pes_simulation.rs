@@ -141,3 +141,44 @@ fn the_same_seed_gives_the_same_bits_and_another_does_not() {
     profile.noise.seed = 5;
     assert_ne!(a.pes, simulate(&plant(), &controller(), &profile).unwrap().pes);
 }
+
+#[test]
+fn the_quick_write_is_the_plain_one_up_to_rounding() {
+    use servotune::lti::DiscretePlant;
+    use servotune::pes::{QuickScene, QuickWork, Scene};
+    let mut profile = profile();
+    profile.noise =
+        Noise { encoder_rms: 0.003, windage_rms: 1e-3, windage_corner_hz: 60.0, seed: 5, ..Noise::default() };
+    let mut free = plant();
+    free.body = Body::FreeInertia { acceleration_gain: 1e7, viscous_rate_per_s: 0.0 };
+    for (plant, modes) in [(plant(), 0), (plant(), 4), (plant(), 9), (plant(), 16), (free, 0)] {
+        let mut plant = plant;
+        for i in 0..modes {
+            let w = 9000.0 + 2500.0 * f64::from(i);
+            let (zero_damping_ratio, pole_damping_ratio) = (0.02, 0.025);
+            plant.modes.push(Mode { zero_rad_s: 1.02 * w, zero_damping_ratio, pole_rad_s: w, pole_damping_ratio });
+        }
+        for delay_s in [0.0, 65e-6, 130e-6] {
+            plant.delay_s = delay_s;
+            let sampled = DiscretePlant::of(&plant, T).unwrap();
+            let scene = Scene::of_window(&profile, &sampled).unwrap();
+            let mut c = controller();
+            c.pid.kp *= 0.3;
+            c.pid.kd_s *= 0.3;
+            c.output_limit = Some(0.1);
+            let chain = c.sections().unwrap().chain;
+            let mut plain = scene.workspace(&sampled, chain.len());
+            scene.run(&sampled, &chain, c.feedforward.as_ref(), c.output_limit, &mut plain);
+            let mut work = QuickWork::default();
+            let peak =
+                QuickScene::of(scene.clone(), &sampled).run(&chain, c.feedforward.as_ref(), c.output_limit, &mut work);
+            let expected = scene.window(&plain);
+            assert_eq!(work.window.len(), expected.len());
+            // Sums in another order: rounding of terms of order 10, over a few hundred steps of a stable loop.
+            for (a, b) in work.window.iter().zip(expected) {
+                assert!((a - b).abs() < 1e-9, "{modes} {delay_s}: {a} {b}");
+            }
+            assert!((peak - plain.command.iter().fold(0.0f64, |a, u| a.max(u.abs()))).abs() < 1e-12);
+        }
+    }
+}

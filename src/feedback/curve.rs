@@ -57,6 +57,16 @@ impl ResponseCurve {
         &self.w
     }
 
+    /// Logarithms of those frequencies.
+    pub fn ln_w(&self) -> &[f64] {
+        &self.ln_w
+    }
+
+    /// ln|P| + j phase at each of them, the phase unwrapped from the first point.
+    pub fn ln_p(&self) -> &[Complex<f64>] {
+        &self.ln_p
+    }
+
     /// Poles at rest that the slope of the first points says.
     pub fn integrators(&self) -> usize {
         self.integrators

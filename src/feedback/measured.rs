@@ -1,14 +1,13 @@
 //! The loop of a measured response: the same margins, each with its interval.
 //!
-//! Between the points of the sweep ln L is interpolated over ln w. Each value may be off by the measurement's deviation and by
+//! Between the points of the sweep ln P is a cubic in ln w. Each value may be off by the measurement's deviation and by
 //! the interpolation's error, for which the local second differences speak. A mode narrower than the grid can still hide:
 //! these are intervals about noise and interpolation, not certificates.
 
 use super::open_loop::section_poles;
-use super::{FeedbackError, Margins, OpenLoop, margins};
+use super::{FeedbackError, Margins, OpenLoop, ResponseCurve, margins};
 use crate::frf::Frf;
 use crate::lti::{FrequencyResponse, Sections};
-use crate::numeric::interpolation::MonotoneCubic;
 use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
@@ -17,11 +16,11 @@ use std::f64::consts::{PI, TAU};
 #[derive(Clone, Debug)]
 pub struct MeasuredLoop<'a> {
     sections: &'a Sections,
-    /// ln |P| and the continuous phase of P (rad) over ln w, hold included.
-    ln_size: MonotoneCubic,
-    phase: MonotoneCubic,
+    /// The plant, hold included.
+    curve: ResponseCurve,
     /// Half width (95 %) of ln|P| and of the phase (rad) in each interval of the sweep.
     slack: Vec<f64>,
+    /// Phase of the plant at the first point (rad), on its true branch.
     start_phase: f64,
 }
 
@@ -72,23 +71,14 @@ impl<'a> MeasuredLoop<'a> {
     /// The plant is taken to be stable with a phase between +90 and -270 deg at the first point, as a positioner's is.
     pub fn new(frf: &Frf, sections: &'a Sections, hold_included: bool) -> Result<Self, FeedbackError> {
         let t = sections.sample_time_s;
-        let n = frf.w_rad_s().partition_point(|&w| w < PI / t);
+        let curve = ResponseCurve::of(frf, t, |w| if hold_included { Complex::new(1.0, 0.0) } else { hold(w * t) })?;
+        let (ln_w, ln_p) = (curve.ln_w(), curve.ln_p());
+        let n = ln_w.len();
         if n < 4 {
             let from_hz = frf.w_rad_s()[0] / TAU;
             return Err(FeedbackError::Band { from_hz, half_rate_hz: 0.5 / t });
         }
-        let w = &frf.w_rad_s()[..n];
-        let value: Vec<Complex<f64>> =
-            w.iter().zip(frf.value()).map(|(&w, &p)| if hold_included { p } else { p * hold(w * t) }).collect();
-        let ln_w: Vec<f64> = w.iter().map(|w| w.ln()).collect();
-        let ln_size: Vec<f64> = value.iter().map(|v| v.norm().ln()).collect();
-        let mut phase = Vec::with_capacity(n);
-        let first = value[0].arg();
-        phase.push(if first > PI / 2.0 { first - TAU } else { first });
-        for pair in value.windows(2) {
-            let before = phase[phase.len() - 1];
-            phase.push(before + (pair[1] * pair[0].conj()).arg());
-        }
+        let (ln_size, phase): (Vec<f64>, Vec<f64>) = ln_p.iter().map(|p| (p.re, p.im)).unzip();
         let deviation: Vec<f64> = match frf.relative_std() {
             Some(s) => s[..n].to_vec(),
             None => vec![scatter(&ln_size, &phase); n],
@@ -96,27 +86,23 @@ impl<'a> MeasuredLoop<'a> {
         let slack = (0..n - 1)
             .map(|i| {
                 let noise = REACH * deviation[i].max(deviation[i + 1]);
-                noise + bend(&ln_w, &ln_size, i).max(bend(&ln_w, &phase, i))
+                noise + bend(ln_w, &ln_size, i).max(bend(ln_w, &phase, i))
             })
             .collect();
-        let start_phase = phase[0];
-        Ok(MeasuredLoop {
-            sections,
-            ln_size: MonotoneCubic::new(ln_w.clone(), ln_size),
-            phase: MonotoneCubic::new(ln_w, phase),
-            slack,
-            start_phase,
-        })
+        let first = phase[0];
+        let start_phase = if first > PI / 2.0 { first - TAU } else { first };
+        Ok(MeasuredLoop { sections, curve, slack, start_phase })
     }
 
     /// Half width (95 %) of ln|L| and of arg L (rad) at a frequency of the band.
     fn slack_at(&self, w: f64) -> f64 {
-        self.slack[self.ln_size.interval(w.ln())]
+        let i = self.curve.ln_w().partition_point(|k| *k <= w.ln());
+        self.slack[i.saturating_sub(1).min(self.slack.len() - 1)]
     }
 
     fn ends(&self) -> (f64, f64) {
-        let x = self.ln_size.x();
-        (x[0].exp(), x[x.len() - 1].exp())
+        let w = self.curve.w_rad_s();
+        (w[0], w[w.len() - 1])
     }
 
     /// How far (rad/s) around a crossing `level(w)` stays within the slack of 0: there the true curve may cross.
@@ -182,15 +168,14 @@ fn bend(x: &[f64], y: &[f64], i: usize) -> f64 {
 
 impl OpenLoop for MeasuredLoop<'_> {
     fn at(&self, w: f64) -> Complex<f64> {
-        let x = w.ln();
-        Complex::from_polar(self.ln_size.at(x).exp(), self.phase.at(x)) * self.sections.at(w)
+        self.curve.at(w) * self.sections.at(w)
     }
 
     fn grid(&self) -> Vec<f64> {
         let (first, last) = self.ends();
         let mut grid = super::frequency_grid(&[], self.sections);
         grid.retain(|&w| w > first && w < last);
-        grid.extend(self.ln_size.x().iter().map(|x| x.exp()));
+        grid.extend_from_slice(self.curve.w_rad_s());
         grid.sort_by(f64::total_cmp);
         grid.dedup_by(|b, a| *b - *a < 1e-9 * *a);
         grid

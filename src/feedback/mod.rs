@@ -12,6 +12,7 @@
 mod crossing;
 mod cubic;
 mod curve;
+mod events;
 mod gang;
 mod grid;
 mod margins;
@@ -24,6 +25,7 @@ mod trace;
 
 pub use crossing::Crossing;
 pub use curve::ResponseCurve;
+pub use events::{Event, GRAZE, Graze, QuickMargins};
 pub use gang::{GangOfFour, gang_of_four};
 pub use grid::frequency_grid;
 pub use margins::{Margins, margins};
@@ -31,5 +33,5 @@ pub use measured::{Interval, MarginIntervals, MeasuredLoop, MeasuredMargins, hol
 pub use nyquist::{NyquistCount, nyquist_count};
 pub use open_loop::{FeedbackError, ModelLoop, OpenLoop, angle_from_rest};
 pub use poles::closed_loop_poles;
-pub use sampled::{Event, GRAZE, Graze, LoopOnGrid, QuickMargins, SampledPlant};
+pub use sampled::{LoopOnGrid, SampledPlant};
 pub use trace::Trace;

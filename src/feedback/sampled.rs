@@ -5,6 +5,7 @@
 //! What is shipped is judged again by [`super::margins`]; spec: `specs/tuning.md`.
 
 use super::cubic::Cubic;
+use super::events::{Event, GRAZE, Graze, QuickMargins};
 use super::frequency_grid;
 use crate::lti::{DiscretePlant, FrequencyResponse, Section, Sections};
 use nalgebra::Complex;
@@ -12,6 +13,8 @@ use std::f64::consts::{PI, TAU};
 
 /// Phase crossings this much (ln|L|²) beyond the smallest gain margin are read: 6.5 dB, several times what a step changes.
 const NEARLY: f64 = 1.5;
+/// Extrema of |L|² this near to 1 on the grid are looked at for a graze.
+const NEAR_ONE: f64 = 0.07;
 /// Dips of |1 + L|² up to this factor above the lowest are read: twice the lowest distance.
 const DEEP: f64 = 4.0;
 
@@ -53,74 +56,14 @@ pub struct LoopOnGrid {
     lifted: [Vec<f64>; 2],
     /// Candidates for phase crossings: point before, ln|L|² there.
     passes: Vec<(usize, f64)>,
+    /// Points where |1 + L| is lower than at both neighbours.
+    lows: Vec<usize>,
     /// What was read off.
     pub quick: QuickMargins,
 }
 
-/// One event of the curve with what its derivatives need.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Event {
-    /// Where (rad/s).
-    pub w_rad_s: f64,
-    /// Phase margin (deg), gain margin (dB) or |1 + L|.
-    pub value: f64,
-    /// L there.
-    pub l: Complex<f64>,
-    /// d ln L / d ln w there; 0 where the event cannot move (half the sample rate).
-    pub slope: Complex<f64>,
-}
-
-/// An extremum of |L| near 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Graze {
-    /// The extremum; value: the phase margin that a crossing there would have (deg).
-    pub event: Event,
-    /// Whether |L| comes down to 1 there, rather than up to it.
-    pub minimum: bool,
-}
-
-/// Extrema of |L| within this of 1 (ln) are grazes: far more than the grid's error, far less than anybody can measure.
-pub const GRAZE: f64 = 0.01;
-
-/// Margins read off the grid.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct QuickMargins {
-    /// Closed-loop poles outside the unit circle.
-    pub unstable_poles: i64,
-    /// |L| = 1, value: phase margin (deg).
-    pub gain_crossings: Vec<Event>,
-    /// L real and negative, those near the smallest gain margin; value: gain margin (dB).
-    pub phase_crossings: Vec<Event>,
-    /// Extrema of |L| so near to 1 that a finer grid may see crossings there; value: phase margin (deg).
-    pub grazes: Vec<Graze>,
-    /// Local minima of |1 + L| up to twice the lowest, value: |1 + L|.
-    pub dips: Vec<Event>,
-    /// Largest |L|, for loops that never reach 1.
-    pub largest_gain: f64,
-}
-
-impl QuickMargins {
-    fn smallest(events: &[Event]) -> Option<Event> {
-        events.iter().copied().min_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))
-    }
-
-    /// The gain crossing whose phase margin is smallest in absolute value.
-    pub fn worst_gain_crossing(&self) -> Option<Event> {
-        Self::smallest(&self.gain_crossings)
-    }
-
-    /// The phase crossing whose gain margin is smallest in absolute value.
-    pub fn worst_phase_crossing(&self) -> Option<Event> {
-        Self::smallest(&self.phase_crossings)
-    }
-
-    /// Ms, the largest |1/(1 + L)|.
-    pub fn max_sensitivity(&self) -> f64 {
-        1.0 / self.dips.iter().map(|d| d.value).fold(f64::INFINITY, f64::min)
-    }
-}
-
-/// Largest ratio between neighbours of the model's grid above 20 Hz: fine enough that a notch of 0.05 spans four steps.
+/// Where crossovers and notches lie (Hz), and the largest ratio between neighbours there: a notch of 0.05 spans four steps.
+const FINE_HZ: [f64; 2] = [150.0, 4000.0];
 const STEP: f64 = 1.03;
 
 impl SampledPlant {
@@ -131,7 +74,8 @@ impl SampledPlant {
         let mut w = Vec::new();
         let mut last = 0.0;
         for x in frequency_grid(plant.terms(), &none) {
-            if last > TAU * 20.0 && (x > STEP * last || near_mode(0.5 * (last + x))) {
+            let fine = last > FINE_HZ[0] * TAU && x < FINE_HZ[1] * TAU && x > STEP * last;
+            if last > 0.0 && (fine || near_mode(0.5 * (last + x))) {
                 w.push((last * x).sqrt());
             }
             // Far below any crossover a loop needs few points; its integrators draw a straight line there.
@@ -230,36 +174,53 @@ impl SampledPlant {
         let mut passes = std::mem::take(&mut on.passes);
         passes.clear();
         let (re, im, gain, distance) = (&on.re[..n], &on.im[..n], &on.gain[..n], &on.distance[..n]);
-        quick.largest_gain = gain.iter().copied().fold(0.0, f64::max).sqrt();
-        let lowest = distance.iter().copied().fold(f64::INFINITY, f64::min);
-        for i in 0..n - 1 {
-            if (gain[i] < 1.0) != (gain[i + 1] < 1.0) {
-                quick.gain_crossings.push(self.gain_event(on, i));
+        let mut lows = std::mem::take(&mut on.lows);
+        lows.clear();
+        // One pass, one rarely taken branch a point.
+        let (mut below, mut under, mut falling, mut sinking) = (gain[0] < 1.0, im[0] < 0.0, false, false);
+        let at = gain.windows(2).zip(im.windows(2)).zip(distance.windows(2)).enumerate();
+        for (i, ((g, y), d)) in at {
+            let (below_next, under_next) = (g[1] < 1.0, y[1] < 0.0);
+            let (falls, sinks) = (d[1] < d[0], g[1] < g[0]);
+            let turns = sinks != sinking && (g[0] - 1.0).abs() < NEAR_ONE;
+            if (below != below_next) | (under != under_next) | (falling & !falls) | turns {
+                if below != below_next {
+                    quick.gain_crossings.push(self.gain_event(on, i));
+                }
+                if under != under_next && crossing_side(re[i], y[0], re[i + 1], y[1]) < 0.0 {
+                    passes.push((i, g[0].ln()));
+                }
+                if falling && !falls {
+                    lows.push(i);
+                }
+                if turns && i > 0 {
+                    let event = self.gain_extremum(on, i, sinking);
+                    if event.l.norm().ln().abs() < GRAZE {
+                        quick.grazes.push(Graze { event, minimum: sinking });
+                    }
+                }
             }
-            if (im[i] < 0.0) != (im[i + 1] < 0.0) && crossing_side(re[i], im[i], re[i + 1], im[i + 1]) < 0.0 {
-                passes.push((i, gain[i].ln()));
-            }
+            (below, under, falling, sinking) = (below_next, under_next, falls, sinks);
         }
-        // Only crossings that may be the worst, or nearly, are worth their interpolation.
+        // Only crossings that may be the worst, or nearly, are worth their interpolation; likewise dips.
         let least = passes.iter().map(|(_, g)| g.abs()).fold(f64::INFINITY, f64::min);
         for (i, _) in passes.iter().filter(|(_, g)| g.abs() <= least + NEARLY) {
             quick.phase_crossings.extend(self.phase_event(on, *i));
         }
-        for i in 1..n.saturating_sub(1) {
-            if (gain[i] - 1.0).abs() < 2.0 * GRAZE + 0.05 && (gain[i] < gain[i - 1]) == (gain[i] < gain[i + 1]) {
-                let event = self.gain_extremum(on, i, gain[i] < gain[i - 1]);
-                if event.l.norm().ln().abs() < GRAZE {
-                    quick.grazes.push(Graze { event, minimum: gain[i] < gain[i - 1] });
-                }
-            }
-            let low = distance[i] <= distance[i - 1] && distance[i] < distance[i + 1];
-            if low && distance[i] <= DEEP * lowest {
-                quick.dips.push(self.dip_event(on, i));
-            }
+        let lowest = lows.iter().map(|&i| distance[i]).fold(distance[0].min(distance[n - 1]), f64::min);
+        for &i in lows.iter().filter(|&&i| distance[i] <= DEEP * lowest) {
+            quick.dips.push(self.dip_event(on, i));
         }
-        let lowest_at = distance.iter().position(|d| *d == lowest).unwrap_or(0);
+        on.lows = lows;
+        let lowest_at = if distance[0] <= lowest {
+            0
+        } else if distance[n - 1] <= lowest {
+            n - 1
+        } else {
+            n
+        };
         on.passes = passes;
-        if lowest_at == 0 || lowest_at + 1 == n {
+        if lowest_at < n {
             let l = Complex::new(re[lowest_at], im[lowest_at]);
             let slope = Complex::new(0.0, 0.0);
             quick.dips.push(Event { w_rad_s: self.w[lowest_at], value: lowest.sqrt(), l, slope });

@@ -1,7 +1,7 @@
 //! The whole way from response to result.
 
 use super::body_start::{self, Start};
-use super::growth::{self, Joint, Stage};
+use super::growth::{self, Joint, Stage, structured};
 use super::held_out;
 use super::ladder;
 use super::noise::local_noise;
@@ -21,6 +21,8 @@ use std::f64::consts::TAU;
 /// Steps of the last joint fit and its tolerance: the sum of squares moves by less than its own scatter by far.
 const LAST_STEPS: usize = 60;
 const LAST_TOLERANCE: f64 = 1e-8;
+/// Most bodies from which growth begins.
+const STARTS: usize = 3;
 /// A deviation of ln ω0 above this (factor 1.6 either way at 95 %) leaves the natural frequency undetermined.
 const UNDETERMINED: f64 = 0.25;
 
@@ -44,11 +46,8 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
     };
     let steps = ladder::build(&sweep, settings);
     let mut memory = Workspace::default();
-    let start = match body_start::find(&sweep, settings, steps.as_ref(), ranges, &mut memory) {
-        Some(start) => start,
-        None => flat(&sweep),
-    };
-    let weight = match &sweep.relative_std {
+    let mut starts = body_start::find(&sweep, settings, steps.as_ref(), ranges, &mut memory).into_iter();
+    let weight: Vec<f64> = match &sweep.relative_std {
         // While modes are missing, their absence is the larger error: the deviations are levelled by their median.
         Some(s) => {
             let middle = median(s);
@@ -56,10 +55,21 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
         }
         None => vec![1.0; n],
     };
-    let target = sweep.value.iter().map(|v| v * start.sign).collect();
     let work = Work { linear_fits: steps.as_ref().map_or(0, |l| l.fits), ..Work::default() };
-    let mut joint = Joint { sweep: &sweep, target, weight, ranges, memory, work };
-    let (stages, last) = growth::grow(&mut joint, &start, settings);
+    let mut joint = Joint { sweep: &sweep, target: vec![], weight, ranges, memory, work };
+    let mut best = Climb::from(&mut joint, starts.next().unwrap_or_else(|| flat(&sweep)), settings);
+    for start in starts.take(STARTS - 1) {
+        // A later start is tried only where the best one has left more than noise.
+        if !best.left {
+            break;
+        }
+        let other = Climb::from(&mut joint, start, settings);
+        if other.cost() < best.cost() {
+            best = other;
+        }
+    }
+    let Climb { start, stages, last, .. } = best;
+    joint.target = sweep.value.iter().map(|v| v * start.sign).collect();
     let (chosen, held_out) = choose(&stages, last, joint.weight[0]);
     let Stage { mut shape, mut x, .. } = stages[chosen].clone();
     joint.weight = match &sweep.relative_std {
@@ -119,6 +129,30 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
         plant,
         spread,
     })
+}
+
+/// One start with all that grew from it.
+struct Climb {
+    start: Start,
+    stages: Vec<Stage>,
+    /// The last stage whose pairs stand out from noise.
+    last: usize,
+    /// Whether more than noise is left there.
+    left: bool,
+}
+
+impl Climb {
+    fn from(joint: &mut Joint, mut start: Start, settings: &IdentifySettings) -> Climb {
+        body_start::polish(joint.sweep, &mut start, joint.ranges, &mut joint.memory);
+        joint.target = joint.sweep.value.iter().map(|v| v * start.sign).collect();
+        let (stages, last) = growth::grow(joint, &start, settings);
+        let left = structured(&joint.ratio(stages[last].shape, &stages[last].x), &joint.weight);
+        Climb { start, stages, last, left }
+    }
+
+    fn cost(&self) -> f64 {
+        self.stages[self.last].cost
+    }
 }
 
 /// The last resort: a body at the sweep's middle with its level.

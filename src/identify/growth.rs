@@ -180,7 +180,7 @@ pub(super) fn grow(joint: &mut Joint, start: &Start, settings: &IdentifySettings
 }
 
 /// Whether more than noise is left: the residual exceeds twice what its neighbours' differences say.
-fn structured(ratio: &[Complex<f64>], weight: &[f64]) -> bool {
+pub(super) fn structured(ratio: &[Complex<f64>], weight: &[f64]) -> bool {
     let square: f64 = ratio.iter().zip(weight).map(|(r, w)| r.ln().norm_sqr() * w * w).sum();
     let size = (square / weight.iter().map(|w| w * w).sum::<f64>() / 2.0).sqrt();
     size > 2.0 * difference_noise(ratio)

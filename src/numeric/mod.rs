@@ -3,7 +3,6 @@
 //! In: plain slices. Out: plain numbers and small structs. Every method is deterministic.
 
 pub mod golden;
-pub mod interpolation;
 pub mod least_squares;
 pub mod levenberg;
 pub mod peaks;

@@ -4,6 +4,7 @@
 //! Convention: PES = reference - position (+ run-out), amplitude |X_k|/N; spec: `specs/pes.md`.
 
 mod dft;
+mod expected;
 mod figures;
 mod noise;
 mod profile;
@@ -13,6 +14,7 @@ mod simulation;
 mod spectral;
 
 pub use dft::{Harmonic, WindowDft};
+pub use expected::ExpectedNoise;
 pub use figures::{HIGH_BAND_HZ, LOW_BAND_HZ, PesFigures, figures};
 pub use profile::{Noise, PesClock, Profile, ProfileError, Runout, Spiral};
 pub use quick::{QuickScene, QuickWork};

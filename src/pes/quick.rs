@@ -39,8 +39,8 @@ struct Terms<const N: usize> {
     now: [[f64; N]; 2],
     before: [[f64; N]; 2],
     whole: usize,
-    reference: Vec<f64>,
-    encoder: Vec<f64>,
+    /// Reference less encoder noise.
+    target: Vec<f64>,
     windage: Vec<f64>,
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
@@ -100,9 +100,6 @@ impl QuickScene {
     }
 }
 
-/// Sections kept in registers and on the stack; longer chains fall back to the heap once.
-const SECTIONS: usize = 8;
-
 impl<const N: usize> Terms<N> {
     fn of(scene: &Scene, plant: &DiscretePlant) -> Terms<N> {
         let n = plant.numbers();
@@ -119,8 +116,7 @@ impl<const N: usize> Terms<N> {
             now: pair(n.now),
             before: pair(n.before),
             whole: n.whole,
-            reference: scene.reference.clone(),
-            encoder: scene.encoder.clone(),
+            target: scene.reference.iter().zip(&scene.encoder).map(|(r, e)| r - e).collect(),
             windage: scene.windage.clone(),
             velocity: scene.velocity.clone(),
             acceleration: scene.acceleration.clone(),
@@ -130,19 +126,30 @@ impl<const N: usize> Terms<N> {
     }
 
     fn run(&self, chain: &[Section], ff: Option<&Feedforward>, limit: Option<f64>, work: &mut QuickWork) -> f64 {
-        let still = Section { b0: 1.0, b1: 0.0, b2: 0.0, a1: 0.0, a2: 0.0 };
-        let mut fixed = [(still, [0.0f64; 2]); SECTIONS];
-        let mut long = Vec::new();
-        let memory: &mut [(Section, [f64; 2])] = if chain.len() <= SECTIONS {
-            &mut fixed[..chain.len()]
-        } else {
-            long.resize(chain.len(), (still, [0.0; 2]));
-            &mut long
-        };
-        for (m, s) in memory.iter_mut().zip(chain) {
-            m.0 = *s;
+        // A length known to the compiler keeps the chain in registers; longer chains than any firmware's take the slice.
+        match chain.len() {
+            1 => self.run_chain(&mut memory::<1>(chain), ff, limit, work),
+            2 => self.run_chain(&mut memory::<2>(chain), ff, limit, work),
+            3 => self.run_chain(&mut memory::<3>(chain), ff, limit, work),
+            4 => self.run_chain(&mut memory::<4>(chain), ff, limit, work),
+            5 => self.run_chain(&mut memory::<5>(chain), ff, limit, work),
+            6 => self.run_chain(&mut memory::<6>(chain), ff, limit, work),
+            _ => {
+                let mut long: Vec<_> = chain.iter().map(|s| (*s, [0.0; 2])).collect();
+                self.run_chain(long.as_mut_slice(), ff, limit, work)
+            }
         }
-        let ticks = self.reference.len();
+    }
+
+    #[inline(always)]
+    fn run_chain<M: AsMut<[(Section, [f64; 2])]> + ?Sized>(
+        &self,
+        memory: &mut M,
+        ff: Option<&Feedforward>,
+        limit: Option<f64>,
+        work: &mut QuickWork,
+    ) -> f64 {
+        let ticks = self.target.len();
         let lag = self.whole + 1;
         work.acting.clear();
         work.acting.resize(ticks + lag, 0.0);
@@ -152,17 +159,19 @@ impl<const N: usize> Terms<N> {
         let forwards = forward != [0.0; 2];
         let (mut re, mut im) = ([0.0f64; N], [0.0f64; N]);
         let mut peak = 0.0f64;
-        let mut readings = self.readings.iter().peekable();
-        while let Some(r) = readings.next_if(|r| r.sample < self.first) {
-            work.window.push(r.target);
+        let mut next = 0;
+        while next < self.readings.len() && self.readings[next].sample < self.first {
+            work.window.push(self.readings[next].target);
+            next += 1;
         }
+        let mut due = self.readings.get(next).map_or(usize::MAX, |r| r.sample);
         let acting = &mut work.acting[..ticks + lag];
-        let (reference, encoder, windage) = (&self.reference[..ticks], &self.encoder[..ticks], &self.windage[..ticks]);
+        let (target, windage) = (&self.target[..ticks], &self.windage[..ticks]);
         for k in self.first..ticks {
-            let mut signal = reference[k] - encoder[k] - sum(&re);
-            for (s, m) in memory.iter_mut() {
+            let mut signal = target[k] - sum(&re);
+            for (s, m) in memory.as_mut() {
                 let out = s.b0 * signal + m[0];
-                m[0] = s.b1 * signal - s.a1 * out + m[1];
+                m[0] = (s.b1 * signal + m[1]) - s.a1 * out;
                 m[1] = s.b2 * signal - s.a2 * out;
                 signal = out;
             }
@@ -173,23 +182,31 @@ impl<const N: usize> Terms<N> {
             peak = peak.max(u.abs());
             acting[k + lag] = u + windage[k];
             let (now, before) = (acting[k + 1], acting[k]);
-            while let Some(r) = readings.next_if(|r| r.sample == k) {
+            while due == k {
+                let r = &self.readings[next];
                 let mut position = [0.0; N];
                 for i in 0..N {
                     position[i] = r.states[0][i] * re[i] + r.states[1][i] * im[i];
                 }
                 work.window.push(r.target - (sum(&position) + r.inputs[0] * now + r.inputs[1] * before));
+                next += 1;
+                due = self.readings.get(next).map_or(usize::MAX, |r| r.sample);
             }
             for i in 0..N {
                 let (a, b) = (re[i], im[i]);
-                let (now_re, now_im) = (self.now[0][i] * now, self.now[1][i] * now);
-                let (before_re, before_im) = (self.before[0][i] * before, self.before[1][i] * before);
-                re[i] = self.lambda[0][i] * a - self.lambda[1][i] * b + (now_re + before_re);
-                im[i] = self.lambda[1][i] * a + self.lambda[0][i] * b + (now_im + before_im);
+                let driven_re = self.now[0][i] * now + self.before[0][i] * before;
+                let driven_im = self.now[1][i] * now + self.before[1][i] * before;
+                re[i] = (self.lambda[0][i] * a - self.lambda[1][i] * b) + driven_re;
+                im[i] = (self.lambda[1][i] * a + self.lambda[0][i] * b) + driven_im;
             }
         }
         peak
     }
+}
+
+/// The chain at rest, its length known.
+fn memory<const S: usize>(chain: &[Section]) -> [(Section, [f64; 2]); S] {
+    std::array::from_fn(|i| (chain[i], [0.0; 2]))
 }
 
 /// A sum by halves: short in time, and in a fixed order.

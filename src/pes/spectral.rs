@@ -4,6 +4,7 @@
 //! Between its lines nothing is left out; what is neglected: images above half the sample rate, the output limit, and the rest
 //! of one move that the next one still sees. Noise enters as expected power. Spec: `specs/tuning.md`, "The measured route".
 
+use super::expected::{ExpectedNoise, dot, kernel};
 use super::{PesError, Profile, Reference, WindowDft};
 use crate::controller::{Controller, Feedforward};
 use crate::feedback::{LoopOnGrid, ResponseCurve, SampledPlant};
@@ -15,15 +16,12 @@ use std::f64::consts::{PI, TAU};
 #[derive(Clone, Debug)]
 pub struct SpectralPes {
     lines: SampledPlant,
-    bins: SampledPlant,
     dft: WindowDft,
     /// For every bin, the weights of Re S and Im S of every line, to Re X and Im X: X = sum S A + conj(S) B.
     weight: Vec<[Vec<f64>; 4]>,
     /// Run-out of every bin, added at the head.
     runout: Vec<Complex<f64>>,
-    /// Expected |X|² of every bin per |T|² and per |P S|².
-    encoder_power: f64,
-    windage_power: Vec<f64>,
+    noise: ExpectedNoise,
     command: Option<Box<CommandLines>>,
     /// Which lines lie outside the sweep.
     outside: Vec<bool>,
@@ -37,9 +35,11 @@ struct CommandLines {
     forward: Vec<Complex<f64>>,
     /// Angle steps: instants (s) at which the command is looked at.
     instants: Vec<f64>,
-    /// Encoder and windage power density times line spacing, each counted for both signs.
-    encoder: f64,
-    windage: Vec<f64>,
+    /// The plant next to rest, and the mean of the reference: half the distance.
+    rest: SampledPlant,
+    mean: f64,
+    /// Line spacing, both signs counted (Hz).
+    spacing_hz: f64,
     samples: f64,
 }
 
@@ -47,13 +47,17 @@ struct CommandLines {
 #[derive(Clone, Debug, Default)]
 pub struct SpectralWork {
     lines: LoopOnGrid,
-    bins: LoopOnGrid,
+    rest: LoopOnGrid,
+    density: Vec<f64>,
+    noise: Vec<f64>,
     s_re: Vec<f64>,
     s_im: Vec<f64>,
 }
 
 /// Rest after the move before the way back, where the record itself leaves less (s).
 const REST_S: f64 = 0.02;
+/// How near to rest, as a share of the first line, the command that holds the mean position is taken.
+const NEAR_REST: f64 = 1e-2;
 /// Instants at which the command is looked at, spread over the move and a little beyond.
 const INSTANTS: usize = 400;
 
@@ -101,16 +105,7 @@ impl SpectralPes {
             }
             weight.push(rows);
         }
-        let noise = &profile.noise;
-        let keep = (-TAU * noise.windage_corner_hz * t).exp();
-        let coloured = |w: f64| {
-            let back = Complex::new(1.0, 0.0) - keep * Complex::from_polar(1.0, -w * t);
-            noise.windage_rms.powi(2) * t * (1.0 - keep * keep) / back.norm_sqr()
-        };
-        let bin_w: Vec<f64> = dft.bins().iter().map(|&k| TAU * dft.hz(k)).collect();
-        let bin_p: Vec<Complex<f64>> = bin_w.iter().map(|w| plant.at(*w)).collect();
-        // Density (per hertz, both signs) times rate over N: the power of one bin of a white sequence is its variance over N.
-        let per_bin = rate / n as f64;
+        let spacing_hz = 2.0 / period;
         let runout = runout(profile, &dft, from_s, n);
         let command = command.then(|| {
             Box::new(CommandLines {
@@ -119,20 +114,22 @@ impl SpectralPes {
                 instants: (0..INSTANTS)
                     .map(|i| spiral.start_s + (end_s + 0.5 * REST_S - spiral.start_s) * i as f64 / INSTANTS as f64)
                     .collect(),
-                encoder: noise.encoder_rms.powi(2) * t * 4.0 / period,
-                windage: w.iter().map(|w| coloured(*w) * 4.0 / period).collect(),
+                rest: {
+                    let near = NEAR_REST * w[0];
+                    SampledPlant::of_points(t, plant.integrators(), vec![near], &[plant.at(near)])
+                },
+                mean: 0.5 * spiral.distance.copysign(spiral.velocity),
+                spacing_hz: 2.0 * spacing_hz,
                 samples: spiral.duration_s / t,
             })
         });
         Ok(SpectralPes {
             outside: w.iter().map(|w| !plant.covers(*w)).collect(),
+            noise: ExpectedNoise::new(profile, &dft, &w, spacing_hz, t),
             lines: SampledPlant::of_points(t, plant.integrators(), w, &p),
-            windage_power: bin_w.iter().map(|w| coloured(*w) * per_bin).collect(),
-            bins: SampledPlant::of_points(t, plant.integrators(), bin_w, &bin_p),
             dft,
             weight,
             runout,
-            encoder_power: noise.encoder_rms.powi(2) * t * per_bin,
             command,
         })
     }
@@ -145,19 +142,16 @@ impl SpectralPes {
     /// Root of the expected |X_k|²/N² for every bin, into `amplitude`; returns the command's peak, 0 where it is not asked for.
     pub fn write(&self, chain: &[Section], work: &mut SpectralWork, amplitude: &mut Vec<f64>) -> f64 {
         self.sensitivities(chain, work);
-        self.bins.close(chain, &mut work.bins);
+        let on = [&work.lines.re[..], &work.lines.im[..]];
+        self.noise.power(&self.lines, on, &mut work.density, &mut work.noise);
         amplitude.clear();
         for (k, rows) in self.weight.iter().enumerate() {
             let [a, b, c, d] = rows;
             let re = dot(a, &work.s_re) + dot(b, &work.s_im) + self.runout[k].re;
             let im = dot(c, &work.s_re) + dot(d, &work.s_im) + self.runout[k].im;
-            let l = Complex::new(work.bins.re[k], work.bins.im[k]);
-            let s = 1.0 / (1.0 + l);
-            let noise =
-                self.encoder_power * (l * s).norm_sqr() + self.windage_power[k] * (self.bins.value(k) * s).norm_sqr();
-            amplitude.push((re * re + im * im + noise).sqrt());
+            amplitude.push((re * re + im * im + work.noise[k]).sqrt());
         }
-        self.command.as_ref().map_or(0.0, |c| self.command_peak(c, work))
+        self.command.as_ref().map_or(0.0, |c| self.command_peak(c, chain, work))
     }
 
     /// Share of the energy in the bins that comes from lines outside the sweep, where the plant is a continuation.
@@ -190,7 +184,7 @@ impl SpectralPes {
     }
 
     /// The largest command of the move, and the expected largest of its noise on top.
-    fn command_peak(&self, c: &CommandLines, work: &SpectralWork) -> f64 {
+    fn command_peak(&self, c: &CommandLines, chain: &[Section], work: &mut SpectralWork) -> f64 {
         let n = self.outside.len();
         let mut power = 0.0;
         // U = C E + F R; C from L = P C, and outside the sweep, where P is 0, nothing is known of it: the lines end there.
@@ -200,8 +194,13 @@ impl SpectralPes {
             let s = Complex::new(work.s_re[i], work.s_im[i]);
             let gain = if p.norm_sqr() > 0.0 { l / p } else { Complex::new(0.0, 0.0) };
             command.push(gain * s * c.error[i] + c.forward[i]);
-            power += c.encoder * (gain * s).norm_sqr() + c.windage[i] * (l * s).norm_sqr();
+            let (encoder, windage) = (self.noise.encoder(), self.noise.windage(i));
+            power += (encoder * (gain * s).norm_sqr() + windage * (l * s).norm_sqr()) * c.spacing_hz;
         }
+        // What holds the mean position: C S next to rest, where it is real.
+        c.rest.close(chain, &mut work.rest);
+        let l = Complex::new(work.rest.re[0], work.rest.im[0]);
+        let held = c.mean * (l / (c.rest.value(0) * (1.0 + l))).re;
         let at = |time: f64| {
             // The lines are odd multiples of the first: one rotation steps from each to the next.
             let first = self.lines.w_rad_s()[0] * time;
@@ -211,33 +210,11 @@ impl SpectralPes {
                 sum += u.re * turn.re - u.im * turn.im;
                 turn *= step;
             }
-            (2.0 * sum).abs()
+            (held + 2.0 * sum).abs()
         };
         let peak = c.instants.iter().map(|t| at(*t)).fold(0.0, f64::max);
         peak + (power * 2.0 * c.samples.max(2.0).ln()).sqrt()
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (a4, a1) = a.as_chunks::<4>();
-    let (b4, b1) = b.as_chunks::<4>();
-    let mut sum = [0.0; 4];
-    for (a, b) in a4.iter().zip(b4) {
-        for j in 0..4 {
-            sum[j] += a[j] * b[j];
-        }
-    }
-    let rest: f64 = a1.iter().zip(b1).map(|(a, b)| a * b).sum();
-    (sum[0] + sum[1]) + (sum[2] + sum[3]) + rest
-}
-
-/// Mean of exp(j angle i) over i = 0..n.
-fn kernel(angle: f64, n: usize) -> Complex<f64> {
-    let half = 0.5 * angle;
-    let n = n as f64;
-    let size =
-        if half.sin().abs() < 1e-12 { (n * half).cos() / half.cos() } else { (n * half).sin() / (n * half.sin()) };
-    Complex::from_polar(1.0, (n - 1.0) * half) * size
 }
 
 /// The feed-forward's response: central differences of the reference.

@@ -173,10 +173,10 @@ impl Parameters {
         for (i, &parameter) in self.free.iter().enumerate() {
             *Self::raw(c, parameter) = x[i].exp();
         }
-        for i in 0..self.free.len() {
-            if let Parameter::NotchDepth { filter } = self.free[i] {
+        for (x, parameter) in x.iter().zip(&self.free) {
+            if let Parameter::NotchDepth { filter } = *parameter {
                 let notch = &mut c.notch[filter];
-                notch.zero_damping_ratio = x[i].exp() * notch.pole_damping_ratio;
+                notch.zero_damping_ratio = x.exp() * notch.pole_damping_ratio;
             }
         }
     }

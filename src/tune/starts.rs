@@ -63,6 +63,7 @@ pub(super) fn starts(
         order.into_iter().map(|i| (i as f64 + random.uniform()) / n as f64).collect()
     };
     let columns: Vec<Vec<f64>> = (0..10).map(|_| column()).collect();
+    #[allow(clippy::needless_range_loop, reason = "i is the stratum, an index into every column")]
     for i in 0..n {
         let between = |c: usize, from: f64, to: f64| from + (to - from) * columns[c][i];
         let shape = Shape {

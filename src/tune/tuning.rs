@@ -27,7 +27,7 @@ pub struct TuneSettings {
 
 impl Default for TuneSettings {
     fn default() -> Self {
-        TuneSettings { sample_time_s: 39.6e-6, starts: 12, simplex_steps: 100, polish_steps: 40 }
+        TuneSettings { sample_time_s: 39.6e-6, starts: 12, simplex_steps: 40, polish_steps: 40 }
     }
 }
 
@@ -120,18 +120,16 @@ pub fn tune_jointly(
     let mut best: Option<(Vec<f64>, Vec<Proof>)> = None;
     for end in found.ends.iter().take(ENDS) {
         let settled = ending.settle(&mut bench, &end.x, settings.polish_steps)?;
-        let miss =
-            |proofs: &[Proof]| proofs.iter().map(|p| p.judged.worst()).fold(f64::NEG_INFINITY, f64::max).max(0.0);
-        if best.as_ref().is_none_or(|(_, b)| miss(&settled.1) < miss(b)) {
+        if best.as_ref().is_none_or(|(_, b)| worst(&settled.1) < worst(b)) {
             best = Some(settled);
         }
-        if best.as_ref().is_some_and(|(_, b)| miss(b) == 0.0) || end.score.violation > 0.0 {
+        if best.as_ref().is_some_and(|(_, b)| worst(b) == 0.0) || end.score.violation > 0.0 {
             break;
         }
     }
     let (x, after) = best.ok_or(TuneError::NoStableLoop { starts: settings.starts })?;
     let controller = bench.parameters.controller(&x);
-    let at_bounds = at_bounds(&bench, &x);
+    let on_bounds = at_bounds(&bench, &x);
     let work = |ending: &Ending<'_>| Work {
         route: machines[0].route(),
         starts: found.starts,
@@ -141,18 +139,37 @@ pub fn tune_jointly(
     };
     if after.iter().all(|p| p.judged.passes()) {
         let work = work(&ending);
-        return Ok(Outcome::Tuned(Tuned { controller, before, after, at_bounds, work }));
+        return Ok(Outcome::Tuned(Tuned { controller, before, after, at_bounds: on_bounds, work }));
     }
-    let share = after.iter().map(|p| p.judged.worst()).fold(0.0, f64::max);
-    let relaxed = relaxed_spec(&bench.wanted, &after, share);
-    let conflicts = relaxed.iter().filter_map(|(_, limit)| *limit).collect();
-    // Confirmation: the same polish against the relaxed limits, from the compromise, judged exactly.
-    let wanted: Vec<Requirement> = relaxed.iter().map(|(r, _)| *r).collect();
-    bench.wanted = wanted.clone();
-    let (_, again) = ending.settle(&mut bench, &x, settings.polish_steps)?;
-    let confirmed = again.iter().all(|p| super::Judged::of(&wanted, p.judged.found.clone()).passes());
+    let compromise = Compromise { share: worst(&after), x, after };
+    let (mut conflicts, mut confirmed, mut reached) = (Vec::new(), false, compromise.clone());
+    // First only the limits that set the share give; where that is not enough, every limit that the compromise misses.
+    for part in [1.0 - SAME_MISS, 0.0] {
+        let relaxed = compromise.relaxed(&bench.wanted, part);
+        let wanted: Vec<Requirement> = relaxed.iter().map(|(r, _)| *r).collect();
+        conflicts = relaxed.into_iter().filter_map(|(_, limit)| limit).collect();
+        let asked = std::mem::replace(&mut bench.wanted, wanted.clone());
+        bench.aim(&vec![vec![0.0; wanted.len()]; machines.len()]);
+        let from = refine(&bench, &compromise.x, settings.polish_steps, &mut bench.desk());
+        let from = from.map_or_else(|| compromise.x.clone(), |p| p.x);
+        let (x, after) = ending.settle(&mut bench, &from, settings.polish_steps)?;
+        bench.wanted = asked;
+        confirmed = after.iter().all(|p| super::Judged::of(&wanted, p.judged.found.clone()).passes());
+        if confirmed {
+            reached = Compromise { share: worst(&after), x, after };
+            break;
+        }
+    }
     let work = work(&ending);
+    let Compromise { x, share, after } = reached;
+    let controller = bench.parameters.controller(&x);
+    let at_bounds = at_bounds(&bench, &x);
     Ok(Outcome::Infeasible(Infeasible { controller, before, after, conflicts, share, confirmed, at_bounds, work }))
+}
+
+/// The largest violation over machines, at least 0.
+fn worst(proofs: &[Proof]) -> f64 {
+    proofs.iter().map(|p| p.judged.worst()).fold(0.0, f64::max)
 }
 
 fn check(
@@ -256,27 +273,32 @@ fn at_bounds(bench: &Bench, x: &[f64]) -> Vec<AtBound> {
     p.free().iter().zip(p.bounds()).zip(x).filter_map(on).collect()
 }
 
-/// Every limit, moved so far that the compromise meets it on every machine; the second is there where it is in conflict.
-fn relaxed_spec(wanted: &[Requirement], after: &[Proof], share: f64) -> Vec<(Requirement, Option<RelaxedLimit>)> {
-    let relax = |(i, w): (usize, &Requirement)| {
-        let worst = after.iter().map(|p| p.judged.limits[i]).max_by(|a, b| a.violation.total_cmp(&b.violation));
-        let Some(worst) = worst.filter(|l| l.violation > 0.0) else { return (*w, None) };
-        let limit = match (worst.found, w.side) {
-            (Some(x), Side::AtLeast) => (x * (1.0 - ROOM)).max(f64::MIN_POSITIVE),
-            (Some(x), Side::AtMost) => x * (1.0 + ROOM),
-            (None, _) => w.limit,
+/// The candidate whose largest miss is smallest.
+#[derive(Clone)]
+struct Compromise {
+    x: Vec<f64>,
+    share: f64,
+    after: Vec<Proof>,
+}
+
+impl Compromise {
+    /// The limits, those missed by at least `part` of the share moved so far that the compromise meets them.
+    fn relaxed(&self, wanted: &[Requirement], part: f64) -> Vec<(Requirement, Option<RelaxedLimit>)> {
+        let relax = |(i, w): (usize, &Requirement)| {
+            let worst =
+                self.after.iter().map(|p| p.judged.limits[i]).max_by(|a, b| a.violation.total_cmp(&b.violation));
+            let missed = |l: &super::JudgedLimit| l.violation > 0.0 && l.violation >= part * self.share;
+            let Some(worst) = worst.filter(missed) else { return (*w, None) };
+            let limit = match (worst.found, w.side) {
+                (Some(x), Side::AtLeast) => (x * (1.0 - ROOM)).max(f64::MIN_POSITIVE),
+                (Some(x), Side::AtMost) => x * (1.0 + ROOM),
+                (None, _) => w.limit,
+            };
+            let (what, side, found) = (w.what, w.side, worst.found);
+            let missed_by = worst.slack.map(|s| (-s).max(0.0));
+            let relaxed = RelaxedLimit { what, side, limit: w.limit, found, missed_by, feasible_limit: limit };
+            (Requirement { limit, ..*w }, Some(relaxed))
         };
-        let missed_by = worst.slack.map(|s| (-s).max(0.0));
-        let relaxed = RelaxedLimit {
-            what: w.what,
-            side: w.side,
-            limit: w.limit,
-            found: worst.found,
-            missed_by,
-            feasible_limit: limit,
-        };
-        let named = worst.violation >= (1.0 - SAME_MISS) * share;
-        (Requirement { limit, ..*w }, named.then_some(relaxed))
-    };
-    wanted.iter().enumerate().map(relax).collect()
+        wanted.iter().enumerate().map(relax).collect()
+    }
 }

@@ -1,0 +1,111 @@
+//! The house keeps its plan: arrows point downwards, outside crates have one home, files stay short.
+#![allow(clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+
+/// Rooms by rank; a room uses lower ranks only (`specs/decisions/rooms.md`).
+const RANKS: [&[&str]; 10] = [
+    &["units", "document", "numeric"],
+    &["frf", "recording", "lti", "physics"],
+    &["controller"],
+    &["identify", "feedback"],
+    &["pes"],
+    &["tune", "gate", "diagnose"],
+    &["twin", "fleet"],
+    &["report"],
+    &["study"],
+    &["cli"],
+];
+
+/// Outside crates and the places where they may be named.
+const HOMES: [(&str, &[&str]); 8] = [
+    ("argmin", &["src/tune/search.rs"]),
+    ("rustfft", &["src/numeric/spectrum.rs"]),
+    ("rayon", &["src/tune/search.rs", "src/study/"]),
+    ("clap", &["src/cli/"]),
+    ("maud", &["src/report/"]),
+    ("sha2", &["src/document/digest.rs", "src/frf/"]),
+    ("csv", &["src/frf/", "src/recording/"]),
+    ("flate2", &["src/frf/", "src/recording/"]),
+];
+
+/// Longest file (lines).
+const LINES: usize = 400;
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    let mut entries: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    entries.sort();
+    for path in entries {
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+fn each_source(mut look: impl FnMut(&str, &str)) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    sources(&root.join("src"), &mut files);
+    assert!(files.len() > 50, "the sources were not found");
+    for file in files {
+        let name = file.strip_prefix(root).unwrap().to_string_lossy().replace('\\', "/");
+        look(&name, &std::fs::read_to_string(&file).unwrap());
+    }
+}
+
+fn rank(room: &str) -> Option<usize> {
+    RANKS.iter().position(|rooms| rooms.contains(&room))
+}
+
+#[test]
+fn a_room_uses_lower_ranks_only() {
+    let mut wrong = Vec::new();
+    each_source(|name, text| {
+        let Some(room) = name.strip_prefix("src/").and_then(|n| n.split_once('/')).map(|(r, _)| r) else { return };
+        let own = rank(room).unwrap_or_else(|| panic!("{name}: the room `{room}` has no rank"));
+        // What stands in a comment or in a test module names no arrow of the house.
+        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+        for line in code.lines().map(str::trim_start).filter(|l| !l.starts_with("//")) {
+            for (at, _) in line.match_indices("crate::") {
+                let used: String = line[at + 7..].chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                if used != room && rank(&used).is_some_and(|r| r >= own) {
+                    wrong.push(format!("{name}: {line}"));
+                }
+            }
+        }
+    });
+    assert!(wrong.is_empty(), "arrows upward or sideways:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn an_outside_crate_has_one_home() {
+    let mut wrong = Vec::new();
+    each_source(|name, text| {
+        for (krate, homes) in HOMES {
+            let named = text.lines().map(str::trim_start).any(|l| {
+                !l.starts_with("//") && (l.contains(&format!("use {krate}::")) || l.contains(&format!(" {krate}::")))
+            });
+            if named && !homes.iter().any(|h| name.starts_with(h)) {
+                wrong.push(format!("{name} names {krate}"));
+            }
+        }
+    });
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn files_stay_short_and_say_what_they_are() {
+    let mut wrong = Vec::new();
+    each_source(|name, text| {
+        let lines = text.lines().count();
+        if lines > LINES {
+            wrong.push(format!("{name}: {lines} lines, more than {LINES}"));
+        }
+        if !text.starts_with("//!") {
+            wrong.push(format!("{name}: no header"));
+        }
+    });
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
