@@ -12,7 +12,7 @@ import control
 import numpy as np
 
 import write
-from machine import Controller
+from machine import Controller, Profile
 from realise import Sampled, chain_response, chain_state_space, closed_loop, sections
 
 GRID_POINTS = 1000
@@ -129,23 +129,41 @@ def _smallest(values: np.ndarray) -> int | None:
     return None if len(values) == 0 else int(np.argmin(abs(values)))
 
 
-def whole_by_control(p: Prepared, s: write.Scene, c: Controller) -> tuple[float, float]:
+@dataclass(frozen=True)
+class Write:
+    """The write without noise, and its noise."""
+
+    scene: write.Scene
+    noise: write.NoiseOnLines
+
+    def norms(self, pes: np.ndarray, rows: np.ndarray) -> tuple[float, float]:
+        """Both DFT norms, noise as expected power."""
+        amplitudes = write.harmonics(pes, self.scene.profile)
+        return write.bands(np.sqrt(amplitudes**2 + self.noise.power(rows)), self.scene.profile)
+
+
+def prepare_write(profile: Profile, plant: Sampled) -> Write:
+    return Write(write.scene(write.quiet(profile), plant, whole=False), write.noise_on_lines(profile, plant))
+
+
+def whole_by_control(p: Prepared, w: Write, c: Controller) -> tuple[float, float]:
     """One candidate with python-control: margins on the sampled response, poles, write, DFT."""
     control_frd(p, c)
     rows = sections(c)
     a, _ = closed_loop(p.plant, rows)
     np.linalg.eigvals(a)
-    return write.bands(write.harmonics(write.by_control(s, rows), s.profile), s.profile)
+    return w.norms(write.by_control(w.scene, rows), rows)
 
 
-def whole_by_scipy(p: Prepared, s: write.Scene, c: Controller) -> tuple[float, float]:
+def whole_by_scipy(p: Prepared, w: Write, c: Controller) -> tuple[float, float]:
     """One candidate with scipy's simulation and hand-written margins."""
     numpy_by_hand(p, c)
-    return write.bands(write.harmonics(write.by_scipy(s, sections(c)), s.profile), s.profile)
+    rows = sections(c)
+    return w.norms(write.by_scipy(w.scene, rows), rows)
 
 
-def whole_by_numpy(p: Prepared, s: write.Scene, c: Controller) -> tuple[Figures, float, float]:
+def whole_by_numpy(p: Prepared, w: Write, c: Controller) -> tuple[float, float]:
     """One candidate, hand-written throughout."""
-    figures = numpy_by_hand(p, c)
-    low, high = write.bands(write.harmonics(write.by_numpy(s, sections(c)), s.profile), s.profile)
-    return figures, low, high
+    numpy_by_hand(p, c)
+    rows = sections(c)
+    return w.norms(write.by_numpy(w.scene, rows), rows)

@@ -96,7 +96,7 @@ def compare_write(folder: Path) -> dict:
     words = ("simulate", "--plant", str(PLANT), "--controller", str(CONTROLLER), "--profile")
     plant, controller = healthy_machine(), nominal_controller()
     s, rows, profile = sampled(plant, controller.sample_time_s), sections(controller), spiral_write()
-    noiseless = type(profile)(**{**profile.__dict__, "encoder_rms": 0.0, "windage_rms": 0.0})
+    noiseless = write.quiet(profile)
     out: dict = {"routes": {}}
     routes = {
         "scipy.signal.dlsim": write.by_scipy,
@@ -128,7 +128,7 @@ def candidate_times() -> dict:
     plant, controller, profile = healthy_machine(), nominal_controller(), spiral_write()
     s, w = sampled(plant, controller.sample_time_s), candidate.grid()
     p = candidate.prepare(s, exact.block_response(s, w), w)
-    scene = write.scene(profile, s, whole=False)
+    scene = candidate.prepare_write(profile, s)
     calls = {
         "python-control (FRD of 1000 points, forced_response)": candidate.whole_by_control,
         "scipy (hand-written margins, dlsim)": candidate.whole_by_scipy,

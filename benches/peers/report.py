@@ -168,7 +168,8 @@ def _candidate(r: dict) -> str:
     rows.append(["servotune, search", _both(ours), duration(ours["cpu_s"]), "1", "1", "1"])
     head = ["route", "median (fastest)", "processor", "times servotune: medians", "fastest", "processor"]
     return (
-        "## One candidate of a search\n\nMargins, Ms, stability, write up to the end of the window, DFT; "
+        "## One candidate of a search\n\nMargins, Ms, stability, write up to the end of the window, DFT, "
+        "expected power of the noise; "
         "all that does not depend on the gains is prepared before.\n\n" + table(head, rows)
     )
 
@@ -247,7 +248,7 @@ def _tuning(r: dict) -> str:
         command = f" The whole command takes {duration(t['command_time']['median_s'])}."
     return (
         "## One full tuning\n\nHealthy machine, `benches/peers/spec.toml`, seven parameters. Objective: dft_low/limit + "
-        "dft_high/limit, smaller is better; a miss above 0 breaks a limit. Every result is judged by the reference, not by "
+        "dft_high/limit with the noise as its expected power, smaller is better; a miss above 0 breaks a limit. Every result is judged by the reference, not by "
         "the tuner that found it.\n\n"
         + table(head, rows)
         + f"\n\nservotune's verdict: {t['verdict']}.{command} The scipy optimisers run around the hand-written NumPy "
@@ -282,6 +283,8 @@ def _caveats() -> str:
 - The hand-built block-diagonal form is work that the peers leave to the user. With it they are as accurate as servotune.
 - Vector fitting: scikit-rf is meant for scattering parameters, without weights; the raw row uses it outside that purpose. The row with the true body and delay gives it
   what no user has, which is why its median error is the smaller one. servotune gets the sweep alone.
+- Noise in a candidate: both sides add the expected power of the noise on lines a quarter of a bin apart. The reference that judges the tunings sums the squared share of
+  every draw in the time domain and neglects nothing.
 - Tuning: scipy offers optimisers, not a servo tuner; price of a miss and starts were chosen here and not tuned for either side. Starts, polish and derivatives of
   servotune are counted as evaluations. A miss of some 0.02 % in a scipy row is the penalty's and the grid's, not a fault of the optimiser.
 - Other programs on the machine lengthen the wall times of both sides; the load stands above."""

@@ -1,8 +1,9 @@
 """One full tuning: scipy's optimisers around the cheapest candidate evaluation, with servotune's objective and limits.
 
-Objective: ln(dft_low/limit + dft_high/limit). Limits: margins, Ms, crossover, both DFT norms. A candidate that misses a
-limit by the share v pays 10 v; an unstable one pays more than any stable one. Parameters are searched as logarithms in
-the box of the spec. All optimisers start from the nominal controller or from shaken copies of it.
+Objective: ln(dft_low/limit + dft_high/limit) of the write, the noise as expected power. Limits: margins, Ms, crossover,
+both DFT norms. A candidate that misses a limit by the share v pays 10 v; an unstable one pays more than any stable one.
+Parameters are searched as logarithms in the box of the spec. All optimisers start from the nominal controller or from
+shaken copies of it.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ class Problem:
 
     spec: Spec
     prepared: candidate.Prepared
-    scene: write.Scene
+    write: candidate.Write
     base: Controller
     limit: int
     target: float = -np.inf
@@ -101,8 +102,8 @@ class Problem:
         figures = candidate.numpy_by_hand(self.prepared, c)
         if not figures.stable:
             return UNSTABLE + (0.0 if figures.gain_margin_db is None else abs(figures.gain_margin_db))
-        pes = write.by_numpy(self.scene, sections(c))
-        low, high = write.bands(write.harmonics(pes, self.scene.profile), self.scene.profile)
+        rows = sections(c)
+        low, high = self.write.norms(write.by_numpy(self.write.scene, rows), rows)
         objective, miss = _parts(figures, low, high, self.spec)
         return objective + PRICE * max(miss, 0.0)
 
@@ -139,16 +140,18 @@ def _prepared(limit: int) -> Problem:
     plant, base, spec = healthy_machine(), nominal_controller(), read_spec(SPEC)
     s, w = sampled(plant, base.sample_time_s), candidate.grid()
     prepared = candidate.prepare(s, exact.block_response(s, w), w)
-    return Problem(spec, prepared, write.scene(spec.profile, s, whole=False), base, limit)
+    return Problem(spec, prepared, candidate.prepare_write(spec.profile, s), base, limit)
 
 
 def judge(c: Controller) -> dict:
-    """Objective and largest miss by the reference: a million points, the whole write by scipy."""
+    """Objective and largest miss by the reference: a million points, scipy's simulation, the exact power of the noise."""
     spec, s = read_spec(SPEC), sampled(healthy_machine(), c.sample_time_s)
-    rows = sections(c)
+    profile, rows = spec.profile, sections(c)
     r = exact.margins(s, rows)
-    pes = write.by_scipy(write.scene(spec.profile, s, whole=True), rows)
-    low, high = write.bands(write.harmonics(pes, spec.profile), spec.profile)
+    scene = write.scene(write.quiet(profile), s, whole=True)
+    amplitudes = write.harmonics(write.by_scipy(scene, rows), profile)
+    power = write.expected_power_exact(scene, profile, rows)
+    low, high = write.bands(np.sqrt(amplitudes**2 + power), profile)
     phase = min(r.gain_crossings, key=lambda x: abs(x[1]))
     gain = min(r.phase_crossings, key=lambda x: abs(x[1]))
     f = candidate.Figures(phase[1], phase[0], gain[1], gain[0], r.max_sensitivity)
