@@ -5,7 +5,7 @@ mod tune_common;
 use servotune::controller::Feedforward;
 use servotune::feedback::{MeasuredLoop, ModelLoop, ResponseCurve, margins};
 use servotune::lti::{DiscretePlant, FrequencyResponse};
-use servotune::pes::{Noise, Runout, SpectralPes, SpectralWork, figures, simulate};
+use servotune::pes::{ExpectedNoise, Noise, NoiseWork, Runout, SpectralPes, SpectralWork, figures, simulate};
 use servotune::tune::{Hold, Machine, Outcome, Route, TuneError, TuneSettings, judge, tune};
 use std::f64::consts::TAU;
 use tune_common::{paper_plant, paper_profile, paper_response, paper_spec, start_controller, sweep};
@@ -71,6 +71,15 @@ fn expected_noise_is_the_mean_over_many_draws() {
     // 17 bins of 2 degrees of freedom over 60 draws: a standard error of about 1/sqrt(17 * 60) = 3 %, more where one bin
     // dominates; leakage of the rectangular window adds a few per cent.
     assert!((mean / expected - 1.0).abs() < 0.15, "{mean} {expected}");
+    // The same expectation on the model's own grid: two quadratures of one integral. Its points lie 34 Hz apart, two thirds of
+    // the half-width of the narrowest mode in the band; straight lines between them miss a few per cent of that peak.
+    let plant = DiscretePlant::of(&paper_plant(), T).unwrap();
+    let noise = ExpectedNoise::of(&profile, T, plant.integrators(), &plant, s.dft()).unwrap();
+    let mut on_model = vec![0.0; s.dft().bins().len()];
+    noise.add(&c.sections().unwrap().chain, &mut NoiseWork::default(), &mut on_model);
+    for (a, b) in on_model.iter().zip(&amplitude) {
+        assert!((a / b - 1.0).abs() < 0.04, "{on_model:?} {amplitude:?}");
+    }
 }
 
 #[test]

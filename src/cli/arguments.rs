@@ -23,6 +23,7 @@ pub(super) enum Command {
     Demo(DemoArguments),
     Identify(Box<IdentifyArguments>),
     Margins(Box<MarginsArguments>),
+    Response(ResponseArguments),
     Simulate(SimulateArguments),
     Tune(Box<TuneArguments>),
     Study(StudyArguments),
@@ -77,6 +78,50 @@ pub(super) struct MarginsArguments {
     pub controller: PathBuf,
     #[command(flatten)]
     pub reading: ReadingArguments,
+}
+
+/// Time record to swept-sine file: the response of one column to another, with its deviation
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  servotune response bench.csv.gz --clock t_s --input iq_meas_A --output theta_motor_rad --period 2500 --discard 2 --lines 11:250 --out motor.bod
+  servotune response log.csv --input command --output position --segment 8192 --out slot.bod")]
+pub(super) struct ResponseArguments {
+    /// Record: CSV with a header, gzip allowed
+    #[arg(value_name = "RECORD")]
+    pub record: PathBuf,
+    /// Column of time (s), evenly spaced
+    #[arg(long, value_name = "COLUMN", default_value = "time_s")]
+    pub clock: String,
+    /// Column of the plant's input
+    #[arg(long, value_name = "COLUMN")]
+    pub input: String,
+    /// Column of the plant's output
+    #[arg(long, value_name = "COLUMN")]
+    pub output: String,
+    /// Samples in one period of a periodic excitation; without it, overlapping segments are averaged
+    #[arg(long, value_name = "N")]
+    pub period: Option<usize>,
+    /// Periods left out at the start
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "period")]
+    pub discard: usize,
+    /// Excited lines, as FIRST:LAST; found from the input where absent
+    #[arg(long, value_name = "FIRST:LAST", value_parser = lines, requires = "period")]
+    pub lines: Option<(usize, usize)>,
+    /// Samples in one segment
+    #[arg(long, value_name = "N", default_value_t = 4096, conflicts_with = "period")]
+    pub segment: usize,
+    /// Swept-sine file to write
+    #[arg(long, value_name = "FRF")]
+    pub out: PathBuf,
+}
+
+fn lines(text: &str) -> Result<(usize, usize), String> {
+    let wrong = || format!("found `{text}`; expected FIRST:LAST, such as 11:250");
+    let (first, last) = text.split_once(':').ok_or_else(wrong)?;
+    match (first.parse::<usize>(), last.parse::<usize>()) {
+        (Ok(first), Ok(last)) if 0 < first && first <= last => Ok((first, last)),
+        _ => Err(wrong()),
+    }
 }
 
 /// Closed-loop PES of a spiral write and its DFT

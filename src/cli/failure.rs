@@ -7,6 +7,7 @@ use crate::frf::{FrfError, FrfShapeError};
 use crate::identify::IdentifyError;
 use crate::lti::LtiError;
 use crate::pes::{PesError, ProfileError};
+use crate::recording::RecordingError;
 use crate::report::ReportError;
 use crate::study::StudyError;
 use crate::tune::{GainTableError, TuneError};
@@ -48,6 +49,8 @@ pub enum Failure {
     GainTable(#[from] GainTableError),
     #[error("no machine: expected --plant PLANT or --frf FRF")]
     NoMachine,
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
     #[error(transparent)]
     Twin(#[from] TwinError),
     #[error(transparent)]

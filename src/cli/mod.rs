@@ -9,6 +9,7 @@ mod failure;
 mod identify;
 mod load;
 mod margins;
+mod response;
 mod screen;
 mod simulate;
 mod slot;
@@ -46,6 +47,7 @@ pub fn main() -> ExitCode {
         Command::Demo(a) => demo::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),
+        Command::Response(a) => response::run(&a, &mut screen),
         Command::Simulate(a) => simulate::run(&a, &mut screen),
         Command::Tune(a) => tune::run(&a, &mut screen),
         Command::Study(a) => study::run(&a, &mut screen),

@@ -14,7 +14,7 @@ mod simulation;
 mod spectral;
 
 pub use dft::{Harmonic, WindowDft};
-pub use expected::ExpectedNoise;
+pub use expected::{ExpectedNoise, NoiseWork};
 pub use figures::{HIGH_BAND_HZ, LOW_BAND_HZ, PesFigures, figures};
 pub use profile::{Noise, PesClock, Profile, ProfileError, Runout, Spiral};
 pub use quick::{QuickScene, QuickWork};

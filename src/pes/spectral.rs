@@ -4,7 +4,7 @@
 //! Between its lines nothing is left out; what is neglected: images above half the sample rate, the output limit, and the rest
 //! of one move that the next one still sees. Noise enters as expected power. Spec: `specs/tuning.md`, "The measured route".
 
-use super::expected::{ExpectedNoise, dot, kernel};
+use super::expected::dot;
 use super::{PesError, Profile, Reference, WindowDft};
 use crate::controller::{Controller, Feedforward};
 use crate::feedback::{LoopOnGrid, ResponseCurve, SampledPlant};
@@ -21,7 +21,11 @@ pub struct SpectralPes {
     weight: Vec<[Vec<f64>; 4]>,
     /// Run-out of every bin, added at the head.
     runout: Vec<Complex<f64>>,
-    noise: ExpectedNoise,
+    /// For every bin, the share of every line's noise density that falls into it, leakage of the window included.
+    leak: Vec<Vec<f64>>,
+    /// Densities (per hertz, both signs) of the encoder noise, and of the windage on every line.
+    encoder: f64,
+    windage: Vec<f64>,
     command: Option<Box<CommandLines>>,
     /// Which lines lie outside the sweep.
     outside: Vec<bool>,
@@ -49,7 +53,6 @@ pub struct SpectralWork {
     lines: LoopOnGrid,
     rest: LoopOnGrid,
     density: Vec<f64>,
-    noise: Vec<f64>,
     s_re: Vec<f64>,
     s_im: Vec<f64>,
 }
@@ -105,7 +108,18 @@ impl SpectralPes {
             }
             weight.push(rows);
         }
+        let noise = &profile.noise;
+        let keep = (-TAU * noise.windage_corner_hz * t).exp();
+        let coloured = |w: f64| {
+            let back = Complex::new(1.0, 0.0) - keep * Complex::from_polar(1.0, -w * t);
+            noise.windage_rms.powi(2) * t * (1.0 - keep * keep) / back.norm_sqr()
+        };
         let spacing_hz = 2.0 / period;
+        let leak_into = |k: &usize| -> Vec<f64> {
+            let bin = TAU * *k as f64 / n as f64;
+            let share = |w: &f64| kernel(w / rate - bin, n).norm_sqr() + kernel(-w / rate - bin, n).norm_sqr();
+            w.iter().map(|w| share(w) * spacing_hz).collect()
+        };
         let runout = runout(profile, &dft, from_s, n);
         let command = command.then(|| {
             Box::new(CommandLines {
@@ -123,9 +137,12 @@ impl SpectralPes {
                 samples: spiral.duration_s / t,
             })
         });
+        let windage = w.iter().map(|w| coloured(*w)).collect();
         Ok(SpectralPes {
             outside: w.iter().map(|w| !plant.covers(*w)).collect(),
-            noise: ExpectedNoise::new(profile, &dft, &w, spacing_hz, t),
+            leak: dft.bins().iter().map(leak_into).collect(),
+            encoder: noise.encoder_rms.powi(2) * t,
+            windage,
             lines: SampledPlant::of_points(t, plant.integrators(), w, &p),
             dft,
             weight,
@@ -142,14 +159,19 @@ impl SpectralPes {
     /// Root of the expected |X_k|²/N² for every bin, into `amplitude`; returns the command's peak, 0 where it is not asked for.
     pub fn write(&self, chain: &[Section], work: &mut SpectralWork, amplitude: &mut Vec<f64>) -> f64 {
         self.sensitivities(chain, work);
-        let on = [&work.lines.re[..], &work.lines.im[..]];
-        self.noise.power(&self.lines, on, &mut work.density, &mut work.noise);
+        work.density.clear();
+        for i in 0..self.outside.len() {
+            let s = work.s_re[i] * work.s_re[i] + work.s_im[i] * work.s_im[i];
+            let l = work.lines.re[i] * work.lines.re[i] + work.lines.im[i] * work.lines.im[i];
+            work.density.push(s * (self.encoder * l + self.windage[i] * self.lines.value(i).norm_sqr()));
+        }
         amplitude.clear();
         for (k, rows) in self.weight.iter().enumerate() {
             let [a, b, c, d] = rows;
             let re = dot(a, &work.s_re) + dot(b, &work.s_im) + self.runout[k].re;
             let im = dot(c, &work.s_re) + dot(d, &work.s_im) + self.runout[k].im;
-            amplitude.push((re * re + im * im + work.noise[k]).sqrt());
+            let noise = dot(&self.leak[k], &work.density);
+            amplitude.push((re * re + im * im + noise).sqrt());
         }
         self.command.as_ref().map_or(0.0, |c| self.command_peak(c, chain, work))
     }
@@ -194,8 +216,7 @@ impl SpectralPes {
             let s = Complex::new(work.s_re[i], work.s_im[i]);
             let gain = if p.norm_sqr() > 0.0 { l / p } else { Complex::new(0.0, 0.0) };
             command.push(gain * s * c.error[i] + c.forward[i]);
-            let (encoder, windage) = (self.noise.encoder(), self.noise.windage(i));
-            power += (encoder * (gain * s).norm_sqr() + windage * (l * s).norm_sqr()) * c.spacing_hz;
+            power += (self.encoder * (gain * s).norm_sqr() + self.windage[i] * (l * s).norm_sqr()) * c.spacing_hz;
         }
         // What holds the mean position: C S next to rest, where it is real.
         c.rest.close(chain, &mut work.rest);
@@ -215,6 +236,15 @@ impl SpectralPes {
         let peak = c.instants.iter().map(|t| at(*t)).fold(0.0, f64::max);
         peak + (power * 2.0 * c.samples.max(2.0).ln()).sqrt()
     }
+}
+
+/// Mean of exp(j angle i) over i = 0..n.
+fn kernel(angle: f64, n: usize) -> Complex<f64> {
+    let half = 0.5 * angle;
+    let n = n as f64;
+    let size =
+        if half.sin().abs() < 1e-12 { (n * half).cos() / half.cos() } else { (n * half).sin() / (n * half.sin()) };
+    Complex::from_polar(1.0, (n - 1.0) * half) * size
 }
 
 /// The feed-forward's response: central differences of the reference.

@@ -19,6 +19,8 @@ pub(super) struct Axis {
     pub name: String,
     /// Whether a controller is tuned for it.
     pub diagonal: bool,
+    /// A machine held by springs, whose response at rest has a sign; a free inertia starts at -180 deg.
+    pub flat_at_rest: bool,
     pub frf: Frf,
     pub identified: Identified,
 }
@@ -28,6 +30,8 @@ pub(super) struct Tuned {
     pub name: String,
     pub frf: Frf,
     pub identified: Identified,
+    /// The machine moves against its command: the controller is tuned for the turned sign.
+    pub turned: bool,
     pub outcome: Outcome,
     pub margins: MeasuredMargins,
 }
@@ -35,12 +39,20 @@ pub(super) struct Tuned {
 /// Tunes straight on the response, whose command was held at the controller's rate.
 pub(super) fn tune_axis(axis: &Axis, spec: &str, profile: &str, sample_time_s: f64) -> Result<Tuned, StudyError> {
     let spec = Spec::parse(spec, profile)?;
-    let machine = Machine::Response { frf: &axis.frf, hold: Hold::Included };
+    // Gains are positive: a machine that moves against its command has its sign turned first.
+    let turned = axis.flat_at_rest && axis.frf.value()[0].re < 0.0;
+    let frf = if turned {
+        let value = axis.frf.value().iter().map(|v| -v).collect();
+        Frf::new(axis.frf.w_rad_s().to_vec(), value, axis.frf.relative_std().map(<[f64]>::to_vec))?
+    } else {
+        axis.frf.clone()
+    };
+    let machine = Machine::Response { frf: &frf, hold: Hold::Included };
     let outcome = tune(&machine, &spec, None, &TuneSettings { sample_time_s, ..TuneSettings::default() })?;
     let sections = outcome.controller().sections()?;
-    let margins = measured_margins(&MeasuredLoop::new(&axis.frf, &sections, true)?);
+    let margins = measured_margins(&MeasuredLoop::new(&frf, &sections, true)?);
     let (name, frf, identified) = (axis.name.clone(), axis.frf.clone(), axis.identified.clone());
-    Ok(Tuned { name, frf, identified, outcome, margins })
+    Ok(Tuned { name, frf, identified, turned, outcome, margins })
 }
 
 /// Quantile `q` of |residual| in per cent.
@@ -57,6 +69,7 @@ pub(super) fn tuned_table(tuned: &[Tuned]) -> Result<Table, StudyError> {
         "Controllers tuned on the responses",
         vec![
             Column::words("axis"),
+            Column::words("sign"),
             Column::words("verdict"),
             Column::numbers("crossover", "Hz", digits),
             Column::numbers("phase margin", "deg", digits),
@@ -70,6 +83,7 @@ pub(super) fn tuned_table(tuned: &[Tuned]) -> Result<Table, StudyError> {
         let (m, i) = (&t.margins.margins, &t.margins.intervals);
         table.push(vec![
             t.name.as_str().into(),
+            if t.turned { "turned" } else { "as measured" }.into(),
             if matches!(t.outcome, Outcome::Tuned(_)) { "every limit met" } else { "infeasible" }.into(),
             m.gain_crossover_hz.into(),
             m.phase_margin_deg.into(),

@@ -4,12 +4,13 @@
 
 use super::measured::{Axis, Tuned, axis_page, percent, tune_axis};
 use super::{Study, StudyError};
-use crate::frf::{ColumnChoice, ReadSettings, read_file};
+use crate::frf::{ColumnChoice, Frf, ReadSettings, read_file};
 use crate::identify::{Hold, IdentifySettings, OrderChoice, ZeroSide, identify};
 use crate::report::identified::identified_figure;
 use crate::report::number::NumberFormat;
 use crate::report::table::{Column, Table};
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 use std::path::Path;
 
 /// Sample rate of the recording (Hz); the actuator's command is held over it.
@@ -71,7 +72,16 @@ fn axis(file: &Path, i: usize, j: usize) -> Result<Axis, StudyError> {
         ..IdentifySettings::default()
     };
     let identified = identify(&sweep.frf, &settings)?;
-    Ok(Axis { name, diagonal: i == j, frf: sweep.frf, identified })
+    // The first points scatter most and are outside the band; the rest of the sweep is the measurement.
+    let frf = from(&sweep.frf, BAND_HZ.0)?;
+    Ok(Axis { name, diagonal: i == j, flat_at_rest: true, frf, identified })
+}
+
+/// The response from `low_hz` on.
+fn from(frf: &Frf, low_hz: f64) -> Result<Frf, StudyError> {
+    let first = frf.w_rad_s().partition_point(|w| *w < low_hz * TAU);
+    let std = frf.relative_std().map(|s| s[first..].to_vec());
+    Ok(Frf::new(frf.w_rad_s()[first..].to_vec(), frf.value()[first..].to_vec(), std)?)
 }
 
 fn page(axes: &[Axis], tuned: &[Tuned]) -> Result<String, StudyError> {

@@ -38,6 +38,13 @@ pub struct Desk {
     pub evaluations: usize,
 }
 
+impl Desk {
+    /// The figures of the last candidate on machine `i`, as the search sees them: noise by its expected power.
+    pub fn found(&self, i: usize) -> &Found {
+        &self.scores[i].found
+    }
+}
+
 /// One candidate on one machine.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct MachineScore {

@@ -4,14 +4,13 @@ use super::TuneError;
 use crate::controller::Controller;
 use crate::feedback::{LoopOnGrid, MeasuredLoop, ResponseCurve, SampledPlant, hold};
 use crate::frf::Frf;
-use crate::lti::{DiscretePlant, FrequencyResponse, Plant, Section, Sections};
+use crate::lti::{DiscretePlant, Plant, Section, Sections};
 use crate::pes::{
-    ExpectedNoise, HIGH_BAND_HZ, LOW_BAND_HZ, Profile, QuickScene, QuickWork, Scene, SpectralPes, SpectralWork,
-    WindowDft,
+    ExpectedNoise, HIGH_BAND_HZ, LOW_BAND_HZ, NoiseWork, Profile, QuickScene, QuickWork, Scene, SpectralPes,
+    SpectralWork, WindowDft,
 };
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::TAU;
 
 /// Whether a measured response already contains the zero-order hold of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,42 +86,8 @@ pub(super) struct Prepared {
 
 #[derive(Clone, Debug)]
 enum Source {
-    Model {
-        /// The window's write without noise, and the whole write with it where the command's peak counts.
-        scene: Box<QuickScene>,
-        whole: Option<Box<QuickScene>>,
-        dft: WindowDft,
-        noise: Option<Box<NoiseOnLines>>,
-    },
+    Model { scene: Box<QuickScene>, dft: WindowDft, noise: Option<Box<ExpectedNoise>>, peak: bool },
     Response(Box<SpectralPes>),
-}
-
-/// The expected noise of a model's write, on lines a quarter of a bin apart.
-#[derive(Clone, Debug)]
-struct NoiseOnLines {
-    lines: SampledPlant,
-    expected: ExpectedNoise,
-}
-
-/// Lines in every bin of the window: the window's kernel is two bins wide.
-const LINES_PER_BIN: f64 = 4.0;
-
-impl NoiseOnLines {
-    /// None where the profile has no noise.
-    fn of(profile: &Profile, plant: &DiscretePlant, dft: &WindowDft) -> Option<Box<NoiseOnLines>> {
-        let noise = &profile.noise;
-        if noise.encoder_rms == 0.0 && noise.windage_rms == 0.0 {
-            return None;
-        }
-        let t = plant.sample_time_s();
-        let spacing_hz = dft.hz(1) / LINES_PER_BIN;
-        let count = (0.5 / t / spacing_hz).floor() as usize;
-        let w: Vec<f64> = (0..count).map(|i| TAU * spacing_hz * (i as f64 + 0.5)).collect();
-        let value: Vec<Complex<f64>> = w.iter().map(|w| plant.at(*w)).collect();
-        let expected = ExpectedNoise::new(profile, dft, &w, spacing_hz, t);
-        let lines = SampledPlant::of_points(t, plant.integrators(), w, &value);
-        Some(Box::new(NoiseOnLines { lines, expected }))
-    }
 }
 
 /// Buffers for one machine and one thread.
@@ -130,11 +95,9 @@ impl NoiseOnLines {
 pub(super) struct Buffers {
     pub on: LoopOnGrid,
     simulation: QuickWork,
+    noise: NoiseWork,
     spectral: SpectralWork,
     amplitude: Vec<f64>,
-    lines: LoopOnGrid,
-    density: Vec<f64>,
-    power: Vec<f64>,
 }
 
 /// The figures of one write that a search needs.
@@ -163,18 +126,15 @@ impl Prepared {
                     return Err(TuneError::Physics { effect: p.effect.clone() });
                 }
                 let plant = DiscretePlant::of(plant, t)?;
-                // A search that saw one draw of the noise would learn to cancel just that one: it sees the move alone, and the
-                // noise as its expected power. Only the command's peak, which noise makes, is taken from the draw.
-                let mut quiet = profile.clone();
-                (quiet.noise.encoder_rms, quiet.noise.windage_rms) = (0.0, 0.0);
-                let scene = QuickScene::of(Scene::of_window(&quiet, &plant)?, &plant);
-                let whole =
-                    if peak { Some(Box::new(QuickScene::of(Scene::new(profile, &plant)?, &plant))) } else { None };
+                // The search sees the write without noise and the noise by its expected power; one draw it would learn by heart.
+                let mut still = profile.clone();
+                (still.noise.encoder_rms, still.noise.windage_rms) = (0.0, 0.0);
+                let scene = if peak { Scene::new(&still, &plant)? } else { Scene::of_window(&still, &plant)? };
                 let [first, last] = profile.pes.window;
                 let dft = WindowDft::new(last - first, profile.pes.sample_rate_hz, bins);
                 let sampled = SampledPlant::of_model(&plant);
-                let noise = NoiseOnLines::of(profile, &plant, &dft);
-                let source = Source::Model { scene: Box::new(scene), whole, dft, noise };
+                let noise = ExpectedNoise::of(profile, t, plant.integrators(), &plant, &dft).map(Box::new);
+                let source = Source::Model { scene: Box::new(QuickScene::of(scene, &plant)), dft, noise, peak };
                 Ok(Prepared { sampled, source })
             }
             Machine::Response { frf, hold } => {
@@ -190,29 +150,21 @@ impl Prepared {
         Buffers {
             on: LoopOnGrid::default(),
             simulation: QuickWork::default(),
+            noise: NoiseWork::default(),
             spectral: SpectralWork::default(),
             amplitude: Vec::new(),
-            lines: LoopOnGrid::default(),
-            density: Vec::new(),
-            power: Vec::new(),
         }
     }
 
     /// Simulates the write with these sections, or reads it off the spectrum.
     pub fn write(&self, c: &Controller, chain: &[Section], b: &mut Buffers, harmonics: &[usize], out: &mut PesScore) {
         let dft = match &self.source {
-            Source::Model { scene, whole, dft, noise } => {
-                let forward = c.feedforward.as_ref();
-                out.command_peak =
-                    whole.as_ref().map_or(0.0, |s| s.run(chain, forward, c.output_limit, &mut b.simulation));
-                scene.run(chain, forward, c.output_limit, &mut b.simulation);
+            Source::Model { scene, dft, noise, peak } => {
+                out.command_peak = scene.run(chain, c.feedforward.as_ref(), c.output_limit, &mut b.simulation);
                 dft.amplitudes(&b.simulation.window, &mut b.amplitude);
-                if let Some(n) = noise {
-                    n.lines.close(chain, &mut b.lines);
-                    n.expected.power(&n.lines, [&b.lines.re, &b.lines.im], &mut b.density, &mut b.power);
-                    for (a, power) in b.amplitude.iter_mut().zip(&b.power) {
-                        *a = (*a * *a + power).sqrt();
-                    }
+                if let Some(noise) = noise {
+                    noise.add(chain, &mut b.noise, &mut b.amplitude);
+                    out.command_peak += if *peak { noise.command(&mut b.noise) } else { 0.0 };
                 }
                 dft
             }

@@ -17,7 +17,7 @@ use thiserror::Error;
 pub struct TuneSettings {
     /// Sample time where no start controller names one (s). The paper's controller runs at 39.6 us.
     pub sample_time_s: f64,
-    /// Starts, at least 1.
+    /// Starts for each notch that the search sets (for one where it sets none), at least 1: notches bring the local optima.
     pub starts: usize,
     /// Reflections of the simplex from each start.
     pub simplex_steps: u64,
@@ -75,7 +75,7 @@ pub enum TuneError {
     Setting { key: &'static str, found: f64, expected: &'static str },
     /// No start could be brought to a stable loop.
     #[error(
-        "none of {starts} starts could be brought to a stable loop within the bounds; lower the gains' lower bounds"
+        "none of {starts} starts could be brought to a stable loop within the bounds; lower the gains' lower bounds, or turn the sign of the response: gains are positive, so the machine must move with its command"
     )]
     NoStableLoop { starts: usize },
 }
@@ -110,8 +110,11 @@ pub fn tune_jointly(
 ) -> Result<Outcome, TuneError> {
     let parameters = check(machines, spec, start, settings)?;
     let mut bench = Bench::new(machines, spec, parameters)?;
-    let effort =
-        Effort { starts: settings.starts, simplex_steps: settings.simplex_steps, polish_steps: settings.polish_steps };
+    let effort = Effort {
+        starts: settings.starts * spec.search.notches.max(1),
+        simplex_steps: settings.simplex_steps,
+        polish_steps: settings.polish_steps,
+    };
     let mut found = search(&bench, spec.margins.gain_crossover_hz, start.is_some(), spec.search.seed, &effort);
     found.ends.retain(|e| e.score.violation < UNSTABLE);
     let before = start.map(|c| proofs(machines, c, spec)).transpose()?;
@@ -127,7 +130,7 @@ pub fn tune_jointly(
             break;
         }
     }
-    let (x, after) = best.ok_or(TuneError::NoStableLoop { starts: settings.starts })?;
+    let (x, after) = best.ok_or(TuneError::NoStableLoop { starts: found.starts })?;
     let controller = bench.parameters.controller(&x);
     let on_bounds = at_bounds(&bench, &x);
     let work = |ending: &Ending<'_>| Work {
