@@ -283,7 +283,7 @@ def _caveats() -> str:
 - The hand-built block-diagonal form is work that the peers leave to the user. With it they are as accurate as servotune.
 - Vector fitting: scikit-rf is meant for scattering parameters, without weights; the raw row uses it outside that purpose. The row with the true body and delay gives it
   what no user has, which is why its median error is the smaller one. servotune gets the sweep alone.
-- Noise in a candidate: both sides add the expected power of the noise on lines a quarter of a bin apart. The reference that judges the tunings sums the squared share of
+- Noise in a candidate: both sides add the expected power of the noise, by density on points a quarter of a bin apart; servotune's are coarser away from the bins. The reference that judges the tunings sums the squared share of
   every draw in the time domain and neglects nothing.
 - Tuning: scipy offers optimisers, not a servo tuner; price of a miss and starts were chosen here and not tuned for either side. Starts, polish and derivatives of
   servotune are counted as evaluations. A miss of some 0.02 % in a scipy row is the penalty's and the grid's, not a fault of the optimiser.
