@@ -73,15 +73,15 @@ fn columns(list: &str) -> Result<ColumnChoice, String> {
     let mut choice = ColumnChoice::default();
     for part in list.split(',') {
         let (role, name) = part.split_once('=').ok_or_else(|| format!("found `{part}`; expected ROLE=COLUMN"))?;
-        let name = Some(name.to_owned());
+        let name = name.to_owned();
         match role {
-            "frequency" => choice.frequency = name.unwrap_or_default(),
-            "magnitude" => choice.magnitude = name,
-            "phase" => choice.phase = name,
-            "real" => choice.real = name,
-            "imaginary" => choice.imaginary = name,
-            "std" => choice.std = name,
-            "coherence" => choice.coherence = name,
+            "frequency" => choice.frequency = name,
+            "magnitude" => choice.magnitude = Some(name),
+            "phase" => choice.phase = Some(name),
+            "real" => choice.real = Some(name),
+            "imaginary" => choice.imaginary = Some(name),
+            "std" => choice.std = Some(name),
+            "coherence" => choice.coherence = Some(name),
             _ => {
                 let known = "frequency, magnitude, phase, real, imaginary, std, coherence";
                 return Err(format!("found the role `{role}`; expected one of: {known}"));

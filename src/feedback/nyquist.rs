@@ -28,7 +28,7 @@ pub fn nyquist_count(l: &impl OpenLoop, trace: &Trace) -> NyquistCount {
     let start = trace.w_rad_s.first().zip(trace.value.first()).map_or(0.0, |(&w, &v)| l.start_angle(w, v));
     let turned: f64 = curve().zip(curve().skip(1)).map(|(a, b)| (b * a.conj()).arg()).sum();
     // Beyond the end of a sweep |L| < 1 is taken for granted: 1 + L comes home to the positive real axis by the short way.
-    let home = if l.ends_at_half_rate() { 0.0 } else { -curve().last().unwrap_or(one).arg() };
+    let home = if l.ends_at_half_rate() { 0.0 } else { -curve().next_back().unwrap_or(one).arg() };
     let half_turns = (start + turned + home) / PI;
     let whole = half_turns.round();
     NyquistCount {

@@ -21,8 +21,8 @@ const BAND_HZ: (f64, f64) = (5.0, 2990.0);
 const PAIRS: usize = 20;
 
 /// What fits, what does not, and why.
-const WORDS: &str = "What fits: the flat part and the large resonances up to about 1 kHz, with a median error of 4 to 12 %, which is what two recorded periods allow \
-(the deviation of the data itself is of that order away from resonances). What does not: deep anti-resonances, where the relative error is unbounded because the \
+const WORDS: &str = "What fits: the flat part and the large resonances up to about 1 kHz, with the median error of the table, to be read beside \
+the deviation of the data itself, which rests on two realisations only. What does not: deep anti-resonances, where the relative error is unbounded because the \
 response is nearly nothing, and above about 1.2 kHz, where modes overlap; there the rms is ruled by a few points and the trusted band ends. The source fits 28 states \
 to all nine responses at once with the absolute error of the outputs as its measure; a fit of each response alone on the log scale needs more pairs, because each \
 carries its own zeros. Two of the three axes move against their command; their sign is turned before tuning.";
@@ -88,6 +88,13 @@ fn from(frf: &Frf, low_hz: f64) -> Result<Frf, StudyError> {
     Ok(Frf::new(frf.w_rad_s()[first..].to_vec(), frf.value()[first..].to_vec(), std)?)
 }
 
+/// Median relative deviation of the points (%).
+fn deviation(frf: &Frf) -> Option<f64> {
+    let mut std = frf.relative_std()?.to_vec();
+    std.sort_by(f64::total_cmp);
+    Some(100.0 * std[std.len() / 2])
+}
+
 fn page(axes: &[Axis], tuned: &[Tuned]) -> Result<String, StudyError> {
     let digits = NumberFormat::Significant(3);
     let mut table = Table::new(
@@ -95,6 +102,7 @@ fn page(axes: &[Axis], tuned: &[Tuned]) -> Result<String, StudyError> {
         vec![
             Column::words("response"),
             Column::numbers("order", "", NumberFormat::Decimals(0)),
+            Column::numbers("median deviation of the data", "%", digits),
             Column::numbers("median error", "%", digits),
             Column::numbers("rms error", "%", digits),
             Column::numbers("95th percentile", "%", digits),
@@ -107,6 +115,7 @@ fn page(axes: &[Axis], tuned: &[Tuned]) -> Result<String, StudyError> {
         table.push(vec![
             a.name.as_str().into(),
             (id.plant.order() as f64).into(),
+            deviation(&a.frf).into(),
             percent(&id.residual, 0.5).into(),
             (100.0 * id.rms_relative_error).into(),
             (100.0 * id.p95_relative_error).into(),
