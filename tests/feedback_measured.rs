@@ -52,9 +52,10 @@ fn a_dense_exact_sweep_gives_the_models_own_margins() {
         } else {
             unstable += 1
         }
-        // The hold alone leaves out the aliases, which near a crossover of 600 Hz weigh (600/24 650)², below 1e-3.
+        // The hold alone leaves out the aliases, which at 1 kHz weigh (1/24)³, below 1e-4; on the flank of a mode further up both
+        // they and the interpolation count for more.
         let (a, b) = (found.phase_margin_deg.unwrap(), truth.phase_margin_deg.unwrap());
-        if (found.gain_crossover_hz.unwrap() / truth.gain_crossover_hz.unwrap() - 1.0).abs() < 0.01 {
+        if truth.gain_crossover_hz.unwrap() < 1000.0 {
             assert!((a - b).abs() < 0.2, "{a} deg measured, {b} deg true");
         }
     }

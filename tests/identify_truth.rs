@@ -129,10 +129,15 @@ fn a_free_inertia_is_told_from_a_body_below_the_sweep() {
     assert!(matches!(found.body, BodyEvidence::BelowSweep { lowest_hz } if (lowest_hz - 40.0).abs() < 1e-9));
     assert!(worst(&found, &truth) < 0.03);
     let asked = IdentifySettings { body: BodyChoice::SecondOrder, ..IdentifySettings::default() };
-    let found = identify(&noisy(&truth, 3), &asked).unwrap();
-    assert!(matches!(found.plant.body, Body::SecondOrder { .. }));
-    assert!(matches!(found.body, BodyEvidence::BelowSweep { .. }), "{:?}", found.body);
-    assert!(worst(&found, &truth) < 0.05);
+    let mut said = 0;
+    for seed in 0..20 {
+        let found = identify(&noisy(&truth, seed), &asked).unwrap();
+        assert!(matches!(found.plant.body, Body::SecondOrder { .. }));
+        assert!(worst(&found, &truth) < 0.05);
+        said += i32::from(matches!(found.body, BodyEvidence::BelowSweep { .. }));
+    }
+    // The verdict is a test on noisy data: it must come in most sweeps, it cannot come in all.
+    assert!(said >= 14, "said in {said} of 20 sweeps");
 }
 
 #[test]
@@ -170,7 +175,8 @@ fn a_delay_outside_the_first_interval_is_found_and_bounds_are_flagged() {
     assert!((found.plant.delay_s - 150e-6).abs() < 1e-6);
     let (delay, _) = found.stepwise_bounds.unwrap();
     assert_eq!(delay, Bound::Inside);
-    let tight = IdentifySettings { delay_limit_s: 100e-6, ..IdentifySettings::default() };
+    // A free order would make up the missing dead time with pairs.
+    let tight = IdentifySettings { delay_limit_s: 100e-6, ..fixed(0) };
     let found = identify(&noisy(&truth, 5), &tight).unwrap();
     assert_eq!(found.delay_bound, Bound::High);
     assert!(found.at_bound.contains(&"plant.delay_s".to_string()), "{:?}", found.at_bound);

@@ -194,11 +194,8 @@ fn settle_body(
     let root = joint.memory.qr.inverse_root();
     let n = shape.parameters();
     let deviation = ((1..n).map(|j| root[j * n + 1].powi(2)).sum::<f64>() * chi_square).sqrt();
-    if x[1].exp() >= low || deviation <= UNDETERMINED {
+    if x[1].exp() >= low {
         return BodyEvidence::Supported;
-    }
-    if settings.body == BodyChoice::SecondOrder {
-        return below;
     }
     // The same pairs on a free inertia: s² + 2 ζ0 ω0 s above ω0.
     let mut free = *shape;
@@ -207,8 +204,12 @@ fn settle_body(
     y.extend_from_slice(&x[3..]);
     let other = joint.refine(free, &mut y, LAST_STEPS, LAST_TOLERANCE);
     let rows = r.len() as f64;
-    // One parameter more must lower the information criterion.
-    if rows * (other.cost / out.cost).ln() <= rows.ln() {
+    // One parameter more must lower the information criterion; if it does, the natural frequency shows although it lies below.
+    let needed = rows * (other.cost / out.cost).ln() > rows.ln();
+    if needed && deviation <= UNDETERMINED {
+        return BodyEvidence::Supported;
+    }
+    if !needed && settings.body == BodyChoice::Auto {
         (*shape, *x, *out) = (free, y, other);
     }
     below

@@ -1,6 +1,6 @@
 //! One description of a plot that a control engineer recognises; it knows data and meaning, not pixels.
 //!
-//! In: plain columns. Out: [`Figure`], which [`super::svg`] draws and [`super::html`] makes interactive.
+//! In: plain columns. Out: [`Figure`], which [`super::svg`] draws and the page makes interactive.
 //! Convention: a NaN is a gap in a line; every axis names its unit. Spec: `specs/report.md`.
 
 use super::error::{ReportError, same_length};
@@ -83,7 +83,7 @@ pub enum Mark {
     Note(Note),
 }
 
-/// The meaning of a colour; [`super::palette`] has the colours themselves.
+/// The meaning of a colour; `palette.rs` has the colours themselves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ink {
     /// Data, told apart by number; there are six.

@@ -130,17 +130,16 @@ pub fn tune_jointly(
     let before = start.map(|c| proofs(machines, c, spec)).transpose()?;
     let mut ending = Ending { machines, spec, evaluations: found.evaluations, back_offs: 0 };
     // Where the exact judgement refuses the best end for good, the next one may still pass.
-    let mut best: Option<(Vec<f64>, Vec<Proof>)> = None;
+    let mut settled: Vec<(Vec<f64>, Vec<Proof>)> = Vec::with_capacity(ENDS);
     for end in found.ends.iter().take(ENDS) {
-        let settled = ending.settle(&mut bench, &end.x, settings.polish_steps)?;
-        if best.as_ref().is_none_or(|(_, b)| worst(&settled.1) < worst(b)) {
-            best = Some(settled);
-        }
-        if best.as_ref().is_some_and(|(_, b)| worst(b) == 0.0) || end.score.violation > 0.0 {
+        settled.push(ending.settle(&mut bench, &end.x, settings.polish_steps)?);
+        if settled.last().is_some_and(|(_, proofs)| worst(proofs) == 0.0) {
             break;
         }
     }
-    let (x, after) = best.ok_or(TuneError::NoStableLoop { starts: found.starts })?;
+    // The sort is stable: of equals the earlier end stays ahead.
+    settled.sort_by(|(_, a), (_, b)| worst(a).total_cmp(&worst(b)));
+    let (x, after) = settled.first().cloned().ok_or(TuneError::NoStableLoop { starts: found.starts })?;
     let controller = bench.parameters.controller(&x);
     let on_bounds = at_bounds(&bench, &x);
     let work = |ending: &Ending<'_>| Work {
@@ -154,25 +153,31 @@ pub fn tune_jointly(
         let work = work(&ending);
         return Ok(Outcome::Tuned(Tuned { controller, before, after, at_bounds: on_bounds, work }));
     }
-    let compromise = Compromise { share: worst(&after), x, after };
-    let (mut conflicts, mut confirmed, mut reached) = (Vec::new(), false, compromise.clone());
-    // First only the limits that set the share give; where that is not enough, every limit that the compromise misses.
-    for part in [1.0 - SAME_MISS, 0.0] {
-        let relaxed = compromise.relaxed(&bench.wanted, part);
-        let wanted: Vec<Requirement> = relaxed.iter().map(|(r, _)| *r).collect();
-        conflicts = relaxed.into_iter().filter_map(|(_, limit)| limit).collect();
-        let asked = std::mem::replace(&mut bench.wanted, wanted.clone());
-        bench.aim(&vec![vec![0.0; wanted.len()]; machines.len()]);
-        let from = refine(&bench, &compromise.x, settings.polish_steps, &mut bench.desk());
-        let from = from.map_or_else(|| compromise.x.clone(), |p| p.x);
-        let (x, after) = ending.settle(&mut bench, &from, settings.polish_steps)?;
-        bench.wanted = asked;
-        confirmed = after.iter().all(|p| super::Judged::of(&wanted, p.judged.found.clone()).passes());
-        if confirmed {
-            reached = Compromise { share: worst(&after), x, after };
-            break;
+    let mut best: Option<(Compromise, Vec<RelaxedLimit>)> = None;
+    let mut confirmed = false;
+    'ends: for (x, after) in settled {
+        let compromise = Compromise { share: worst(&after), x, after };
+        // First only the limits that set the share give; where that is not enough, every limit that the compromise misses.
+        for part in [1.0 - SAME_MISS, 0.0] {
+            let relaxed = compromise.relaxed(&bench.wanted, part);
+            let wanted: Vec<Requirement> = relaxed.iter().map(|(r, _)| *r).collect();
+            let conflicts: Vec<RelaxedLimit> = relaxed.into_iter().filter_map(|(_, limit)| limit).collect();
+            let asked = std::mem::replace(&mut bench.wanted, wanted.clone());
+            bench.aim(&vec![vec![0.0; wanted.len()]; machines.len()]);
+            let from = refine(&bench, &compromise.x, settings.polish_steps, &mut bench.desk());
+            let from = from.map_or_else(|| compromise.x.clone(), |p| p.x);
+            let (x, after) = ending.settle(&mut bench, &from, settings.polish_steps)?;
+            bench.wanted = asked;
+            confirmed = after.iter().all(|p| super::Judged::of(&wanted, p.judged.found.clone()).passes());
+            if confirmed {
+                best = Some((Compromise { share: worst(&after), x, after }, conflicts));
+                break 'ends;
+            }
+            // Unconfirmed, the best end's own relaxation is still the best that can be said.
+            best.get_or_insert_with(|| (compromise.clone(), conflicts));
         }
     }
+    let (reached, conflicts) = best.ok_or(TuneError::NoStableLoop { starts: found.starts })?;
     let work = work(&ending);
     let Compromise { x, share, after } = reached;
     let controller = bench.parameters.controller(&x);
