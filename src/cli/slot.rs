@@ -8,12 +8,13 @@ use crate::identify::Identified;
 use crate::lti::{DiscretePlant, Plant};
 use crate::pes::{figures, simulate};
 use crate::report::identified::{identified_figure, identified_sentences, ladder_table, order_table, parameter_table};
+use crate::report::margins::interval_table;
 use crate::report::page::{Block, Page, Section};
 use crate::report::routes::{RouteView, routes_table};
 use crate::report::slot::{LoopView, SlotView, slot_page};
 use crate::report::table::Verdict;
 use crate::report::tuned::{Units, conflicts_table, gains_table, sections_table};
-use crate::tune::{GainTable, Hold, Judged, Machine, Outcome, Spec, judge};
+use crate::tune::{GainTable, Hold, Judged, Machine, Outcome, Spec, judge, margin_intervals};
 use std::f64::consts::TAU;
 
 /// A slot with everything that is known of it.
@@ -67,18 +68,30 @@ fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Res
     })
 }
 
+/// Said under the verdict where the limits were judged on the measured response.
+const JUDGED_ON_RESPONSE: &str = "The limits in this table are judged on the measured response, noise as expected power. The cards above and the curves \
+                                  below are those of the identified model, noise as the profile's draw; the last section sets both side by side.";
+
+/// Draws of the identified plant for the intervals of the margins, and their seed.
+const DRAWS: usize = 200;
+const DRAW_SEED: u64 = 1;
+
 /// The page of the slot.
 pub(super) fn page(slot: &Slot<'_>) -> Result<Page, Failure> {
-    let on_model = Machine::Model(slot.plant);
     let after_controller = slot.outcome.controller();
     let after = loop_view("after", slot, after_controller, slot.outcome.after()[0].judged.clone())?;
-    let before = match slot.start {
-        Some(c) => Some(loop_view("before", slot, c, judge(&on_model, c, slot.spec)?.judged)?),
-        None => None,
+    let was = match slot.outcome {
+        Outcome::Tuned(t) => &t.before,
+        Outcome::Infeasible(i) => &i.before,
+    };
+    let before = match (slot.start, was.as_ref().and_then(|b| b.first())) {
+        (Some(c), Some(proof)) => Some(loop_view("before", slot, c, proof.judged.clone())?),
+        _ => None,
     };
     let view = SlotView {
         name: slot.name,
         verdict: verdict(slot.outcome),
+        judged_on: slot.sweep.map(|_| JUDGED_ON_RESPONSE),
         plant: plant_sections(slot)?,
         before: before.as_ref(),
         after: &after,
@@ -131,6 +144,11 @@ fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
         blocks.push(Block::Details("Choice of the order".into(), vec![Block::Table(order_table(id)?)]));
     }
     blocks.push(Block::Details("Parameters with 95 % intervals".into(), vec![Block::Table(parameter_table(id)?)]));
+    let controller = slot.outcome.controller();
+    if let Some((named, intervals)) = margin_intervals(id, controller, DRAWS, DRAW_SEED)? {
+        let caption = "Margins after tuning over the uncertainty of the model (95 %)";
+        blocks.push(Block::Table(interval_table(caption, &named, &intervals)?));
+    }
     if !sweep.notes.is_empty() {
         let notes = sweep.notes.iter().map(|n| Block::Prose(n.to_string())).collect();
         blocks.push(Block::Details("What the reader decided about the sweep file".into(), notes));

@@ -20,7 +20,7 @@ pub(super) struct ReadingArguments {
     /// Unit of the phase column: auto, degrees or radians
     #[arg(long, default_value_t, value_name = "WORD")]
     angle: AngleUnit,
-    /// Unit of the frequency column: auto, hertz or radians-per-second
+    /// Unit of the frequency column: auto, hertz or rad_per_s
     #[arg(long, default_value_t, value_name = "WORD")]
     frequency: FrequencyUnit,
     /// Conjugated phase: auto (test, refuse when found), no (take as it is) or yes (undo)

@@ -3,7 +3,7 @@
 use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Cell, Column, Table, Verdict};
-use crate::feedback::{Interval, Margins, MeasuredMargins};
+use crate::feedback::{Interval, MarginIntervals, Margins, MeasuredMargins};
 
 /// The figures of one loop as rows of name, value, unit, place.
 pub fn margins_table(m: &Margins) -> Result<Table, ReportError> {
@@ -57,15 +57,11 @@ pub fn margins_text(m: &Margins) -> Result<String, ReportError> {
     Ok(format!("{}\n{}", margins_table(m)?.text(), crossings_table(m)?.text()))
 }
 
-/// The named margins of a measured loop with their 95 % intervals.
-pub fn measured_table(m: &MeasuredMargins) -> Result<Table, ReportError> {
+/// The named margins with their 95 % intervals.
+pub fn interval_table(caption: &str, g: &Margins, i: &MarginIntervals) -> Result<Table, ReportError> {
     let digits = NumberFormat::Significant(4);
     let mut table = Table::new(
-        if m.margins.stable {
-            "Margins of the measured loop (stable)"
-        } else {
-            "Margins of the measured loop (UNSTABLE)"
-        },
+        caption,
         vec![
             Column::words("figure"),
             Column::numbers("value", "", digits),
@@ -77,7 +73,6 @@ pub fn measured_table(m: &MeasuredMargins) -> Result<Table, ReportError> {
     let mut row = |name: &str, value: Option<f64>, i: Option<Interval>, unit: &str| {
         table.push(vec![name.into(), value.into(), i.map(|i| i.low).into(), i.map(|i| i.high).into(), unit.into()])
     };
-    let (g, i) = (&m.margins, &m.intervals);
     row("gain crossover", g.gain_crossover_hz, i.gain_crossover_hz, "Hz")?;
     row("phase margin", g.phase_margin_deg, i.phase_margin_deg, "deg")?;
     row("phase crossover", g.phase_crossover_hz, i.phase_crossover_hz, "Hz")?;
@@ -86,6 +81,16 @@ pub fn measured_table(m: &MeasuredMargins) -> Result<Table, ReportError> {
     row("delay margin", g.delay_margin_s.map(|s| 1e6 * s), None, "us")?;
     row("disk margin", Some(g.disk_margin), None, "ratio")?;
     Ok(table)
+}
+
+/// The named margins of a measured loop with their 95 % intervals.
+pub fn measured_table(m: &MeasuredMargins) -> Result<Table, ReportError> {
+    let caption = if m.margins.stable {
+        "Margins of the measured loop (stable)"
+    } else {
+        "Margins of the measured loop (UNSTABLE)"
+    };
+    interval_table(caption, &m.margins, &m.intervals)
 }
 
 /// Tables of a measured loop for a terminal, with what is taken for granted.

@@ -43,6 +43,8 @@ pub struct SlotView<'a> {
     pub name: &'a str,
     /// The verdict in one sentence, and whether it is good.
     pub verdict: (Verdict, String),
+    /// On what the limits were judged, where that is not what the curves show.
+    pub judged_on: Option<&'a str>,
     /// Sections about where the plant comes from, shown first.
     pub plant: Vec<Section>,
     /// The controller before.

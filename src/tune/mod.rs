@@ -5,6 +5,7 @@
 //! Convention: requirements are wanted ([`Requirement`]), then found ([`Found`]), then judged ([`Judged`]); spec: `specs/tuning.md`.
 
 mod bench;
+mod confidence;
 mod gain_table;
 mod judge;
 mod linear;
@@ -20,6 +21,7 @@ mod starts;
 mod tuning;
 
 pub use bench::{Bench, Desk, Score};
+pub use confidence::margin_intervals;
 pub use gain_table::{CrossingRow, GainTable, GainTableError, InputDigest, Provenance, Summary};
 pub use judge::{Proof, judge};
 pub use machine::{Hold, Machine, Route};
