@@ -11,6 +11,7 @@ use crate::report::identified::{identified_figure, identified_sentences, ladder_
 use crate::report::margins::interval_table;
 use crate::report::page::{Block, Page, Section};
 use crate::report::routes::{RouteView, routes_table};
+use crate::report::sampled::sampled_table;
 use crate::report::slot::{LoopView, SlotView, slot_page};
 use crate::report::table::Verdict;
 use crate::report::tuned::{Units, conflicts_table, gains_table, sections_table};
@@ -134,7 +135,12 @@ pub(super) fn verdict(outcome: &Outcome) -> (Verdict, String) {
 }
 
 fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
-    let (Some((sweep, _)), Some(id)) = (slot.sweep, slot.identified) else { return Ok(vec![]) };
+    let sampled = DiscretePlant::of(slot.plant, slot.outcome.controller().sample_time_s)?;
+    let table = Block::Table(sampled_table(&sampled)?);
+    let eq31 = Block::Details("Sampled plant, exact (counterpart of the paper's eq. 31)".into(), vec![table]);
+    let (Some((sweep, _)), Some(id)) = (slot.sweep, slot.identified) else {
+        return Ok(vec![Section { heading: "Plant".into(), blocks: vec![eq31] }]);
+    };
     let mut blocks = vec![
         Block::Prose(identified_sentences(id).join(" ")),
         Block::Figure(identified_figure(&sweep.frf, id, "Measured response and model")?),
@@ -149,6 +155,7 @@ fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
         let caption = "Margins after tuning over the uncertainty of the model (95 %)";
         blocks.push(Block::Table(interval_table(caption, &named, &intervals)?));
     }
+    blocks.push(eq31);
     if !sweep.notes.is_empty() {
         let notes = sweep.notes.iter().map(|n| Block::Prose(n.to_string())).collect();
         blocks.push(Block::Details("What the reader decided about the sweep file".into(), notes));

@@ -22,6 +22,7 @@ pub mod nyquist;
 pub mod page;
 pub mod pes;
 pub mod routes;
+pub mod sampled;
 pub mod sensitivity;
 pub mod slot;
 pub mod spectrum_bars;
