@@ -51,12 +51,12 @@ mod tests {
     #[derive(serde::Deserialize, Debug)]
     #[serde(deny_unknown_fields)]
     struct Row {
-        #[allow(dead_code)]
         gain: f64,
     }
 
     #[test]
     fn an_unknown_key_is_named_with_its_place() {
+        assert_eq!(parse_toml::<Row>(Path::new("a.toml"), "gain = 1.0\n").unwrap().gain, 1.0);
         let e = parse_toml::<Row>(Path::new("a.toml"), "gain = 1.0\ngian = 2.0\n").unwrap_err();
         let text = e.to_string();
         assert!(text.starts_with("a.toml:2:1:") && text.contains("gian") && text.contains("gain"), "{text}");
