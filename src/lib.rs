@@ -40,6 +40,7 @@ pub mod document;
 pub mod numeric;
 
 pub mod frf;
+pub mod gate;
 pub mod lti;
 pub mod recording;
 

@@ -1,0 +1,2 @@
+//! The gate: which machines are worth tuning.
+pub mod features;
