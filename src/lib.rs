@@ -42,6 +42,7 @@ pub mod numeric;
 pub mod frf;
 pub mod gate;
 pub mod lti;
+pub mod physics;
 pub mod recording;
 
 pub mod controller;
