@@ -52,6 +52,7 @@ pub mod identify;
 
 pub mod pes;
 
+pub mod diagnose;
 pub mod tune;
 
 pub mod twin;

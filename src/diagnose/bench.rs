@@ -1,0 +1,169 @@
+//! Everything that a diagnosis works on, made in order: given plant, noise, filter, refit, motion.
+
+use super::linear::{LinearForm, Sampled};
+use super::refit::{Chosen, Fit, Refitted, simulation_error};
+use super::run::Run;
+use super::stack::Stack;
+use super::trajectory::{Smoother, Trajectory};
+use super::whiten::{NoiseLevels, Whitener};
+use crate::lti::{LtiError, Plant};
+use crate::physics::Scene;
+use crate::recording::Role;
+
+/// The ground of a diagnosis.
+#[derive(Clone, Debug)]
+pub struct Bench {
+    /// The linear plant's free parameters around the given plant.
+    pub form: LinearForm,
+    /// All runs, hold-out included.
+    pub runs: Vec<Run>,
+    /// Runs for fitting.
+    pub fit_runs: Vec<usize>,
+    /// Noise of the open-loop error.
+    pub levels: NoiseLevels,
+    /// Its whitening filter.
+    pub whitener: Whitener,
+    /// Motion behind every run.
+    pub trajectories: Vec<Trajectory>,
+    /// Repeats together.
+    pub stack: Stack,
+    /// Machine and size of its motion.
+    pub scene: Scene,
+    /// Linear parameters of the last refit.
+    pub p: Vec<f64>,
+}
+
+/// Series that hold noise only: each repeat less the mean of its group, scaled back to the noise of one record.
+fn noise_series(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<Vec<f64>> {
+    let mut out = Vec::new();
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (i, (r, e)) in errors.iter().enumerate() {
+        let same = |g: &Vec<usize>| {
+            let (other, o) = &errors[g[0]];
+            runs[*other].group == runs[*r].group && o.len() == e.len()
+        };
+        match groups.iter_mut().find(|g| same(g)) {
+            Some(g) => g.push(i),
+            None => groups.push(vec![i]),
+        }
+    }
+    for g in groups.iter().filter(|g| g.len() > 1) {
+        let n = g.len() as f64;
+        let len = errors[g[0]].1.len();
+        let mean: Vec<f64> = (0..len).map(|k| g.iter().map(|&i| errors[i].1[k]).sum::<f64>() / n).collect();
+        let scale = (n / (n - 1.0)).sqrt();
+        out.extend(g.iter().map(|&i| errors[i].1.iter().zip(&mean).map(|(e, m)| scale * (e - m)).collect::<Vec<f64>>()));
+    }
+    out
+}
+
+impl Bench {
+    /// Sets up a diagnosis of `given` on these runs.
+    pub fn new(given: &Plant, runs: Vec<Run>, sample_time_s: f64, spindle_hz: Option<f64>) -> Result<Bench, LtiError> {
+        let form = LinearForm::new(given, sample_time_s);
+        let fit_runs: Vec<usize> = (0..runs.len()).filter(|&i| runs[i].role == Role::Fit).collect();
+        let stack = Stack::grouped(&runs, &fit_runs);
+        let extremes = |of: &dyn Fn(&Run) -> &[f64]| {
+            fit_runs.iter().flat_map(|&r| of(&runs[r]).iter().copied()).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
+        };
+        let (low, high) = extremes(&|r| &r.position);
+        let (least, most) = extremes(&|r| &r.input);
+        let step = fit_runs
+            .iter()
+            .flat_map(|&r| runs[r].input.windows(2).map(|w| (w[1] - w[0]).abs()))
+            .fold(0.0f64, f64::max);
+        let scene = Scene {
+            plant: given.clone(),
+            sample_time_s,
+            spindle_hz,
+            travel: low.abs().max(high.abs()).max(1e-12),
+            centre: 0.5 * (low + high),
+            speed: 1.0,
+            command: least.abs().max(most.abs()).max(1e-12),
+            command_step: step.max(1e-15),
+            noise: 0.0,
+            duration_s: fit_runs.iter().map(|&r| runs[r].len()).max().unwrap_or(0) as f64 * sample_time_s,
+            indexed: fit_runs.iter().any(|&r| runs[r].spindle_rad.is_some()),
+            warm: fit_runs.iter().any(|&r| runs[r].temperature.is_some()),
+        };
+        let levels = NoiseLevels { sensor_rms: 1.0, torque_rms: 0.0, torque_corner_hz: 60.0, from_repeats: false };
+        let whitener = Whitener::new(&levels, &given.body, sample_time_s);
+        let p = vec![0.0; form.knobs.len()];
+        let mut bench = Bench { form, runs, fit_runs, levels, whitener, trajectories: Vec::new(), stack, scene, p };
+        bench.renew(&[])?;
+        Ok(bench)
+    }
+
+    /// Noise, filter and motion anew, for the linear parameters as they are now and the effects chosen so far.
+    pub fn renew(&mut self, chosen: &[Chosen]) -> Result<(), LtiError> {
+        let plant = self.form.plant(&self.p);
+        let t = self.scene.sample_time_s;
+        let sampled = Sampled::of(&plant, t)?;
+        let effects: Vec<_> = chosen.iter().map(|c| (c.effect, &c.setting)).collect();
+        let still = Trajectory { samples: Vec::new(), unexplained: Vec::new() };
+        let errors: Vec<(usize, Vec<f64>)> = self
+            .fit_runs
+            .iter()
+            .map(|&r| {
+                let motion = self.trajectories.get(r).unwrap_or(&still);
+                (r, simulation_error(&sampled, &effects, &self.scene, &self.runs[r], motion))
+            })
+            .collect();
+        let repeats = noise_series(&errors, &self.runs);
+        let from_repeats = !repeats.is_empty();
+        let series = if from_repeats { repeats } else { errors.into_iter().map(|e| e.1).collect() };
+        let weight = vec![1.0; series.len()];
+        self.levels = NoiseLevels::fit(&series, &weight, &plant.body, t, from_repeats);
+        self.whitener = Whitener::new(&self.levels, &plant.body, t);
+        let filtered: Vec<Vec<f64>> = series
+            .into_iter()
+            .map(|mut s| {
+                self.whitener.apply(&mut s);
+                s
+            })
+            .collect();
+        self.whitener.refine(&filtered, &weight);
+        self.scene.noise = self.levels.sensor_rms;
+        self.scene.plant = plant.clone();
+        let spindle_hz = self.scene.spindle_hz.unwrap_or(0.0);
+        let smoother = self.fit_runs.first().map(|&r| Smoother::of(&plant, &sampled.delayed, self.levels.sensor_rms, &self.runs[r]));
+        if let Some(smoother) = smoother {
+            self.trajectories = self.runs.iter().map(|r| smoother.smooth(r, &sampled.delayed, spindle_hz)).collect();
+        }
+        self.scene.speed = self
+            .fit_runs
+            .iter()
+            .flat_map(|&r| self.trajectories[r].samples.iter().map(|s| s.v.abs()))
+            .fold(0.0f64, f64::max)
+            .max(1e-12);
+        Ok(())
+    }
+
+    /// A fit on the grouped stack with these effects.
+    pub fn fit(&self, chosen: Vec<Chosen>) -> Fit<'_> {
+        Fit {
+            form: &self.form,
+            runs: &self.runs,
+            trajectories: &self.trajectories,
+            whitener: &self.whitener,
+            stack: &self.stack,
+            scene: &self.scene,
+            chosen,
+        }
+    }
+
+    /// Refits, then renews noise and filter at the result, and refits again; `rounds` times.
+    pub fn settle(&mut self, chosen: &mut Vec<Chosen>, rounds: usize) -> Result<Refitted, LtiError> {
+        let mut last = None;
+        for _ in 0..rounds.max(1) {
+            let mut fit = self.fit(chosen.clone());
+            let refitted = fit.refit(&self.p, 25);
+            *chosen = fit.chosen;
+            self.p = refitted.p.clone();
+            self.renew(chosen)?;
+            last = Some(refitted);
+        }
+        // At least one round ran.
+        last.ok_or(LtiError::Range { key: "rounds".into(), found: 0.0, expected: "at least one round" })
+    }
+}

@@ -1,0 +1,284 @@
+//! All linear parameters fitted to all fit records at once, with the strengths and inner parameters of the effects that
+//! were chosen so far; by the whitened simulation error.
+
+use super::columns::raw_columns;
+use super::linear::{LinearForm, Sampled, add_response, free_motions};
+use super::run::Run;
+use super::stack::{Basis, Stack};
+use super::trajectory::Trajectory;
+use super::whiten::Whitener;
+use crate::lti::Plant;
+use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
+use crate::physics::{Effect, Entry, Scene, Setting};
+use rayon::prelude::*;
+
+/// An effect that is part of the model, with its numbers.
+#[derive(Clone)]
+pub struct Chosen {
+    /// The effect.
+    pub effect: &'static dyn Effect,
+    /// Its numbers.
+    pub setting: Setting,
+    /// Which inner parameters may be refined.
+    pub continuous: Vec<bool>,
+}
+
+/// What a refit works on.
+pub struct Fit<'a> {
+    /// The form of the linear plant.
+    pub form: &'a LinearForm,
+    /// All runs.
+    pub runs: &'a [Run],
+    /// Motion behind each run.
+    pub trajectories: &'a [Trajectory],
+    /// The filter.
+    pub whitener: &'a Whitener,
+    /// Which runs, and how they are stacked.
+    pub stack: &'a Stack,
+    /// Machine and size of its motion.
+    pub scene: &'a Scene,
+    /// Effects in the model.
+    pub chosen: Vec<Chosen>,
+}
+
+/// Where a refit ended.
+#[derive(Clone, Debug)]
+pub struct Refitted {
+    /// Linear parameters.
+    pub p: Vec<f64>,
+    /// The plant they make.
+    pub plant: Plant,
+    /// Sum of squares of the whitened error.
+    pub cost: f64,
+    /// Standard errors of the linear parameters, then of the effects' strengths and inner parameters, in their order.
+    pub spread: Vec<f64>,
+    /// Whether the method met its tolerance.
+    pub converged: bool,
+}
+
+/// Step of a finite difference in a linear parameter: the answer is smooth and known to ten digits.
+const STEP: f64 = 1e-5;
+/// Relative step in an inner parameter: laws have kinks, and smaller steps see only them.
+const INNER_STEP: f64 = 1e-3;
+
+struct Problem<'a, 'f> {
+    fit: &'a Fit<'f>,
+    local: Basis,
+    /// Inner parameters to refine: effect and place.
+    inner: Vec<(usize, usize)>,
+    /// Strengths: effect and place.
+    strengths: Vec<(usize, usize)>,
+}
+
+impl Problem<'_, '_> {
+    fn settings(&self, x: &[f64]) -> Vec<Setting> {
+        let mut all: Vec<Setting> = self.fit.chosen.iter().map(|c| c.setting.clone()).collect();
+        let p = self.fit.form.knobs.len();
+        for (v, &(e, i)) in x[p..].iter().zip(&self.strengths) {
+            all[e].strengths[i] = *v;
+        }
+        for (v, &(e, i)) in x[p + self.strengths.len()..].iter().zip(&self.inner) {
+            all[e].inner[i] = v.exp();
+        }
+        all
+    }
+
+    /// Whitened error, one stacked vector, local directions taken out.
+    fn error(&self, x: &[f64]) -> Vec<f64> {
+        let fit = self.fit;
+        let plant = fit.form.plant(&x[..fit.form.knobs.len()]);
+        let Ok(sampled) = Sampled::of(&plant, fit.scene.sample_time_s) else {
+            return vec![f64::INFINITY; fit.stack.total];
+        };
+        let settings = self.settings(x);
+        let effects: Vec<(&dyn Effect, &Setting)> = fit.chosen.iter().map(|c| c.effect).zip(&settings).collect();
+        let mut all = fit.stack.mean(|r| {
+            let mut e = simulation_error(&sampled, &effects, fit.scene, &fit.runs[r], &fit.trajectories[r]);
+            fit.whitener.apply(&mut e);
+            e
+        });
+        self.local.project(&mut all);
+        all
+    }
+}
+
+/// Recorded position less the plant's answer to the recorded command, with the effects driven by the recorded motion.
+pub fn simulation_error(
+    sampled: &Sampled,
+    effects: &[(&dyn Effect, &Setting)],
+    scene: &Scene,
+    run: &Run,
+    trajectory: &Trajectory,
+) -> Vec<f64> {
+    let mut command = run.input.clone();
+    let mut torque: Option<Vec<f64>> = None;
+    let mut y = vec![0.0; run.len()];
+    for (effect, setting) in effects {
+        let raw = raw_columns(*effect, &setting.inner, scene, trajectory);
+        for (column, s) in raw.iter().zip(&setting.strengths) {
+            let into = match effect.facts().entry {
+                Entry::Command => &mut command,
+                Entry::Torque => torque.get_or_insert_with(|| vec![0.0; run.len()]),
+                Entry::Position => &mut y,
+            };
+            into.iter_mut().zip(column).for_each(|(o, v)| *o += s * v);
+        }
+    }
+    add_response(&sampled.delayed, &command, &mut y);
+    if let Some(w) = torque {
+        add_response(&sampled.direct, &w, &mut y);
+    }
+    run.position.iter().zip(&y).map(|(m, y)| m - y).collect()
+}
+
+impl Residuals for Problem<'_, '_> {
+    fn rows(&self) -> usize {
+        self.fit.stack.total
+    }
+
+    fn cols(&self) -> usize {
+        self.fit.form.knobs.len() + self.strengths.len() + self.inner.len()
+    }
+
+    fn evaluate(&mut self, x: &[f64], r: &mut [f64]) {
+        r.copy_from_slice(&self.error(x));
+    }
+
+    fn jacobian(&mut self, x: &[f64], j: &mut [f64]) {
+        let base = self.error(x);
+        let p = self.fit.form.knobs.len();
+        let this = &*self;
+        j.par_chunks_exact_mut(base.len()).enumerate().for_each(|(i, column)| {
+            let mut moved = x.to_vec();
+            // A strength enters linearly: any step is exact, and one of its own size keeps the digits.
+            let step = match i {
+                i if i < p => STEP,
+                i if i < p + this.strengths.len() => x[i].abs().max(1e-9),
+                _ => INNER_STEP,
+            };
+            moved[i] += step;
+            for ((c, a), b) in column.iter_mut().zip(this.error(&moved)).zip(&base) {
+                *c = (a - b) / step;
+            }
+        });
+    }
+
+    fn limit(&self, i: usize) -> Limit {
+        let p = self.fit.form.knobs.len();
+        if i >= p + self.strengths.len() {
+            let (e, k) = self.inner[i - p - self.strengths.len()];
+            let at = self.fit.chosen[e].setting.inner[k].ln();
+            return Limit { low: at - 3.0, high: at + 3.0, step: 0.3 };
+        }
+        if i >= p {
+            return Limit { low: f64::NEG_INFINITY, high: f64::INFINITY, step: f64::INFINITY };
+        }
+        use super::linear::Knob;
+        let (low, high, step) = match self.fit.form.knobs[i] {
+            Knob::Gain => (-6.0, 6.0, 0.5),
+            Knob::Stiffness => (-1.0, 50.0, 0.5),
+            Knob::Viscous => (-50.0, 50.0, 0.5),
+            Knob::Delay => (-50.0, 50.0, 0.5),
+            Knob::Pole(_) | Knob::Zero(_) => (-0.25, 0.25, 0.02),
+            Knob::PoleDamping(_) => (-2.5, 2.5, 0.4),
+            Knob::ZeroDamping(_) => (-20.0, 20.0, 0.5),
+        };
+        Limit { low, high, step }
+    }
+}
+
+impl Fit<'_> {
+    /// Directions of each record's own start and constant torque.
+    pub fn local_basis(&self, plant: &Plant) -> Basis {
+        let mut basis = Basis::default();
+        for s in &self.stack.segments {
+            for mut column in free_motions(&plant.body, self.scene.sample_time_s, s.len) {
+                self.whitener.apply(&mut column);
+                basis.add_local(s.start, column);
+            }
+        }
+        basis
+    }
+
+    fn problem(&self, plant: &Plant) -> Problem<'_, '_> {
+        let mut strengths = Vec::new();
+        let mut inner = Vec::new();
+        for (e, c) in self.chosen.iter().enumerate() {
+            if !c.effect.facts().fixed {
+                strengths.extend((0..c.setting.strengths.len()).map(|i| (e, i)));
+            }
+            inner.extend((0..c.setting.inner.len()).filter(|&i| c.continuous[i]).map(|i| (e, i)));
+        }
+        Problem { fit: self, local: self.local_basis(plant), inner, strengths }
+    }
+
+    fn start(&self, p: &[f64], problem: &Problem) -> Vec<f64> {
+        let mut x = p.to_vec();
+        x.extend(problem.strengths.iter().map(|&(e, i)| self.chosen[e].setting.strengths[i]));
+        x.extend(problem.inner.iter().map(|&(e, i)| self.chosen[e].setting.inner[i].ln()));
+        x
+    }
+
+    /// Fits from `p` on; the chosen effects' numbers move with it.
+    pub fn refit(&mut self, p: &[f64], iterations: usize) -> Refitted {
+        let plant = self.form.plant(p);
+        let mut problem = self.problem(&plant);
+        let mut x = self.start(p, &problem);
+        let mut work = Workspace::default();
+        let settings = LevenbergSettings { iterations, tolerance: 1e-6 };
+        let outcome = minimise(&mut problem, &mut x, &settings, &mut work);
+        let moved = problem.settings(&x);
+        // The covariance of the last factorised Jacobian, one step before the end: the same to first order.
+        let root = work.qr.inverse_root();
+        let n = work.qr.cols();
+        let spread = (0..n).map(|i| (0..n).map(|j| root[j * n + i].powi(2)).sum::<f64>().sqrt()).collect();
+        let knobs = self.form.knobs.len();
+        for (c, s) in self.chosen.iter_mut().zip(moved) {
+            c.setting = s;
+        }
+        Refitted {
+            plant: self.form.plant(&x[..knobs]),
+            p: x[..knobs].to_vec(),
+            cost: outcome.cost,
+            spread,
+            converged: outcome.converged,
+        }
+    }
+
+    /// The whitened error at `p` with every direction of the fit taken out of it, and those directions: each record's own,
+    /// the linear parameters (stiffness and viscous rate along the recorded motion, which is exact for any change), and the
+    /// chosen effects.
+    pub fn screen_basis(&self, p: &[f64]) -> (Vec<f64>, Basis) {
+        let plant = self.form.plant(p);
+        let mut problem = self.problem(&plant);
+        let x = self.start(p, &problem);
+        let mut error = problem.error(&x);
+        let rows = self.stack.total;
+        let mut jacobian = vec![0.0; rows * problem.cols()];
+        problem.jacobian(&x, &mut jacobian);
+        let mut basis = problem.local.clone();
+        if let Ok(sampled) = Sampled::of(&plant, self.scene.sample_time_s) {
+            let motion = self.stack.columns(2, |r| {
+                let samples = &self.trajectories[r].samples;
+                [samples.iter().map(|s| s.x).collect::<Vec<f64>>(), samples.iter().map(|s| s.v).collect()]
+                    .into_iter()
+                    .map(|w| {
+                        let mut y = vec![0.0; w.len()];
+                        add_response(&sampled.direct, &w, &mut y);
+                        self.whitener.apply(&mut y);
+                        y
+                    })
+                    .collect()
+            });
+            for column in motion {
+                basis.add(column);
+            }
+        }
+        for column in jacobian.chunks_exact(rows) {
+            basis.add(column.to_vec());
+        }
+        basis.project(&mut error);
+        (error, basis)
+    }
+}
+

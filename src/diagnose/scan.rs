@@ -1,0 +1,151 @@
+//! Every effect of the library, every point of its grid: how much of the remaining error it explains.
+
+use super::columns::white_columns;
+use super::linear::Sampled;
+use super::refit::Fit;
+use super::stack::{Basis, Explained, explain};
+use crate::lti::Plant;
+use crate::physics::{Effect, Setting};
+use rayon::prelude::*;
+
+/// The best that one effect can do.
+#[derive(Clone)]
+pub struct Candidate {
+    /// The effect.
+    pub effect: &'static dyn Effect,
+    /// Its best numbers.
+    pub setting: Setting,
+    /// Fall of the sum of squares of the whitened error.
+    pub gain: f64,
+    /// Share of its columns that the linear parameters can imitate, at its best point.
+    pub concealed: f64,
+    /// The smallest such share over the grid: 1 means that these records cannot show the effect at all.
+    pub least_concealed: f64,
+    /// Points of the grid.
+    pub points: usize,
+    /// Free strengths.
+    pub strengths: usize,
+    /// Which inner parameters are continuous.
+    pub continuous: Vec<bool>,
+}
+
+impl Candidate {
+    /// Logarithm of an upper bound of the chance that noise alone gives this gain somewhere on the grid, for `effects`
+    /// effects tried at once: the tail of chi-square by Chernoff's bound, times all points and effects (Bonferroni).
+    pub fn log_p_value(&self, effects: usize) -> f64 {
+        log_tail(self.gain, self.strengths.max(1)) + (self.points.max(1) as f64).ln() + (effects.max(1) as f64).ln()
+    }
+}
+
+/// Chernoff's bound of log P(chi2_m > g), 0 below the mean.
+pub fn log_tail(g: f64, m: usize) -> f64 {
+    let m = m as f64;
+    if g <= m { 0.0 } else { 0.5 * (m - g) + 0.5 * m * (g / m).ln() }
+}
+
+/// Inner parameters that take more than three values over the grid, not all whole: these may be refined.
+fn continuous(grid: &[Vec<f64>]) -> Vec<bool> {
+    let count = grid.first().map_or(0, Vec::len);
+    (0..count)
+        .map(|i| {
+            let mut values: Vec<f64> = grid.iter().map(|p| p[i]).collect();
+            values.sort_by(f64::total_cmp);
+            values.dedup();
+            values.len() > 3 && values.iter().any(|v| v.fract() != 0.0) && values.iter().all(|v| *v > 0.0)
+        })
+        .collect()
+}
+
+/// A scan's ground: the error that is left, and what fits have used up.
+pub struct Ground<'a, 'f> {
+    /// Runs, filter, stack.
+    pub fit: &'a Fit<'f>,
+    /// The plant through which torques and commands are seen.
+    pub plant: &'a Plant,
+    /// The whitened error, basis taken out.
+    pub error: &'a [f64],
+    /// Directions used up.
+    pub basis: &'a Basis,
+}
+
+impl Ground<'_, '_> {
+    /// How well an effect does at one point.
+    pub fn explain(&self, sampled: &Sampled, effect: &'static dyn Effect, inner: &[f64]) -> Explained {
+        let facts = effect.facts();
+        let fit = self.fit;
+        let columns = fit.stack.columns(facts.columns, |r| {
+            white_columns(effect, inner, fit.scene, &fit.trajectories[r], sampled, fit.whitener)
+        });
+        explain(self.basis, self.error, columns, facts.fixed)
+    }
+
+    /// The best point of every effect, best effect first.
+    pub fn scan(&self, effects: &[&'static dyn Effect]) -> Vec<Candidate> {
+        let Ok(sampled) = Sampled::of(self.plant, self.fit.scene.sample_time_s) else { return Vec::new() };
+        let grids: Vec<Vec<Vec<f64>>> = effects.iter().map(|e| e.grid(self.fit.scene)).collect();
+        let jobs: Vec<(usize, usize)> =
+            grids.iter().enumerate().flat_map(|(e, g)| (0..g.len()).map(move |i| (e, i))).collect();
+        let scores: Vec<Explained> =
+            jobs.par_iter().map(|&(e, i)| self.explain(&sampled, effects[e], &grids[e][i])).collect();
+        let mut all = Vec::new();
+        for (e, effect) in effects.iter().enumerate() {
+            let own = jobs.iter().zip(&scores).filter(|((k, _), _)| *k == e);
+            let mut best: Option<(usize, &Explained)> = None;
+            let mut least = 1.0f64;
+            for ((_, i), s) in own {
+                least = least.min(s.concealed);
+                if s.gain.is_finite() && best.is_none_or(|(_, b)| s.gain > b.gain) {
+                    best = Some((*i, s));
+                }
+            }
+            if let Some((i, s)) = best {
+                all.push(Candidate {
+                    effect: *effect,
+                    setting: Setting { inner: grids[e][i].clone(), strengths: s.strengths.clone() },
+                    gain: s.gain,
+                    concealed: s.concealed,
+                    least_concealed: least,
+                    points: grids[e].len(),
+                    strengths: if effect.facts().fixed { 1 } else { effect.facts().columns },
+                    continuous: continuous(&grids[e]),
+                });
+            }
+        }
+        all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        all
+    }
+
+    /// Moves the continuous inner parameters of a candidate to where it explains most: one at a time, by steps that shrink.
+    pub fn refine(&self, candidate: &mut Candidate) {
+        let Ok(sampled) = Sampled::of(self.plant, self.fit.scene.sample_time_s) else { return };
+        let mut step: Vec<f64> = candidate.continuous.iter().map(|&c| if c { 0.1 } else { 0.0 }).collect();
+        for _ in 0..10 {
+            let mut moved = false;
+            for i in 0..step.len() {
+                if step[i] < 1e-4 {
+                    continue;
+                }
+                let mut better = false;
+                for way in [1.0, -1.0] {
+                    let mut inner = candidate.setting.inner.clone();
+                    inner[i] *= (way * step[i]).exp();
+                    let s = self.explain(&sampled, candidate.effect, &inner);
+                    if s.gain > candidate.gain {
+                        candidate.gain = s.gain;
+                        candidate.concealed = s.concealed;
+                        candidate.setting = Setting { inner, strengths: s.strengths };
+                        better = true;
+                        break;
+                    }
+                }
+                if !better {
+                    step[i] *= 0.4;
+                }
+                moved = true;
+            }
+            if !moved {
+                break;
+            }
+        }
+    }
+}
