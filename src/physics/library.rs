@@ -2,9 +2,11 @@
 
 use super::effect::{Effect, Facts};
 use super::{
-    aliased_mode, amplifier_lag, broadband_disturbance, controller_mismatch, coulomb_friction, current_saturation,
-    dead_band, encoder_cyclic_error, encoder_noise, extra_delay, jitter, linear_parameters, lost_samples, misalignment,
-    pivot_friction, quantisation, sensor_lag, slew_limit, time_base_drift, torque_factor_rolloff, unexplained,
+    aerodynamic_drag, aliased_mode, amplifier_lag, backlash, base_mode, broadband_disturbance, cable_spring,
+    controller_mismatch, coulomb_friction, current_saturation, dead_band, encoder_cyclic_error, encoder_noise,
+    extra_delay, jitter, line_disturbance, linear_parameters, lost_samples, misalignment, nonlinear_spring,
+    offset_drift, pivot_friction, quantisation, repeatable_runout, sensor_lag, slew_limit, time_base_drift,
+    torque_factor_rolloff, torque_ripple, unexplained, unmodelled_resonance,
 };
 
 /// Every effect that can be simulated and found by its columns.
@@ -12,7 +14,10 @@ pub fn library() -> &'static [&'static dyn Effect] {
     &[
         &pivot_friction::PivotFriction,
         &coulomb_friction::CoulombFriction,
+        &cable_spring::CableSpring,
+        &nonlinear_spring::NonlinearSpring,
         &torque_factor_rolloff::TorqueFactorRolloff,
+        &torque_ripple::TorqueRipple,
         &current_saturation::CurrentSaturation,
         &slew_limit::SlewLimit,
         &dead_band::DeadBand,
@@ -20,6 +25,13 @@ pub fn library() -> &'static [&'static dyn Effect] {
         &extra_delay::ExtraDelay,
         &sensor_lag::SensorLag,
         &encoder_cyclic_error::EncoderCyclicError,
+        &unmodelled_resonance::UnmodelledResonance,
+        &base_mode::BaseMode,
+        &backlash::Backlash,
+        &repeatable_runout::RepeatableRunout,
+        &line_disturbance::LineDisturbance,
+        &offset_drift::OffsetDrift,
+        &aerodynamic_drag::AerodynamicDrag,
     ]
 }
 
