@@ -12,6 +12,7 @@ static FACTS: Facts = Facts {
     entry: Entry::Command,
     columns: 1,
     fixed: true,
+    per_record: false,
     equation: "i = clip(u, -limit, limit)",
     says: "the amplifier runs out of current: commands above a limit give no more torque",
     confused_with: &["slew_limit", "torque_factor_rolloff"],

@@ -69,6 +69,16 @@ pub enum Unit {
     PerPositionSquared,
     /// 1/s.
     PerSecond,
+    /// position_unit per command_unit.
+    PositionPerCommand,
+    /// command_unit per position_unit².
+    CommandPerPositionSquared,
+    /// command_unit s² per position_unit².
+    CommandSecondSquaredPerPositionSquared,
+    /// command_unit per s².
+    CommandPerSecondSquared,
+    /// 1/°C.
+    PerDegreeCelsius,
     /// Samples.
     Sample,
     /// Anything else that the name of the parameter says.
@@ -93,6 +103,11 @@ impl Unit {
             Unit::PerPosition => format!("1/{position}"),
             Unit::PerPositionSquared => format!("1/{position}^2"),
             Unit::PerSecond => "1/s".into(),
+            Unit::PositionPerCommand => format!("{position}/{command}"),
+            Unit::CommandPerPositionSquared => format!("{command}/{position}^2"),
+            Unit::CommandSecondSquaredPerPositionSquared => format!("{command} s^2/{position}^2"),
+            Unit::CommandPerSecondSquared => format!("{command}/s^2"),
+            Unit::PerDegreeCelsius => "1/K".into(),
             Unit::Sample => "samples".into(),
             Unit::Named(text) => text.into(),
         }
@@ -112,6 +127,8 @@ pub struct Facts {
     pub columns: usize,
     /// Whether the strengths are 1 by definition (a saturation is there or not; its limit is an inner parameter).
     pub fixed: bool,
+    /// Whether the strengths differ from record to record (a mains line starts at another phase each time).
+    pub per_record: bool,
     /// The law, written out, with its source.
     pub equation: &'static str,
     /// One plain sentence for the factory floor.
@@ -207,6 +224,27 @@ impl<'a> Given<'a> {
         } else {
             Err(PhysicsError::Range { effect: self.effect, parameter, found, expected: "a finite number above 0" })
         }
+    }
+
+    /// A parameter that must lie strictly between two numbers, which `expected` says in words.
+    pub fn between(
+        &self,
+        parameter: &'static str,
+        low: f64,
+        high: f64,
+        expected: &'static str,
+    ) -> Result<f64, PhysicsError> {
+        let found = self.need(parameter)?;
+        if found > low && found < high {
+            Ok(found)
+        } else {
+            Err(PhysicsError::Range { effect: self.effect, parameter, found, expected })
+        }
+    }
+
+    /// Whether a parameter was given.
+    pub fn has(&self, parameter: &str) -> bool {
+        self.parameters.contains_key(parameter)
     }
 }
 

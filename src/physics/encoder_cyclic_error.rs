@@ -15,6 +15,7 @@ static FACTS: Facts = Facts {
     entry: Entry::Position,
     columns: 2,
     fixed: false,
+    per_record: false,
     equation: "m = x + a cos(2 pi x/P + phi)",
     says: "the encoder reads wrong by a wave that repeats with the position: its lines are not evenly interpolated",
     confused_with: &["torque_ripple", "unmodelled_resonance", "line_disturbance"],

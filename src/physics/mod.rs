@@ -5,13 +5,41 @@
 
 mod effect;
 mod library;
+mod oscillator;
 mod sample;
 
+pub mod aerodynamic_drag;
+pub mod aliased_mode;
+pub mod amplifier_lag;
+pub mod backlash;
+pub mod base_mode;
+pub mod broadband_disturbance;
+pub mod cable_spring;
+pub mod controller_mismatch;
+pub mod coulomb_friction;
 pub mod current_saturation;
+pub mod dead_band;
 pub mod encoder_cyclic_error;
+pub mod encoder_noise;
+pub mod extra_delay;
+pub mod jitter;
+pub mod line_disturbance;
+pub mod linear_parameters;
+pub mod lost_samples;
+pub mod misalignment;
+pub mod nonlinear_spring;
+pub mod offset_drift;
 pub mod pivot_friction;
+pub mod quantisation;
+pub mod repeatable_runout;
+pub mod sensor_lag;
+pub mod slew_limit;
+pub mod time_base_drift;
 pub mod torque_factor_rolloff;
+pub mod torque_ripple;
+pub mod unexplained;
+pub mod unmodelled_resonance;
 
 pub use effect::{COLUMNS, Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
-pub use library::{effect, library};
+pub use library::{data_facts, effect, facts, library};
 pub use sample::{Sample, Scene, logarithmic};

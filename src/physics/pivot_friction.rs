@@ -17,6 +17,7 @@ static FACTS: Facts = Facts {
     entry: Entry::Torque,
     columns: 1,
     fixed: false,
+    per_record: false,
     equation: "tau = -F z, dz/dx = (1 - sgn(dx) z)/x_s (Dahl) or a row of Maxwell-slip elements up to x_s",
     says: "the arm behaves like a bearing that sticks: after each reversal it first acts as a spring, then slides at a constant drag",
     confused_with: &["coulomb_friction", "cable_spring", "nonlinear_spring", "linear_parameters"],

@@ -14,6 +14,7 @@ static FACTS: Facts = Facts {
     entry: Entry::Torque,
     columns: 2,
     fixed: false,
+    per_record: false,
     equation: "tau = Kt0 (1 - a (x - x0)^2) i",
     says: "the motor pushes less towards the ends of the stroke: the same current gives less torque there",
     confused_with: &["gain_drift", "cable_spring", "mode_shift"],
