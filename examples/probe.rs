@@ -1,4 +1,5 @@
-use servotune::diagnose::{bench::Bench, run::runs, scan::Ground, stack::Stack};
+//! probe
+use servotune::diagnose::{bench::Bench, run::runs, select::*};
 use servotune::{recording::*, physics::library, lti::*};
 use std::path::Path;
 fn main(){
@@ -9,21 +10,14 @@ fn main(){
     let plant=Plant::try_from(pf).unwrap();
     let dt=case.records[0].1.sample_time_s;
     let mut b=Bench::new(&plant,runs(&case),dt,case.spindle_hz).unwrap();
-    let all=Stack::single(&b.runs,&b.fit_runs); 
-    println!("{} levels {:?}",case.id,b.levels);
-    { let f=b.fit(vec![]); let (e,_)=f.screen_basis(&b.p); println!("  given: sse/N {:.3} N {}",e.iter().map(|v|v*v).sum::<f64>()/e.len() as f64,e.len()); }
-    let mut ch=vec![];
-    let r=b.settle(&mut ch,3).unwrap();
-    println!("  levels {:?} t {:.2}",b.levels,t0.elapsed().as_secs_f64());
-    println!("  p {:.4?}",&r.p[..4]); println!("  s {:.6?}",&r.spread[..4]); println!("  body {:?} delay {:.3e}",r.plant.body,r.plant.delay_s);
-    let f=b.fit(vec![]); let (e,basis)=f.screen_basis(&b.p);
-    println!("  refit: cost/N {:.4} projected sse/N {:.4} dim {} conv {}",r.cost/e.len() as f64,e.iter().map(|v|v*v).sum::<f64>()/(e.len()-basis.dimension()) as f64,basis.dimension(),r.converged);
-    let plant=b.form.plant(&b.p);
-    let g=Ground{fit:&f,plant:&plant,error:&e,basis:&basis};
-    let lib=library();
-    let mut c=g.scan(lib);
-    println!("  scan t {:.2}",t0.elapsed().as_secs_f64());
-    for c in c.iter_mut().take(6){ let g0=c.gain; g.refine(c); println!("    {:24} gain {:10.1} ->{:10.1} inner {:.4?} str {:.4?} conc {:.3} {:.3} logp {:.1}",c.effect.facts().name,g0,c.gain,c.setting.inner,c.setting.strengths,c.concealed,c.least_concealed,c.log_p_value(lib.len())); }
-    println!("  t {:.2}",t0.elapsed().as_secs_f64()); let _=&all;
+    println!("==== {} levels {:?} t {:.2}",case.id,b.levels,t0.elapsed().as_secs_f64());
+    let s=select(&mut b,library(),&SelectSettings::default(),|m| eprintln!("   .. {m} {:.2}",t0.elapsed().as_secs_f64()));
+    let n=b.stack.total as f64;
+    println!("  given {:.3} baseline {:.3} (sig {:.1}) conv {}",s.given/n,s.baseline.cost/n,s.baseline.excess_sigma(),s.baseline.refitted.converged);
+    for st in &s.steps { for (i,m) in &st.tried { let c=&st.candidates[*i]; let l=m.chosen.last().unwrap();
+       println!("    {:24} screen {:10.1} conc {:.4} lp {:.1}| cost/N {:.4} sig {:.1} inner {:.4?} str {:.5?} {}",c.effect.facts().name,c.gain,c.concealed,c.log_p_value(30),m.cost/n,m.excess_sigma(),l.setting.inner,l.setting.strengths,if m.refitted.converged {""} else {"NOCONV"}); }
+       println!("    -> taken {:?}; best {} {:.1} lp {:.1}",st.taken,st.candidates[0].effect.facts().name,st.candidates[0].gain,st.candidates[0].log_p_value(30));}
+    println!("  FOUND {:?} explained {:.4} sig {:.1} t {:.2}",s.model.chosen.iter().map(|c|(c.effect.facts().name,c.effect.parameters(&c.setting,&b.scene).iter().map(|p|format!("{}={:.5}",p.name,p.value)).collect::<Vec<_>>().join(" "))).collect::<Vec<_>>(),1.0-s.model.excess()/s.baseline.excess(),s.model.excess_sigma(),t0.elapsed().as_secs_f64());
+    println!("  plant {:?} delay {:.4e}",s.model.refitted.plant.body,s.model.refitted.plant.delay_s);
   }
 }

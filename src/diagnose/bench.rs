@@ -1,8 +1,8 @@
 //! Everything that a diagnosis works on, made in order: given plant, noise, filter, refit, motion.
 
-use super::linear::{LinearForm, Sampled};
-use super::refit::{Chosen, Fit, Refitted, simulation_error};
-use super::run::Run;
+use super::linear::{Carrier, LinearForm, Sampled};
+use super::refit::{Chosen, Fit, simulation_error};
+use super::run::{Run, mean_run};
 use super::stack::Stack;
 use super::trajectory::{Smoother, Trajectory};
 use super::whiten::{NoiseLevels, Whitener};
@@ -23,7 +23,9 @@ pub struct Bench {
     pub levels: NoiseLevels,
     /// Its whitening filter.
     pub whitener: Whitener,
-    /// Motion behind every run.
+    /// The mean run of every segment of the stack.
+    pub means: Vec<Run>,
+    /// The motion behind each of them.
     pub trajectories: Vec<Trajectory>,
     /// Repeats together.
     pub stack: Stack,
@@ -63,6 +65,7 @@ impl Bench {
         let form = LinearForm::new(given, sample_time_s);
         let fit_runs: Vec<usize> = (0..runs.len()).filter(|&i| runs[i].role == Role::Fit).collect();
         let stack = Stack::grouped(&runs, &fit_runs);
+        let means = stack.segments.iter().map(|s| mean_run(&runs, &s.runs)).collect();
         let extremes = |of: &dyn Fn(&Run) -> &[f64]| {
             fit_runs.iter().flat_map(|&r| of(&runs[r]).iter().copied()).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
         };
@@ -89,32 +92,27 @@ impl Bench {
         let levels = NoiseLevels { sensor_rms: 1.0, torque_rms: 0.0, torque_corner_hz: 60.0, from_repeats: false };
         let whitener = Whitener::new(&levels, &given.body, sample_time_s);
         let p = vec![0.0; form.knobs.len()];
-        let mut bench = Bench { form, runs, fit_runs, levels, whitener, trajectories: Vec::new(), stack, scene, p };
-        bench.renew(&[])?;
+        let mut bench = Bench { form, runs, fit_runs, levels, whitener, means, trajectories: Vec::new(), stack, scene, p };
+        bench.renew()?;
         Ok(bench)
     }
 
-    /// Noise, filter and motion anew, for the linear parameters as they are now and the effects chosen so far.
-    pub fn renew(&mut self, chosen: &[Chosen]) -> Result<(), LtiError> {
-        let plant = self.form.plant(&self.p);
+    /// Noise, filter and motion anew, for the linear parameters as they are now.
+    pub fn renew(&mut self) -> Result<(), LtiError> {
+        let carrier = self.form.carrier(&self.p);
         let t = self.scene.sample_time_s;
-        let sampled = Sampled::of(&plant, t)?;
-        let effects: Vec<_> = chosen.iter().map(|c| (c.effect, &c.setting)).collect();
+        let sampled = Sampled::of(&carrier.plant, t)?;
+        // Repeats differ by noise only, so that the linear answer to the difference of their commands is all that counts.
+        let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
         let still = Trajectory { samples: Vec::new(), unexplained: Vec::new() };
-        let errors: Vec<(usize, Vec<f64>)> = self
-            .fit_runs
-            .iter()
-            .map(|&r| {
-                let motion = self.trajectories.get(r).unwrap_or(&still);
-                (r, simulation_error(&sampled, &effects, &self.scene, &self.runs[r], motion))
-            })
-            .collect();
+        let error = |r: usize| simulation_error(&sampled, &plain, &[], &self.scene, &self.runs[r], &still);
+        let errors: Vec<(usize, Vec<f64>)> = self.fit_runs.iter().map(|&r| (r, error(r))).collect();
         let repeats = noise_series(&errors, &self.runs);
         let from_repeats = !repeats.is_empty();
-        let series = if from_repeats { repeats } else { errors.into_iter().map(|e| e.1).collect() };
+        let series = if from_repeats { repeats } else { self.residual_series(&sampled, &carrier) };
         let weight = vec![1.0; series.len()];
-        self.levels = NoiseLevels::fit(&series, &weight, &plant.body, t, from_repeats);
-        self.whitener = Whitener::new(&self.levels, &plant.body, t);
+        self.levels = NoiseLevels::fit(&series, &weight, &carrier.plant.body, t, from_repeats);
+        self.whitener = Whitener::new(&self.levels, &carrier.plant.body, t);
         let filtered: Vec<Vec<f64>> = series
             .into_iter()
             .map(|mut s| {
@@ -124,46 +122,44 @@ impl Bench {
             .collect();
         self.whitener.refine(&filtered, &weight);
         self.scene.noise = self.levels.sensor_rms;
-        self.scene.plant = plant.clone();
+        self.scene.plant = carrier.plant.clone();
         let spindle_hz = self.scene.spindle_hz.unwrap_or(0.0);
-        let smoother = self.fit_runs.first().map(|&r| Smoother::of(&plant, &sampled.delayed, self.levels.sensor_rms, &self.runs[r]));
-        if let Some(smoother) = smoother {
-            self.trajectories = self.runs.iter().map(|r| smoother.smooth(r, &sampled.delayed, spindle_hz)).collect();
-        }
-        self.scene.speed = self
-            .fit_runs
-            .iter()
-            .flat_map(|&r| self.trajectories[r].samples.iter().map(|s| s.v.abs()))
-            .fold(0.0f64, f64::max)
-            .max(1e-12);
+        let smoother = Smoother::of(&carrier.plant, &sampled.delayed, self.levels.sensor_rms, &self.means[0]);
+        self.trajectories = self.means.iter().map(|r| smoother.smooth(r, &sampled.delayed, spindle_hz)).collect();
+        let speeds = self.trajectories.iter().flat_map(|t| t.samples.iter().map(|s| s.v.abs()));
+        self.scene.speed = speeds.fold(0.0f64, f64::max).max(1e-12);
         Ok(())
     }
 
-    /// A fit on the grouped stack with these effects.
+    /// Without repeats there is only what the model leaves: the error of the carrier along the recorded motion, which holds
+    /// what the model lacks as well as the noise. Verdicts are weaker for it.
+    fn residual_series(&self, sampled: &Sampled, carrier: &Carrier) -> Vec<Vec<f64>> {
+        let still = Trajectory { samples: Vec::new(), unexplained: Vec::new() };
+        let moved = self.trajectories.len() == self.means.len();
+        self.means
+            .iter()
+            .enumerate()
+            .map(|(i, run)| {
+                if moved {
+                    simulation_error(sampled, carrier, &[], &self.scene, run, &self.trajectories[i])
+                } else {
+                    let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
+                    simulation_error(sampled, &plain, &[], &self.scene, run, &still)
+                }
+            })
+            .collect()
+    }
+
+    /// A fit on the stack with these effects.
     pub fn fit(&self, chosen: Vec<Chosen>) -> Fit<'_> {
         Fit {
             form: &self.form,
-            runs: &self.runs,
+            means: &self.means,
             trajectories: &self.trajectories,
             whitener: &self.whitener,
             stack: &self.stack,
             scene: &self.scene,
             chosen,
         }
-    }
-
-    /// Refits, then renews noise and filter at the result, and refits again; `rounds` times.
-    pub fn settle(&mut self, chosen: &mut Vec<Chosen>, rounds: usize) -> Result<Refitted, LtiError> {
-        let mut last = None;
-        for _ in 0..rounds.max(1) {
-            let mut fit = self.fit(chosen.clone());
-            let refitted = fit.refit(&self.p, 25);
-            *chosen = fit.chosen;
-            self.p = refitted.p.clone();
-            self.renew(chosen)?;
-            last = Some(refitted);
-        }
-        // At least one round ran.
-        last.ok_or(LtiError::Range { key: "rounds".into(), found: 0.0, expected: "at least one round" })
     }
 }

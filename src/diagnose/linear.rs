@@ -38,6 +38,18 @@ pub struct LinearForm {
 /// Share of half the sample rate above which a mode is left as it is: records hold nothing about it.
 const HIGHEST_MODE: f64 = 0.95;
 
+/// The plant that carries a simulation: gain, delay and modes as the parameters have them, the body's spring and damper as
+/// given. Their change acts as a torque along the recorded motion, which is exact for any change and linear in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Carrier {
+    /// The plant.
+    pub plant: Plant,
+    /// Torque per position (command_unit per position_unit).
+    pub spring: f64,
+    /// Torque per velocity (command_unit s per position_unit).
+    pub damper: f64,
+}
+
 impl LinearForm {
     /// All parameters that records at this sample time can tell.
     pub fn new(given: &Plant, sample_time_s: f64) -> LinearForm {
@@ -53,6 +65,23 @@ impl LinearForm {
             }
         }
         LinearForm { given: given.clone(), knobs, sample_time_s }
+    }
+
+    /// The plant that carries a simulation at these parameters.
+    pub fn carrier(&self, p: &[f64]) -> Carrier {
+        let mut held = p.to_vec();
+        let (mut spring, mut damper) = (0.0, 0.0);
+        let (b, k, _) = body_numbers(&self.given.body);
+        let mut gain = b * self.given.resonance_gain;
+        for (knob, value) in self.knobs.iter().zip(held.iter_mut()) {
+            match knob {
+                Knob::Gain => gain *= value.exp(),
+                Knob::Stiffness => spring = -k * std::mem::take(value),
+                Knob::Viscous => damper = -rate_of(&self.given.body) * std::mem::take(value),
+                _ => {}
+            }
+        }
+        Carrier { plant: self.plant(&held), spring: spring / gain, damper: damper / gain }
     }
 
     /// The plant at these parameters; values that make no plant are taken to the nearest that do.

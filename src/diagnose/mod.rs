@@ -5,6 +5,7 @@ pub mod linear;
 pub mod refit;
 pub mod run;
 pub mod scan;
+pub mod select;
 pub mod stack;
 pub mod trajectory;
 pub mod whiten;

@@ -2,14 +2,14 @@
 //! were chosen so far; by the whitened simulation error.
 
 use super::columns::raw_columns;
-use super::linear::{LinearForm, Sampled, add_response, free_motions};
+use super::linear::{Carrier, LinearForm, Sampled, add_response, free_motions};
 use super::run::Run;
 use super::stack::{Basis, Stack};
 use super::trajectory::Trajectory;
 use super::whiten::Whitener;
 use crate::lti::Plant;
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
-use crate::physics::{Effect, Entry, Scene, Setting};
+use crate::physics::{Effect, Entry, Sample, Scene, Setting};
 use rayon::prelude::*;
 
 /// An effect that is part of the model, with its numbers.
@@ -27,13 +27,13 @@ pub struct Chosen {
 pub struct Fit<'a> {
     /// The form of the linear plant.
     pub form: &'a LinearForm,
-    /// All runs.
-    pub runs: &'a [Run],
-    /// Motion behind each run.
+    /// The mean run of every segment of the stack.
+    pub means: &'a [Run],
+    /// The motion behind each.
     pub trajectories: &'a [Trajectory],
     /// The filter.
     pub whitener: &'a Whitener,
-    /// Which runs, and how they are stacked.
+    /// How they are stacked.
     pub stack: &'a Stack,
     /// Machine and size of its motion.
     pub scene: &'a Scene,
@@ -86,14 +86,14 @@ impl Problem<'_, '_> {
     /// Whitened error, one stacked vector, local directions taken out.
     fn error(&self, x: &[f64]) -> Vec<f64> {
         let fit = self.fit;
-        let plant = fit.form.plant(&x[..fit.form.knobs.len()]);
-        let Ok(sampled) = Sampled::of(&plant, fit.scene.sample_time_s) else {
+        let carrier = fit.form.carrier(&x[..fit.form.knobs.len()]);
+        let Ok(sampled) = Sampled::of(&carrier.plant, fit.scene.sample_time_s) else {
             return vec![f64::INFINITY; fit.stack.total];
         };
         let settings = self.settings(x);
         let effects: Vec<(&dyn Effect, &Setting)> = fit.chosen.iter().map(|c| c.effect).zip(&settings).collect();
-        let mut all = fit.stack.mean(|r| {
-            let mut e = simulation_error(&sampled, &effects, fit.scene, &fit.runs[r], &fit.trajectories[r]);
+        let mut all = fit.stack.series(|i| {
+            let mut e = simulation_error(&sampled, &carrier, &effects, fit.scene, &fit.means[i], &fit.trajectories[i]);
             fit.whitener.apply(&mut e);
             e
         });
@@ -102,16 +102,23 @@ impl Problem<'_, '_> {
     }
 }
 
-/// Recorded position less the plant's answer to the recorded command, with the effects driven by the recorded motion.
+/// Recorded position less the carrier's answer to the recorded command, with changes of the body and all effects driven by
+/// the recorded motion.
 pub fn simulation_error(
     sampled: &Sampled,
+    carrier: &Carrier,
     effects: &[(&dyn Effect, &Setting)],
     scene: &Scene,
     run: &Run,
     trajectory: &Trajectory,
 ) -> Vec<f64> {
     let mut command = run.input.clone();
-    let mut torque: Option<Vec<f64>> = None;
+    let mut torque: Option<Vec<f64>> = (carrier.spring != 0.0 || carrier.damper != 0.0).then(|| {
+        // The mean over each interval, by the trapezium.
+        let at = |s: &Sample| carrier.spring * s.x + carrier.damper * s.v;
+        let samples = &trajectory.samples;
+        (0..run.len()).map(|k| 0.5 * (at(&samples[k]) + at(&samples[(k + 1).min(run.len() - 1)]))).collect()
+    });
     let mut y = vec![0.0; run.len()];
     for (effect, setting) in effects {
         let raw = raw_columns(*effect, &setting.inner, scene, trajectory);
@@ -176,8 +183,8 @@ impl Residuals for Problem<'_, '_> {
         use super::linear::Knob;
         let (low, high, step) = match self.fit.form.knobs[i] {
             Knob::Gain => (-6.0, 6.0, 0.5),
-            Knob::Stiffness => (-1.0, 50.0, 0.5),
-            Knob::Viscous => (-50.0, 50.0, 0.5),
+            Knob::Stiffness => (-50.0, 50.0, 5.0),
+            Knob::Viscous => (-50.0, 50.0, 5.0),
             Knob::Delay => (-50.0, 50.0, 0.5),
             Knob::Pole(_) | Knob::Zero(_) => (-0.25, 0.25, 0.02),
             Knob::PoleDamping(_) => (-2.5, 2.5, 0.4),
@@ -189,10 +196,10 @@ impl Residuals for Problem<'_, '_> {
 
 impl Fit<'_> {
     /// Directions of each record's own start and constant torque.
-    pub fn local_basis(&self, plant: &Plant) -> Basis {
+    pub fn local_basis(&self) -> Basis {
         let mut basis = Basis::default();
         for s in &self.stack.segments {
-            for mut column in free_motions(&plant.body, self.scene.sample_time_s, s.len) {
+            for mut column in free_motions(&self.form.given.body, self.scene.sample_time_s, s.len) {
                 self.whitener.apply(&mut column);
                 basis.add_local(s.start, column);
             }
@@ -200,7 +207,7 @@ impl Fit<'_> {
         basis
     }
 
-    fn problem(&self, plant: &Plant) -> Problem<'_, '_> {
+    fn problem(&self) -> Problem<'_, '_> {
         let mut strengths = Vec::new();
         let mut inner = Vec::new();
         for (e, c) in self.chosen.iter().enumerate() {
@@ -209,7 +216,7 @@ impl Fit<'_> {
             }
             inner.extend((0..c.setting.inner.len()).filter(|&i| c.continuous[i]).map(|i| (e, i)));
         }
-        Problem { fit: self, local: self.local_basis(plant), inner, strengths }
+        Problem { fit: self, local: self.local_basis(), inner, strengths }
     }
 
     fn start(&self, p: &[f64], problem: &Problem) -> Vec<f64> {
@@ -219,10 +226,16 @@ impl Fit<'_> {
         x
     }
 
+    /// Sum of squares of the whitened error at `p`, each record's own start taken out.
+    pub fn cost(&self, p: &[f64]) -> f64 {
+        let problem = self.problem();
+        let error = problem.error(&self.start(p, &problem));
+        error.iter().map(|e| e * e).sum()
+    }
+
     /// Fits from `p` on; the chosen effects' numbers move with it.
     pub fn refit(&mut self, p: &[f64], iterations: usize) -> Refitted {
-        let plant = self.form.plant(p);
-        let mut problem = self.problem(&plant);
+        let mut problem = self.problem();
         let mut x = self.start(p, &problem);
         let mut work = Workspace::default();
         let settings = LevenbergSettings { iterations, tolerance: 1e-6 };
@@ -246,34 +259,15 @@ impl Fit<'_> {
     }
 
     /// The whitened error at `p` with every direction of the fit taken out of it, and those directions: each record's own,
-    /// the linear parameters (stiffness and viscous rate along the recorded motion, which is exact for any change), and the
-    /// chosen effects.
+    /// the linear parameters, and the chosen effects.
     pub fn screen_basis(&self, p: &[f64]) -> (Vec<f64>, Basis) {
-        let plant = self.form.plant(p);
-        let mut problem = self.problem(&plant);
+        let mut problem = self.problem();
         let x = self.start(p, &problem);
         let mut error = problem.error(&x);
         let rows = self.stack.total;
         let mut jacobian = vec![0.0; rows * problem.cols()];
         problem.jacobian(&x, &mut jacobian);
         let mut basis = problem.local.clone();
-        if let Ok(sampled) = Sampled::of(&plant, self.scene.sample_time_s) {
-            let motion = self.stack.columns(2, |r| {
-                let samples = &self.trajectories[r].samples;
-                [samples.iter().map(|s| s.x).collect::<Vec<f64>>(), samples.iter().map(|s| s.v).collect()]
-                    .into_iter()
-                    .map(|w| {
-                        let mut y = vec![0.0; w.len()];
-                        add_response(&sampled.direct, &w, &mut y);
-                        self.whitener.apply(&mut y);
-                        y
-                    })
-                    .collect()
-            });
-            for column in motion {
-                basis.add(column);
-            }
-        }
         for column in jacobian.chunks_exact(rows) {
             basis.add(column.to_vec());
         }

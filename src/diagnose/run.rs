@@ -70,3 +70,17 @@ pub fn runs(case: &Case) -> Vec<Run> {
         })
         .collect()
 }
+
+/// The mean of repeats of equal length: one run with less noise. The logs beside the motion are the first one's.
+pub fn mean_run(runs: &[Run], repeats: &[usize]) -> Run {
+    let mut mean = runs[repeats[0]].clone();
+    let scale = 1.0 / repeats.len() as f64;
+    type Pick = fn(&Run) -> &Vec<f64>;
+    let average = |pick: Pick| -> Vec<f64> {
+        (0..mean.len()).map(|k| scale * repeats.iter().map(|&r| pick(&runs[r])[k]).sum::<f64>()).collect()
+    };
+    let (command, excitation, input, position) =
+        (average(|r| &r.command), average(|r| &r.excitation), average(|r| &r.input), average(|r| &r.position));
+    (mean.command, mean.excitation, mean.input, mean.position) = (command, excitation, input, position);
+    mean
+}

@@ -27,6 +27,8 @@ pub struct Candidate {
     pub strengths: usize,
     /// Which inner parameters are continuous.
     pub continuous: Vec<bool>,
+    /// Range of each inner parameter on the grid.
+    pub range: Vec<[f64; 2]>,
 }
 
 impl Candidate {
@@ -56,6 +58,12 @@ fn continuous(grid: &[Vec<f64>]) -> Vec<bool> {
         .collect()
 }
 
+fn range(grid: &[Vec<f64>]) -> Vec<[f64; 2]> {
+    let count = grid.first().map_or(0, Vec::len);
+    let over = |i: usize, pick: fn(f64, f64) -> f64, from: f64| grid.iter().map(|p| p[i]).fold(from, pick);
+    (0..count).map(|i| [over(i, f64::min, f64::INFINITY), over(i, f64::max, f64::NEG_INFINITY)]).collect()
+}
+
 /// A scan's ground: the error that is left, and what fits have used up.
 pub struct Ground<'a, 'f> {
     /// Runs, filter, stack.
@@ -73,8 +81,8 @@ impl Ground<'_, '_> {
     pub fn explain(&self, sampled: &Sampled, effect: &'static dyn Effect, inner: &[f64]) -> Explained {
         let facts = effect.facts();
         let fit = self.fit;
-        let columns = fit.stack.columns(facts.columns, |r| {
-            white_columns(effect, inner, fit.scene, &fit.trajectories[r], sampled, fit.whitener)
+        let columns = fit.stack.columns(facts.columns, |i| {
+            white_columns(effect, inner, fit.scene, &fit.trajectories[i], sampled, fit.whitener)
         });
         explain(self.basis, self.error, columns, facts.fixed)
     }
@@ -108,6 +116,7 @@ impl Ground<'_, '_> {
                     points: grids[e].len(),
                     strengths: if effect.facts().fixed { 1 } else { effect.facts().columns },
                     continuous: continuous(&grids[e]),
+                    range: range(&grids[e]),
                 });
             }
         }
@@ -128,7 +137,8 @@ impl Ground<'_, '_> {
                 let mut better = false;
                 for way in [1.0, -1.0] {
                     let mut inner = candidate.setting.inner.clone();
-                    inner[i] *= (way * step[i]).exp();
+                    let [low, high] = candidate.range[i];
+                    inner[i] = (inner[i] * (way * step[i]).exp()).clamp(low, high);
                     let s = self.explain(&sampled, candidate.effect, &inner);
                     if s.gain > candidate.gain {
                         candidate.gain = s.gain;

@@ -1,6 +1,6 @@
 //! Several records as one long vector, and least squares on it.
 //!
-//! Repeats enter once, as their mean times the root of their number: under white noise nothing is lost, and the cost falls
+//! Repeats enter once, as their mean times the root of their number: under white noise nothing is lost, and the work falls
 //! by that number.
 
 use super::run::Run;
@@ -9,13 +9,13 @@ use crate::numeric::least_squares::dot;
 /// One stretch of the stacked vector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Segment {
-    /// Runs whose mean stands here; the first is the one whose motion drives the laws.
+    /// The repeats whose mean stands here.
     pub runs: Vec<usize>,
     /// First sample in the stacked vector.
     pub start: usize,
     /// Samples.
     pub len: usize,
-    /// Root of the number of runs.
+    /// Root of the number of repeats.
     pub weight: f64,
 }
 
@@ -29,12 +29,7 @@ pub struct Stack {
 }
 
 impl Stack {
-    /// Every run of its own.
-    pub fn single(runs: &[Run], wanted: &[usize]) -> Stack {
-        Stack::build(wanted.iter().map(|&i| (vec![i], runs[i].len())).collect())
-    }
-
-    /// Repeats of equal length together.
+    /// Repeats of equal length together, the others each of its own.
     pub fn grouped(runs: &[Run], wanted: &[usize]) -> Stack {
         let mut groups: Vec<(Vec<usize>, usize)> = Vec::new();
         for &i in wanted {
@@ -44,10 +39,6 @@ impl Stack {
                 None => groups.push((vec![i], len)),
             }
         }
-        Stack::build(groups)
-    }
-
-    fn build(groups: Vec<(Vec<usize>, usize)>) -> Stack {
         let mut start = 0;
         let segments = groups
             .into_iter()
@@ -61,28 +52,20 @@ impl Stack {
         Stack { segments, total: start }
     }
 
-    /// Stacks a series of each run: the mean over the runs of a segment, weighted.
-    pub fn mean(&self, of: impl Fn(usize) -> Vec<f64>) -> Vec<f64> {
-        let mut out = vec![0.0; self.total];
-        for s in &self.segments {
-            let scale = s.weight / s.runs.len() as f64;
-            for &r in &s.runs {
-                let series = of(r);
-                out[s.start..s.start + s.len].iter_mut().zip(&series).for_each(|(o, v)| *o += scale * v);
+    /// Stacks `count` columns of every segment, weighted.
+    pub fn columns(&self, count: usize, of: impl Fn(usize) -> Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let mut out = vec![vec![0.0; self.total]; count];
+        for (i, s) in self.segments.iter().enumerate() {
+            for (o, c) in out.iter_mut().zip(of(i)) {
+                o[s.start..s.start + s.len].iter_mut().zip(&c).for_each(|(o, v)| *o = s.weight * v);
             }
         }
         out
     }
 
-    /// Stacks columns of the first run of each segment, weighted.
-    pub fn columns(&self, count: usize, of: impl Fn(usize) -> Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-        let mut out = vec![vec![0.0; self.total]; count];
-        for s in &self.segments {
-            for (o, c) in out.iter_mut().zip(of(s.runs[0])) {
-                o[s.start..s.start + s.len].iter_mut().zip(&c).for_each(|(o, v)| *o = s.weight * v);
-            }
-        }
-        out
+    /// Stacks one series of every segment, weighted.
+    pub fn series(&self, of: impl Fn(usize) -> Vec<f64>) -> Vec<f64> {
+        self.columns(1, |i| vec![of(i)]).swap_remove(0)
     }
 }
 

@@ -3,7 +3,7 @@
 //! m = x + a cos(2 pi x/P) + b sin(2 pi x/P); offsets of the two photocurrents give the first harmonic (Heydemann 1981).
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{Sample, Scene};
 use std::f64::consts::TAU;
 
 /// Inner: the period. Strengths: cosine and sine.
@@ -42,12 +42,11 @@ impl Effect for EncoderCyclicError {
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
         // Evenly in 1/P, a quarter of a wave over the whole travel apart: no period falls between two points.
         let finest = (8.0 * scene.noise).max(scene.travel / 150.0);
-        let coarse = 1.2 * scene.travel;
+        // A longer wave over the stroke is a scale error, not one of the grating.
+        let coarse = 0.6 * scene.travel;
         let step = 0.2 / scene.travel;
         let count = (((1.0 / finest - 1.0 / coarse) / step).ceil() as usize).clamp(1, 700);
-        let mut all: Vec<Vec<f64>> = (0..count).map(|i| vec![1.0 / (1.0 / coarse + step * i as f64)]).collect();
-        all.extend(logarithmic(coarse, 4.0 * scene.travel, 4).into_iter().skip(1).map(|p| vec![p]));
-        all
+        (0..count).map(|i| vec![1.0 / (1.0 / coarse + step * i as f64)]).collect()
     }
 
     fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
