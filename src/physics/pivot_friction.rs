@@ -3,7 +3,8 @@
 //! Dahl's law (P. Dahl, Aerospace Corp. TOR-0158, 1968): dz/dx = (1 - sgn(dx) z)/x_s with z = friction torque over its sliding
 //! level; exact over a step: z1 = s - (s - z0) exp(-|dx|/x_s), s = sgn(dx). Maxwell-slip form (Al-Bender, Lampaert, Swevers
 //! 2005): a row of spring-slider elements with evenly spread yield lengths up to x_s, whose first loading is the parabola
-//! z = 2 d/x_s - (d/x_s)². The inner parameter `shape` chooses: 0 Dahl, 1 Maxwell slip.
+//! z = 2 d/x_s - (d/x_s)². The inner parameter `shape` chooses: 0 Dahl, 1 Maxwell slip with that parabola, 2 Maxwell slip with
+//! Dahl's first loading 1 - exp(-d/x_s).
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene, logarithmic};
@@ -25,8 +26,8 @@ static FACTS: Facts = Facts {
     band_hz: [1.0, 150.0],
 };
 
-/// Elements of the Maxwell-slip row: enough for a smooth parabola (kinks below 0.2 % of the level).
-const ELEMENTS: usize = 12;
+/// Elements of the Maxwell-slip row: the curve's kinks stay below half a per cent of the level.
+const ELEMENTS: usize = 16;
 
 struct Dahl {
     length: f64,
@@ -48,24 +49,39 @@ impl Law for Dahl {
     }
 }
 
-/// Elements i = 1..n yield at i/n of the sliding length; each carries 1/n of the stiffness 2/x_s.
+/// A row of spring-slider elements whose first loading is a given curve, linear between nodes (Iwan 1966): element i yields
+/// at node i and has the stiffness by which the curve's slope falls there. Unloading and nested loops follow Masing's rule.
 struct MaxwellSlip {
-    length: f64,
-    /// Stretch of each spring over its yield length.
+    /// Yield lengths (position_unit).
+    yields: [f64; ELEMENTS],
+    /// Stiffness, so that all elements sliding make 1 (1/position_unit).
+    stiffness: [f64; ELEMENTS],
+    /// Stretch of each spring (position_unit).
     stretch: [f64; ELEMENTS],
 }
 
 impl MaxwellSlip {
-    fn level(stretch: &[f64; ELEMENTS]) -> f64 {
-        let n = ELEMENTS as f64;
-        // The levels i sum to n (n + 1)/2: the row slides at 1.
-        stretch.iter().enumerate().map(|(i, s)| s * (i + 1) as f64).sum::<f64>() * 2.0 / (n * (n + 1.0))
+    /// `curve` from 0 to 1 over distances in sliding lengths, up to `end` of them.
+    fn of(curve: fn(f64) -> f64, end: f64, length: f64) -> MaxwellSlip {
+        // Nodes closer at the start, where the curve bends most.
+        let node = |i: usize| end * (i as f64 / ELEMENTS as f64).powf(1.5);
+        let level = |i: usize| curve(node(i)) / curve(end);
+        let slope = |i: usize| if i > ELEMENTS { 0.0 } else { (level(i) - level(i - 1)) / ((node(i) - node(i - 1)) * length) };
+        MaxwellSlip {
+            yields: std::array::from_fn(|i| node(i + 1) * length),
+            stiffness: std::array::from_fn(|i| slope(i + 1) - slope(i + 2)),
+            stretch: [0.0; ELEMENTS],
+        }
+    }
+
+    fn level(&self, stretch: &[f64; ELEMENTS]) -> f64 {
+        stretch.iter().zip(&self.stiffness).map(|(s, k)| s * k).sum()
     }
 
     fn moved(&self, dx: f64) -> [f64; ELEMENTS] {
         let mut next = self.stretch;
-        for (i, s) in next.iter_mut().enumerate() {
-            *s = (*s + dx * ELEMENTS as f64 / ((i + 1) as f64 * self.length)).clamp(-1.0, 1.0);
+        for (s, y) in next.iter_mut().zip(&self.yields) {
+            *s = (*s + dx).clamp(-y, *y);
         }
         next
     }
@@ -73,12 +89,22 @@ impl MaxwellSlip {
 
 impl Law for MaxwellSlip {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        out[0] = -0.5 * (Self::level(&self.stretch) + Self::level(&self.moved(to.x - from.x)));
+        out[0] = -0.5 * (self.level(&self.stretch) + self.level(&self.moved(to.x - from.x)));
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
         self.stretch = self.moved(to.x - from.x);
     }
+}
+
+/// First loading of evenly spread yield lengths.
+fn parabola(d: f64) -> f64 {
+    if d < 1.0 { d * (2.0 - d) } else { 1.0 }
+}
+
+/// First loading of Dahl's law.
+fn exponential(d: f64) -> f64 {
+    1.0 - (-d).exp()
 }
 
 impl Effect for PivotFriction {
@@ -90,14 +116,16 @@ impl Effect for PivotFriction {
         // Below some twelve times the sensor's noise the hysteresis cannot be told from dry friction.
         let low = (12.0 * scene.noise).max(2e-3 * scene.travel);
         let lengths = logarithmic(low, 4.0 * scene.travel, 14);
-        lengths.iter().flat_map(|&l| [vec![l, 0.0], vec![l, 1.0]]).collect()
+        lengths.iter().flat_map(|&l| [0.0, 1.0, 2.0].map(|shape| vec![l, shape])).collect()
     }
 
     fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
         if inner[1] < 0.5 {
             Box::new(Dahl { length: inner[0], z: 0.0 })
         } else {
-            Box::new(MaxwellSlip { length: inner[0], stretch: [0.0; ELEMENTS] })
+            let (curve, end): (fn(f64) -> f64, f64) =
+                if inner[1] < 1.5 { (parabola, 1.0) } else { (exponential, 6.0) };
+            Box::new(MaxwellSlip::of(curve, end, inner[0]))
         }
     }
 
