@@ -2,10 +2,11 @@
 
 use super::effect::{Effect, Facts};
 use super::{
-    aerodynamic_drag, aliased_mode, amplifier_lag, backlash, base_mode, broadband_disturbance, cable_spring,
-    controller_mismatch, coulomb_friction, current_saturation, dead_band, encoder_cyclic_error, encoder_noise,
-    extra_delay, jitter, line_disturbance, linear_parameters, lost_samples, misalignment, nonlinear_spring,
-    offset_drift, pivot_friction, quantisation, repeatable_runout, sensor_lag, slew_limit, time_base_drift,
+    aerodynamic_drag, aliased_mode, amplifier_lag, backlash, base_mode, bearing_bias, broadband_disturbance,
+    cable_spring, controller_mismatch, coulomb_friction, current_saturation, dead_band, encoder_cyclic_error,
+    encoder_noise, encoder_scale_error, extra_delay, gain_drift, jitter, line_disturbance, linear_parameters,
+    lost_samples, misalignment, modal_damping, mode_shift, nonlinear_spring, offset_drift, parametric_gain,
+    pivot_friction, quantisation, repeatable_runout, sensor_lag, shock, slew_limit, time_base_drift,
     torque_factor_rolloff, torque_ripple, unexplained, unmodelled_resonance,
 };
 
@@ -14,6 +15,7 @@ pub fn library() -> &'static [&'static dyn Effect] {
     &[
         &pivot_friction::PivotFriction,
         &coulomb_friction::CoulombFriction,
+        &bearing_bias::BearingBias,
         &cable_spring::CableSpring,
         &nonlinear_spring::NonlinearSpring,
         &torque_factor_rolloff::TorqueFactorRolloff,
@@ -24,12 +26,18 @@ pub fn library() -> &'static [&'static dyn Effect] {
         &amplifier_lag::AmplifierLag,
         &extra_delay::ExtraDelay,
         &sensor_lag::SensorLag,
+        &gain_drift::GainDrift,
+        &parametric_gain::ParametricGain,
         &encoder_cyclic_error::EncoderCyclicError,
+        &encoder_scale_error::EncoderScaleError,
         &unmodelled_resonance::UnmodelledResonance,
+        &mode_shift::ModeShift,
         &base_mode::BaseMode,
+        &modal_damping::ModalDamping,
         &backlash::Backlash,
         &repeatable_runout::RepeatableRunout,
         &line_disturbance::LineDisturbance,
+        &shock::Shock,
         &offset_drift::OffsetDrift,
         &aerodynamic_drag::AerodynamicDrag,
     ]
