@@ -54,7 +54,9 @@ fn noise_series(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<Vec<f64>> {
         let len = errors[g[0]].1.len();
         let mean: Vec<f64> = (0..len).map(|k| g.iter().map(|&i| errors[i].1[k]).sum::<f64>() / n).collect();
         let scale = (n / (n - 1.0)).sqrt();
-        out.extend(g.iter().map(|&i| errors[i].1.iter().zip(&mean).map(|(e, m)| scale * (e - m)).collect::<Vec<f64>>()));
+        out.extend(
+            g.iter().map(|&i| errors[i].1.iter().zip(&mean).map(|(e, m)| scale * (e - m)).collect::<Vec<f64>>()),
+        );
     }
     out
 }
@@ -67,14 +69,15 @@ impl Bench {
         let stack = Stack::grouped(&runs, &fit_runs);
         let means = stack.segments.iter().map(|s| mean_run(&runs, &s.runs)).collect();
         let extremes = |of: &dyn Fn(&Run) -> &[f64]| {
-            fit_runs.iter().flat_map(|&r| of(&runs[r]).iter().copied()).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
+            fit_runs
+                .iter()
+                .flat_map(|&r| of(&runs[r]).iter().copied())
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
         };
         let (low, high) = extremes(&|r| &r.position);
         let (least, most) = extremes(&|r| &r.input);
-        let step = fit_runs
-            .iter()
-            .flat_map(|&r| runs[r].input.windows(2).map(|w| (w[1] - w[0]).abs()))
-            .fold(0.0f64, f64::max);
+        let step =
+            fit_runs.iter().flat_map(|&r| runs[r].input.windows(2).map(|w| (w[1] - w[0]).abs())).fold(0.0f64, f64::max);
         let scene = Scene {
             plant: given.clone(),
             sample_time_s,
@@ -92,7 +95,8 @@ impl Bench {
         let levels = NoiseLevels { sensor_rms: 1.0, torque_rms: 0.0, torque_corner_hz: 60.0, from_repeats: false };
         let whitener = Whitener::new(&levels, &given.body, sample_time_s);
         let p = vec![0.0; form.knobs.len()];
-        let mut bench = Bench { form, runs, fit_runs, levels, whitener, means, trajectories: Vec::new(), stack, scene, p };
+        let mut bench =
+            Bench { form, runs, fit_runs, levels, whitener, means, trajectories: Vec::new(), stack, scene, p };
         bench.renew()?;
         Ok(bench)
     }

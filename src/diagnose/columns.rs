@@ -19,8 +19,11 @@ pub fn raw_columns(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectory
     let ahead = usize::from(facts.entry == Entry::Torque);
     for k in 0..n {
         // A torque's column belongs to the interval that starts at the sample, the others' to the sample itself.
-        let (from, to): (&Sample, &Sample) =
-            if ahead == 1 { (&samples[k], &samples[(k + 1).min(n - 1)]) } else { (&samples[k.saturating_sub(1)], &samples[k]) };
+        let (from, to): (&Sample, &Sample) = if ahead == 1 {
+            (&samples[k], &samples[(k + 1).min(n - 1)])
+        } else {
+            (&samples[k.saturating_sub(1)], &samples[k])
+        };
         law.columns(from, to, &mut value[..facts.columns]);
         law.commit(from, to);
         for (column, v) in out.iter_mut().zip(&value) {

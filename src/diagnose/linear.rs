@@ -186,4 +186,3 @@ pub fn free_motions(body: &Body, sample_time_s: f64, n: usize) -> [Vec<f64>; 3] 
             .collect()
     })
 }
-

@@ -275,4 +275,3 @@ impl Fit<'_> {
         (error, basis)
     }
 }
-

@@ -94,7 +94,12 @@ fn fitted_from_both(bench: &Bench, chosen: &[Chosen], p: &[f64], iterations: usi
 }
 
 /// Searches the library for what the linear model lacks.
-pub fn select(bench: &mut Bench, library: &[&'static dyn Effect], settings: &SelectSettings, mut progress: impl FnMut(&str)) -> Selection {
+pub fn select(
+    bench: &mut Bench,
+    library: &[&'static dyn Effect],
+    settings: &SelectSettings,
+    mut progress: impl FnMut(&str),
+) -> Selection {
     let zero = vec![0.0; bench.form.knobs.len()];
     let given = {
         let fit = bench.fit(vec![]);
@@ -126,7 +131,8 @@ pub fn select(bench: &mut Bench, library: &[&'static dyn Effect], settings: &Sel
             let (i, next) = &step.tried[t];
             let c = &step.candidates[*i];
             let gain = model.cost - next.cost;
-            let log_p = log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library.len() as f64).ln();
+            let log_p =
+                log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library.len() as f64).ln();
             (log_p < limit && gain > settings.share * model.excess().max(0.0)).then(|| next.clone())
         });
         if accepted.is_none() {

@@ -80,28 +80,28 @@ fn band_edges(n: usize) -> Vec<f64> {
 impl NoiseLevels {
     /// Levels that fit the spectrum of pure-noise series best (Whittle's likelihood, scoring for the two powers, a grid for
     /// the corner). `weight` undoes the scale of each series: 1/2 for a difference of two repeats.
-    pub fn fit(series: &[Vec<f64>], weight: &[f64], body: &Body, sample_time_s: f64, from_repeats: bool) -> NoiseLevels {
+    pub fn fit(
+        series: &[Vec<f64>],
+        weight: &[f64],
+        body: &Body,
+        sample_time_s: f64,
+        from_repeats: bool,
+    ) -> NoiseLevels {
         let p = periodogram(series, weight, sample_time_s);
         let (gain, k, c) = body_numbers(body);
-        let through: Vec<f64> = p
-            .w_rad_s
-            .iter()
-            .map(|w| gain * gain / ((k - w * w).powi(2) + (c * w).powi(2)))
-            .collect();
+        let through: Vec<f64> =
+            p.w_rad_s.iter().map(|w| gain * gain / ((k - w * w).powi(2) + (c * w).powi(2))).collect();
         let nyquist = 0.5 / sample_time_s;
-        let mut best = (f64::INFINITY, NoiseLevels { sensor_rms: 0.0, torque_rms: 0.0, torque_corner_hz: 60.0, from_repeats });
+        let mut best =
+            (f64::INFINITY, NoiseLevels { sensor_rms: 0.0, torque_rms: 0.0, torque_corner_hz: 60.0, from_repeats });
         let high = p.power.len().saturating_sub(4);
         let floor = p.power[high..].iter().copied().fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE);
         for i in 0..16 {
             let corner = 3.0 * (nyquist / 12.0).powf(f64::from(i) / 15.0);
             let wc = TAU * corner;
             // Density of unit-variance first-order noise, per sample.
-            let shape: Vec<f64> = p
-                .w_rad_s
-                .iter()
-                .zip(&through)
-                .map(|(w, g)| g * 2.0 * wc / (wc * wc + w * w) / sample_time_s)
-                .collect();
+            let shape: Vec<f64> =
+                p.w_rad_s.iter().zip(&through).map(|(w, g)| g * 2.0 * wc / (wc * wc + w * w) / sample_time_s).collect();
             let (mut a, mut d) = (floor, 0.0);
             let mut cost = f64::INFINITY;
             for round in 0..60 {
@@ -134,7 +134,12 @@ impl NoiseLevels {
             if cost < best.0 {
                 best = (
                     cost,
-                    NoiseLevels { sensor_rms: a.sqrt(), torque_rms: d.max(0.0).sqrt(), torque_corner_hz: corner, from_repeats },
+                    NoiseLevels {
+                        sensor_rms: a.sqrt(),
+                        torque_rms: d.max(0.0).sqrt(),
+                        torque_corner_hz: corner,
+                        from_repeats,
+                    },
                 );
             }
         }

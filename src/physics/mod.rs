@@ -6,6 +6,7 @@
 mod describing;
 mod effect;
 mod library;
+mod machine;
 mod oscillator;
 mod pair;
 mod sample;
@@ -52,4 +53,5 @@ pub mod unmodelled_resonance;
 pub use describing::describing;
 pub use effect::{COLUMNS, Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 pub use library::{data_facts, effect, facts, library};
+pub use machine::Machine;
 pub use sample::{Sample, Scene, logarithmic};

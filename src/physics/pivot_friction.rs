@@ -66,7 +66,8 @@ impl MaxwellSlip {
         // Nodes closer at the start, where the curve bends most.
         let node = |i: usize| end * (i as f64 / ELEMENTS as f64).powf(1.5);
         let level = |i: usize| curve(node(i)) / curve(end);
-        let slope = |i: usize| if i > ELEMENTS { 0.0 } else { (level(i) - level(i - 1)) / ((node(i) - node(i - 1)) * length) };
+        let slope =
+            |i: usize| if i > ELEMENTS { 0.0 } else { (level(i) - level(i - 1)) / ((node(i) - node(i - 1)) * length) };
         MaxwellSlip {
             yields: std::array::from_fn(|i| node(i + 1) * length),
             stiffness: std::array::from_fn(|i| slope(i + 1) - slope(i + 2)),
@@ -123,8 +124,7 @@ impl Effect for PivotFriction {
         if inner[1] < 0.5 {
             Box::new(Dahl { length: inner[0], z: 0.0 })
         } else {
-            let (curve, end): (fn(f64) -> f64, f64) =
-                if inner[1] < 1.5 { (parabola, 1.0) } else { (exponential, 6.0) };
+            let (curve, end): (fn(f64) -> f64, f64) = if inner[1] < 1.5 { (parabola, 1.0) } else { (exponential, 6.0) };
             Box::new(MaxwellSlip::of(curve, end, inner[0]))
         }
     }

@@ -66,7 +66,12 @@ impl Case {
     pub fn read(folder: &Path, settings: &RecordSettings) -> Result<Case, RecordingError> {
         let file = folder.join("case.toml");
         let read: CaseFile = read_toml(&file)?;
-        let refuse = |key: &'static str, found: String, expected: &'static str| RecordingError::Case { file: file.clone(), key, found, expected };
+        let refuse = |key: &'static str, found: String, expected: &'static str| RecordingError::Case {
+            file: file.clone(),
+            key,
+            found,
+            expected,
+        };
         if read.id.is_empty() {
             return Err(refuse("id", "an empty text".into(), "a name"));
         }
@@ -101,7 +106,10 @@ impl Case {
         for (i, (entry, record)) in self.records.iter().enumerate() {
             if (record.sample_time_s - first.sample_time_s).abs() > 1e-3 * first.sample_time_s {
                 let (name, t) = (entry.file.display(), record.sample_time_s);
-                return refuse(format!("{name} at {t} s beside {} s", first.sample_time_s), "one sample time in a case");
+                return refuse(
+                    format!("{name} at {t} s beside {} s", first.sample_time_s),
+                    "one sample time in a case",
+                );
             }
             if self.records[..i].iter().any(|(e, _)| e.file == entry.file) {
                 return refuse(format!("{} twice", entry.file.display()), "each file once");

@@ -184,7 +184,12 @@ fn clock_of(time: &[f64], file: &Path, first: usize) -> Result<(f64, Vec<ClockGa
     steps.sort_by(f64::total_cmp);
     let median = steps[steps.len() / 2];
     // Line 1 is the header.
-    let refuse = |i: usize, found_s: f64| RecordingError::Clock { file: file.into(), line: first + i + 3, found_s, expected_s: median };
+    let refuse = |i: usize, found_s: f64| RecordingError::Clock {
+        file: file.into(),
+        line: first + i + 3,
+        found_s,
+        expected_s: median,
+    };
     if median <= 0.0 {
         return Err(refuse(0, median));
     }
