@@ -109,7 +109,7 @@ impl Bench {
         // Repeats differ by noise only, so that the linear answer to the difference of their commands is all that counts.
         let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
         let still = Trajectory { samples: Vec::new(), unexplained: Vec::new() };
-        let error = |r: usize| simulation_error(&sampled, &plain, &[], &self.scene, &self.runs[r], &still);
+        let error = |r: usize| simulation_error(&sampled, &plain, &[], &self.scene, &self.runs[r], &still, 0);
         let errors: Vec<(usize, Vec<f64>)> = self.fit_runs.iter().map(|&r| (r, error(r))).collect();
         let repeats = noise_series(&errors, &self.runs);
         let from_repeats = !repeats.is_empty();
@@ -145,10 +145,10 @@ impl Bench {
             .enumerate()
             .map(|(i, run)| {
                 if moved {
-                    simulation_error(sampled, carrier, &[], &self.scene, run, &self.trajectories[i])
+                    simulation_error(sampled, carrier, &[], &self.scene, run, &self.trajectories[i], i)
                 } else {
                     let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
-                    simulation_error(sampled, &plain, &[], &self.scene, run, &still)
+                    simulation_error(sampled, &plain, &[], &self.scene, run, &still, i)
                 }
             })
             .collect()

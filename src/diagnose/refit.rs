@@ -93,7 +93,7 @@ impl Problem<'_, '_> {
         let settings = self.settings(x);
         let effects: Vec<(&dyn Effect, &Setting)> = fit.chosen.iter().map(|c| c.effect).zip(&settings).collect();
         let mut all = fit.stack.series(|i| {
-            let mut e = simulation_error(&sampled, &carrier, &effects, fit.scene, &fit.means[i], &fit.trajectories[i]);
+            let mut e = simulation_error(&sampled, &carrier, &effects, fit.scene, &fit.means[i], &fit.trajectories[i], i);
             fit.whitener.apply(&mut e);
             e
         });
@@ -103,7 +103,7 @@ impl Problem<'_, '_> {
 }
 
 /// Recorded position less the carrier's answer to the recorded command, with changes of the body and all effects driven by
-/// the recorded motion.
+/// the recorded motion; `segment` picks the strengths of effects that differ from record to record.
 pub fn simulation_error(
     sampled: &Sampled,
     carrier: &Carrier,
@@ -111,6 +111,7 @@ pub fn simulation_error(
     scene: &Scene,
     run: &Run,
     trajectory: &Trajectory,
+    segment: usize,
 ) -> Vec<f64> {
     let mut command = run.input.clone();
     let mut torque: Option<Vec<f64>> = (carrier.spring != 0.0 || carrier.damper != 0.0).then(|| {
@@ -122,8 +123,11 @@ pub fn simulation_error(
     let mut y = vec![0.0; run.len()];
     for (effect, setting) in effects {
         let raw = raw_columns(*effect, &setting.inner, scene, trajectory);
-        for (column, s) in raw.iter().zip(&setting.strengths) {
-            let into = match effect.facts().entry {
+        let facts = effect.facts();
+        // Effects that differ from record to record have their strengths segment by segment.
+        let own = if facts.per_record { setting.strengths.get(segment * facts.columns..).unwrap_or(&[]) } else { &setting.strengths };
+        for (column, s) in raw.iter().zip(own) {
+            let into = match facts.entry {
                 Entry::Command => &mut command,
                 Entry::Torque => torque.get_or_insert_with(|| vec![0.0; run.len()]),
                 Entry::Position => &mut y,

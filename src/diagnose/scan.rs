@@ -81,13 +81,31 @@ impl Ground<'_, '_> {
     pub fn explain(&self, sampled: &Sampled, effect: &'static dyn Effect, inner: &[f64]) -> Explained {
         let facts = effect.facts();
         let fit = self.fit;
-        let columns = fit.stack.columns(facts.columns, |i| {
-            white_columns(effect, inner, fit.scene, &fit.trajectories[i], sampled, fit.whitener)
-        });
-        explain(self.basis, self.error, columns, facts.fixed)
+        let segments = &fit.stack.segments;
+        let whole = |i: usize| {
+            let mut columns = white_columns(effect, inner, fit.scene, &fit.trajectories[i], sampled, fit.whitener);
+            let weight = segments[i].weight;
+            columns.iter_mut().flatten().for_each(|v| *v *= weight);
+            columns
+        };
+        let mut columns = Vec::new();
+        let mut spans = Vec::new();
+        if facts.per_record {
+            for (i, s) in segments.iter().enumerate() {
+                columns.extend(whole(i));
+                spans.extend((0..facts.columns).map(|_| [s.start, s.start + s.len]));
+            }
+        } else {
+            columns = vec![Vec::with_capacity(fit.stack.total); facts.columns];
+            for i in 0..segments.len() {
+                columns.iter_mut().zip(whole(i)).for_each(|(all, part)| all.extend(part));
+            }
+            spans = vec![[0, fit.stack.total]; facts.columns];
+        }
+        explain(self.basis, self.error, &columns, &spans, facts.fixed)
     }
 
-    /// The best point of every effect, best effect first.
+    /// The best point of every effect, one candidate for each combination of its discrete inner parameters; best first.
     pub fn scan(&self, effects: &[&'static dyn Effect]) -> Vec<Candidate> {
         let Ok(sampled) = Sampled::of(self.plant, self.fit.scene.sample_time_s) else { return Vec::new() };
         let grids: Vec<Vec<Vec<f64>>> = effects.iter().map(|e| e.grid(self.fit.scene)).collect();
@@ -95,29 +113,36 @@ impl Ground<'_, '_> {
             grids.iter().enumerate().flat_map(|(e, g)| (0..g.len()).map(move |i| (e, i))).collect();
         let scores: Vec<Explained> =
             jobs.par_iter().map(|&(e, i)| self.explain(&sampled, effects[e], &grids[e][i])).collect();
-        let mut all = Vec::new();
+        let mut all: Vec<Candidate> = Vec::new();
+        let mut at = 0;
         for (e, effect) in effects.iter().enumerate() {
-            let own = jobs.iter().zip(&scores).filter(|((k, _), _)| *k == e);
-            let mut best: Option<(usize, &Explained)> = None;
-            let mut least = 1.0f64;
-            for ((_, i), s) in own {
-                least = least.min(s.concealed);
-                if s.gain.is_finite() && best.is_none_or(|(_, b)| s.gain > b.gain) {
-                    best = Some((*i, s));
+            let grid = &grids[e];
+            let own = &scores[at..at + grid.len()];
+            at += grid.len();
+            let free = continuous(grid);
+            let least = own.iter().map(|s| s.concealed).fold(1.0, f64::min);
+            let first = all.len();
+            for (point, s) in grid.iter().zip(own) {
+                if !s.gain.is_finite() {
+                    continue;
                 }
-            }
-            if let Some((i, s)) = best {
-                all.push(Candidate {
-                    effect: *effect,
-                    setting: Setting { inner: grids[e][i].clone(), strengths: s.strengths.clone() },
-                    gain: s.gain,
-                    concealed: s.concealed,
-                    least_concealed: least,
-                    points: grids[e].len(),
-                    strengths: if effect.facts().fixed { 1 } else { effect.facts().columns },
-                    continuous: continuous(&grids[e]),
-                    range: range(&grids[e]),
-                });
+                let same = |c: &Candidate| free.iter().enumerate().all(|(i, f)| *f || c.setting.inner[i] == point[i]);
+                let setting = Setting { inner: point.clone(), strengths: s.strengths.clone() };
+                match all[first..].iter_mut().find(|c| same(c)) {
+                    Some(c) if s.gain > c.gain => (c.setting, c.gain, c.concealed) = (setting, s.gain, s.concealed),
+                    Some(_) => {}
+                    None => all.push(Candidate {
+                        effect: *effect,
+                        gain: s.gain,
+                        concealed: s.concealed,
+                        least_concealed: least,
+                        points: grid.len(),
+                        strengths: if effect.facts().fixed { 1 } else { s.strengths.len() },
+                        setting,
+                        continuous: free.clone(),
+                        range: range(grid),
+                    }),
+                }
             }
         }
         all.sort_by(|a, b| b.gain.total_cmp(&a.gain));

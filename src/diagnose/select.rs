@@ -4,6 +4,7 @@ use super::bench::Bench;
 use super::refit::{Chosen, Refitted};
 use super::scan::{Candidate, Ground, log_tail};
 use crate::physics::Effect;
+use rayon::prelude::*;
 
 /// How the search decides.
 #[derive(Clone, Debug, PartialEq)]
@@ -156,9 +157,7 @@ fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
     let plant = bench.form.carrier(&model.refitted.p).plant;
     let ground = Ground { fit: &fit, plant: &plant, error: &error, basis: &basis };
     let mut candidates = ground.scan(library);
-    for c in candidates.iter_mut().take(8) {
-        ground.refine(c);
-    }
+    candidates.par_iter_mut().take(10).for_each(|c| ground.refine(c));
     candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     Step { candidates, tried: Vec::new(), taken: None }
 }

@@ -103,6 +103,17 @@ impl Basis {
         }
     }
 
+    /// The coordinates of a vector that is zero outside `span`; `x` holds the span only.
+    pub fn coordinates(&self, x: &[f64], span: [usize; 2]) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.dimension());
+        for (start, q) in &self.local {
+            let (low, high) = (span[0].max(*start), span[1].min(start + q.len()));
+            out.push(if low < high { dot(&x[low - span[0]..high - span[0]], &q[low - start..high - start]) } else { 0.0 });
+        }
+        out.extend(self.global.iter().map(|q| dot(x, &q[span[0]..span[1]])));
+        out
+    }
+
     /// Adds a direction of one stretch; to be done before any global one.
     pub fn add_local(&mut self, start: usize, mut column: Vec<f64>) {
         let before = dot(&column, &column).sqrt();
@@ -148,23 +159,33 @@ pub struct Explained {
     pub concealed: f64,
 }
 
-/// Fits `residual` (already projected) by `columns` (not yet); strengths are 1 where `fixed`.
-pub fn explain(basis: &Basis, residual: &[f64], mut columns: Vec<Vec<f64>>, fixed: bool) -> Explained {
-    let before: f64 = columns.iter().map(|c| dot(c, c)).sum();
+/// Fits `residual` (basis already taken out) by `columns` (not yet); strengths are 1 where `fixed`. Each column is non-zero
+/// within `spans[i]` only.
+pub fn explain(basis: &Basis, residual: &[f64], columns: &[Vec<f64>], spans: &[[usize; 2]], fixed: bool) -> Explained {
     let m = columns.len();
-    columns.iter_mut().for_each(|c| basis.project(c));
-    let after: f64 = columns.iter().map(|c| dot(c, c)).sum();
-    let concealed = if before > 0.0 { 1.0 - after / before } else { 1.0 };
+    let part = |i: usize| &columns[i][..];
+    // What the basis takes of each column, as coordinates: the projected column itself is never needed.
+    let taken: Vec<Vec<f64>> = (0..m).map(|i| basis.coordinates(part(i), spans[i])).collect();
+    let inner = |i: usize, j: usize| {
+        let [low, high] = [spans[i][0].max(spans[j][0]), spans[i][1].min(spans[j][1])];
+        let own = if low < high { dot(&part(i)[low - spans[i][0]..high - spans[i][0]], &part(j)[low - spans[j][0]..high - spans[j][0]]) } else { 0.0 };
+        (own, own - dot(&taken[i], &taken[j]))
+    };
+    let right: Vec<f64> = (0..m).map(|i| dot(part(i), &residual[spans[i][0]..spans[i][1]])).collect();
+    let squares: Vec<(f64, f64)> = (0..m).map(|i| inner(i, i)).collect();
+    let (before, after) = squares.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
+    let concealed = if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 1.0 };
     if fixed {
-        let gain = columns.iter().map(|c| 2.0 * dot(c, residual) - dot(c, c)).sum();
+        let gain = (0..m).map(|i| 2.0 * right[i] - squares[i].1).sum();
         return Explained { gain, strengths: vec![1.0; m], concealed };
     }
-    // Scaled normal equations of a handful of columns, dependent ones dropped by the singular values.
-    let scale: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt()).collect();
-    let unit = |i: usize| if scale[i] > 0.0 && scale[i].is_finite() { 1.0 / scale[i] } else { 0.0 };
-    let gram = nalgebra::DMatrix::from_fn(m, m, |i, j| dot(&columns[i], &columns[j]) * unit(i) * unit(j));
-    let right = nalgebra::DVector::from_fn(m, |i, _| dot(&columns[i], residual) * unit(i));
-    let solved = gram.svd(true, true).solve(&right, 1e-9).unwrap_or_else(|_| nalgebra::DVector::zeros(m));
-    let gain = solved.dot(&right);
-    Explained { gain, strengths: (0..m).map(|i| solved[i] * unit(i)).collect(), concealed }
+    // Scaled normal equations; directions that the others or the basis hold already are dropped.
+    let unit = |i: usize| {
+        let s = squares[i].1;
+        if s.is_finite() && s > 1e-9 * squares[i].0 && s > 0.0 { 1.0 / s.sqrt() } else { 0.0 }
+    };
+    let gram = nalgebra::DMatrix::from_fn(m, m, |i, j| inner(i, j).1 * unit(i) * unit(j));
+    let scaled = nalgebra::DVector::from_fn(m, |i, _| right[i] * unit(i));
+    let solved = gram.svd(true, true).solve(&scaled, 1e-8).unwrap_or_else(|_| nalgebra::DVector::zeros(m));
+    Explained { gain: solved.dot(&scaled), strengths: (0..m).map(|i| solved[i] * unit(i)).collect(), concealed }
 }

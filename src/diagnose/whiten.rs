@@ -209,9 +209,16 @@ impl Whitener {
             z2 = a[(2, 0)] * c0 + a[(2, 1)] * c1 + a[(2, 2)] * c2;
             *v = e * self.scale;
         }
-        if !self.ar.is_empty() {
-            for i in (0..x.len()).rev() {
-                let past: f64 = self.ar.iter().enumerate().filter(|(j, _)| i > *j).map(|(j, a)| a * x[i - 1 - j]).sum();
+        let order = self.ar.len();
+        if order > 0 {
+            // Backwards, so that each sample still finds its own past unfiltered; the coefficients run oldest first.
+            let oldest: Vec<f64> = self.ar.iter().rev().copied().collect();
+            for i in (order..x.len()).rev() {
+                let past: f64 = oldest.iter().zip(&x[i - order..i]).map(|(a, v)| a * v).sum();
+                x[i] = (x[i] - past) * self.ar_scale;
+            }
+            for i in (0..order.min(x.len())).rev() {
+                let past: f64 = (0..i).map(|j| self.ar[j] * x[i - 1 - j]).sum();
                 x[i] = (x[i] - past) * self.ar_scale;
             }
         }
