@@ -21,11 +21,11 @@ const RANKS: [&[&str]; 10] = [
 const HOMES: [(&str, &[&str]); 8] = [
     ("argmin", &["src/tune/search.rs"]),
     ("rustfft", &["src/numeric/spectrum.rs"]),
-    ("rayon", &["src/tune/search.rs", "src/study/"]),
+    ("rayon", &["src/tune/search.rs", "src/gate/parallel.rs", "src/study/"]),
     ("clap", &["src/cli/"]),
     ("maud", &["src/report/"]),
     ("sha2", &["src/document/digest.rs", "src/frf/"]),
-    ("csv", &["src/frf/", "src/recording/"]),
+    ("csv", &["src/frf/", "src/recording/", "src/gate/table.rs", "src/gate/error.rs"]),
     ("flate2", &["src/frf/", "src/recording/"]),
 ];
 

@@ -1,5 +1,6 @@
 //! The words of the command line.
 
+pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -26,6 +27,8 @@ pub(super) enum Command {
     Response(ResponseArguments),
     Simulate(SimulateArguments),
     Tune(Box<TuneArguments>),
+    Train(Box<TrainArguments>),
+    Classify(ClassifyArguments),
     Study(StudyArguments),
 }
 

@@ -4,6 +4,7 @@ use crate::controller::ControllerError;
 use crate::document::DocumentError;
 use crate::feedback::FeedbackError;
 use crate::frf::{FrfError, FrfShapeError};
+use crate::gate::GateError;
 use crate::identify::IdentifyError;
 use crate::lti::LtiError;
 use crate::pes::{PesError, ProfileError};
@@ -55,6 +56,8 @@ pub enum Failure {
     Twin(#[from] TwinError),
     #[error(transparent)]
     Sweep(#[from] FrfShapeError),
+    #[error(transparent)]
+    Gate(#[from] GateError),
     #[error(transparent)]
     Study(#[from] StudyError),
     /// Two algorithms that share no code disagree: no answer can be trusted.

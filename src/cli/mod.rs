@@ -4,8 +4,10 @@
 //! 1 (done, something was rejected) or 2 (could not do it). Commands: `specs/files.md` and `servotune --help`.
 
 mod arguments;
+mod classify;
 mod demo;
 mod failure;
+mod gate_arguments;
 mod identify;
 mod load;
 mod margins;
@@ -15,6 +17,7 @@ mod simulate;
 mod slot;
 mod study;
 mod sweep_arguments;
+mod train;
 mod tune;
 
 use arguments::{Arguments, Command};
@@ -50,6 +53,8 @@ pub fn main() -> ExitCode {
         Command::Response(a) => response::run(&a, &mut screen),
         Command::Simulate(a) => simulate::run(&a, &mut screen),
         Command::Tune(a) => tune::run(&a, &mut screen),
+        Command::Train(a) => train::run(&a, &mut screen),
+        Command::Classify(a) => classify::run(&a, &mut screen),
         Command::Study(a) => study::run(&a, &mut screen),
     };
     match ending {
