@@ -14,7 +14,7 @@ fn main() {
         .flat_map(|&c| (0..10).map(|j| if j % 4 == c { 1.5 } else { 0.0 } + random.normal() as f32).collect::<Vec<_>>())
         .collect();
     let rows = |a: usize, b: usize| Rows { inputs: &inputs[a * 10..b * 10], class: &class[a..b] };
-    let settings = FitSettings { epochs: 200, batch: 10, learning_rate: 0.01 };
+    let settings = FitSettings { epochs: 200, batch: 10, learning_rate: 0.01, patience: None };
     for seed in 0..3 {
         let clock = Instant::now();
         let f = fit(&[10, 200, 500, 200, 4], rows(0, 291), rows(291, 388), &settings, seed);

@@ -1,11 +1,12 @@
 //! Training: gradients of the cross-entropy and Adam's step, in one pass over the weights.
 //!
 //! In: a network, rows of inputs and their classes. Out: the weights of the epoch with the least validation loss, and the curve of losses.
-//! Adam as Kingma & Ba (2015), algorithm 1 with the order of operations of its section 2; epsilon 1e-7. Moments and derivatives too
+//! Adam is algorithm 1 of Kingma & Ba (2015) with epsilon 1e-7. Moments and derivatives too
 //! small to matter are put to zero: numbers below 1e-38 cost a processor many times as much as others. Spec: `specs/gate.md`.
 
 use super::network::{Desk, Network, TILE, softmax};
 use super::split::shuffle;
+use super::wide::wide;
 use crate::numeric::random::Random;
 use serde::Serialize;
 
@@ -18,6 +19,8 @@ pub struct FitSettings {
     pub batch: usize,
     /// Adam's step.
     pub learning_rate: f64,
+    /// Epochs without a better validation loss after which training stops; none goes on to the end.
+    pub patience: Option<usize>,
 }
 
 /// Losses and accuracies of one epoch.
@@ -131,6 +134,7 @@ fn step<const N: usize>(
 }
 
 impl Sink for Adam {
+    #[inline(always)]
     fn row(&mut self, at: usize, live: &[(usize, f32)], deltas: &[f32], w: &mut [f32]) {
         let n = w.len();
         let mut first = std::mem::take(&mut self.first);
@@ -154,6 +158,7 @@ impl Sink for Adam {
 }
 
 /// Loss (sum over rows, nat) and rows right, with the derivatives of the mean loss left in the last delta.
+#[inline(always)]
 fn output(network: &Network, class: &[usize], desk: &mut Desk) -> (f64, usize) {
     let last = network.layers();
     let k = network.sizes[last];
@@ -177,6 +182,7 @@ fn output(network: &Network, class: &[usize], desk: &mut Desk) -> (f64, usize) {
 }
 
 /// Derivatives through all layers, the last first; each row of weights is used for the layer below and then handed to the sink.
+#[inline(always)]
 fn backward(network: &mut Network, rows: usize, desk: &mut Desk, sink: &mut impl Sink) {
     for l in (0..network.layers()).rev() {
         let (n, m) = (network.sizes[l], network.sizes[l + 1]);
@@ -236,8 +242,10 @@ pub fn judge(network: &Network, rows: Rows<'_>, desk: &mut Desk) -> (f64, f64) {
     let (mut loss, mut right) = (0.0, 0);
     for (x, y) in rows.inputs.chunks(d * desk.batch).zip(rows.class.chunks(desk.batch)) {
         desk.activations[0][..x.len()].copy_from_slice(x);
-        network.forward(y.len(), desk);
-        let (l, r) = output(network, y, desk);
+        let (l, r) = wide(|| {
+            network.forward(y.len(), desk);
+            output(network, y, desk)
+        });
         loss += l;
         right += r;
     }
@@ -264,12 +272,15 @@ pub fn fit(sizes: &[usize], train: Rows<'_>, validate: Rows<'_>, settings: &FitS
                 desk.activations[0][i * d..(i + 1) * d].copy_from_slice(&train.inputs[r * d..(r + 1) * d]);
                 class[i] = train.class[r];
             }
-            network.forward(rows.len(), &mut desk);
-            let (l, n) = output(&network, &class[..rows.len()], &mut desk);
+            adam.tick();
+            let (l, n) = wide(|| {
+                network.forward(rows.len(), &mut desk);
+                let judged = output(&network, &class[..rows.len()], &mut desk);
+                backward(&mut network, rows.len(), &mut desk, &mut adam);
+                judged
+            });
             loss += l;
             right += n;
-            adam.tick();
-            backward(&mut network, rows.len(), &mut desk, &mut adam);
         }
         let n = order.len().max(1) as f64;
         let (loss, accuracy) = (loss / n, right as f64 / n);
@@ -279,6 +290,9 @@ pub fn fit(sizes: &[usize], train: Rows<'_>, validate: Rows<'_>, settings: &FitS
         if validation_loss < best.0 {
             best = (validation_loss, epoch, std::mem::take(&mut best.2));
             best.2.copy_from_slice(&network.values);
+        }
+        if settings.patience.is_some_and(|p| epoch >= best.1 + p) {
+            break;
         }
     }
     network.values = best.2;

@@ -25,6 +25,15 @@ pub struct Calibration {
     pub loss_after: f64,
 }
 
+/// What a network says of a row, and how far its logits typically reach.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Logits {
+    /// One a class.
+    pub raw: Vec<f64>,
+    /// The network's own unit.
+    pub unit: f64,
+}
+
 /// Bins of the calibration error.
 const BINS: usize = 10;
 
@@ -52,9 +61,10 @@ pub fn log_loss(p: &[Vec<f64>], class: &[usize]) -> f64 {
     p.iter().zip(class).map(|(p, &y)| -p[y].max(1e-12).ln()).sum::<f64>() / class.len().max(1) as f64
 }
 
-/// Finds the temperature.
-pub fn calibrate(logits: &[Vec<f64>], class: &[usize]) -> Calibration {
-    let at = |t: f64| logits.iter().map(|z| probabilities(z, t)).collect::<Vec<_>>();
+/// Finds the temperature, in each network's own unit.
+pub fn calibrate(logits: &[Logits], class: &[usize]) -> Calibration {
+    let raw = logits.iter().map(|z| probabilities(&z.raw, 1.0)).collect::<Vec<_>>();
+    let scaled: Vec<Vec<f64>> = logits.iter().map(|z| z.raw.iter().map(|v| v / z.unit).collect()).collect();
     let n = class.len() as f64;
     let doubt = 1.0 / (n + 2.0);
     let score = |log_t: f64| {
@@ -66,11 +76,12 @@ pub fn calibrate(logits: &[Vec<f64>], class: &[usize]) -> Calibration {
             let others = (z.len() - 1).max(1) as f64;
             (0..z.len()).map(|k| loss(k) * if k == y { 1.0 - doubt } else { doubt / others }).sum::<f64>()
         };
-        logits.iter().zip(class).map(|(z, &y)| of(z, y)).sum::<f64>()
+        scaled.iter().zip(class).map(|(z, &y)| of(z, y)).sum::<f64>()
     };
-    // Logits reach thousands where Adam runs far; e^-3 to e^8 holds every temperature seen.
-    let temperature = golden_section(score, -3.0, 8.0, 1e-6).x.exp();
-    let (before, after) = (at(1.0), at(temperature));
+    // In units of the typical lead: from a probability of 1 - e^-400 at that lead to no lead at all.
+    let temperature = golden_section(score, -6.0, 6.0, 1e-6).x.exp();
+    let after: Vec<Vec<f64>> = scaled.iter().map(|z| probabilities(z, temperature)).collect();
+    let before = raw;
     Calibration {
         temperature,
         rows: class.len(),
@@ -102,7 +113,7 @@ mod tests {
             } else {
                 2
             });
-            logits.push(z.iter().map(|v| 3.0 * v).collect());
+            logits.push(Logits { raw: z.iter().map(|v| 3.0 * v).collect(), unit: 1.0 });
         }
         let c = calibrate(&logits, &class);
         // The standard error of ln T is about 1/sqrt(n) = 0.7 %; five of them.

@@ -5,9 +5,10 @@
 
 use super::GateError;
 use super::adam::{Rows, judge};
+use super::calibrate::Logits;
 use super::network::Desk;
 use super::parallel::each;
-use super::prepare::{learn, prepare, seed_of};
+use super::prepare::{PATIENCE, learn, prepare, reach, seed_of};
 use super::settings::TrainSettings;
 use super::split::hold_out;
 use super::table::Table;
@@ -37,8 +38,8 @@ pub(super) fn crossfit(
     fold: &[usize],
     hidden: &[usize],
     settings: &TrainSettings,
-) -> Result<(Vec<Fold>, Vec<Vec<f64>>), GateError> {
-    let one = |f: usize| -> Result<(Fold, Vec<Vec<f64>>), GateError> {
+) -> Result<(Vec<Fold>, Vec<Logits>), GateError> {
+    let one = |f: usize| -> Result<(Fold, Vec<Logits>), GateError> {
         let pick = |inside: bool| {
             rows.iter().zip(fold).filter(|(_, k)| (**k == f) == inside).map(|(r, _)| *r).collect::<Vec<usize>>()
         };
@@ -47,16 +48,22 @@ pub(super) fn crossfit(
         let (train, choose) = hold_out(&others, class, classes, CHOOSE, &mut random);
         let p = prepare(table, &train, class, classes, settings.feature_count(), settings)?;
         let seed = seed_of(settings.seed, 200 + f as u64);
-        let fitted = learn(&p, &train, &choose, class, classes, hidden, settings, seed)?;
+        let fitted = learn(&p, &train, &choose, class, classes, hidden, settings, Some(PATIENCE), seed)?;
+        let unit = reach(&p, &fitted, if choose.is_empty() { &train } else { &choose }, classes);
         let mut desk = Desk::new(&fitted.network.sizes, settings.batch);
         let inputs = p.scale.inputs(&p.chosen, &held);
         let of_held: Vec<usize> = held.iter().map(|&r| class[r]).collect();
         let (loss, accuracy) = judge(&fitted.network, Rows { inputs: &inputs, class: &of_held }, &mut desk);
-        let logits = fitted.network.logits(&inputs, &mut desk).chunks(classes).map(<[f64]>::to_vec).collect();
+        let logits = fitted
+            .network
+            .logits(&inputs, &mut desk)
+            .chunks(classes)
+            .map(|z| Logits { raw: z.to_vec(), unit })
+            .collect();
         Ok((Fold { loss, accuracy, rows: held.len() }, logits))
     };
     let mut found = Vec::new();
-    let mut logits = vec![Vec::new(); rows.len()];
+    let mut logits = vec![Logits { raw: Vec::new(), unit: 1.0 }; rows.len()];
     for (f, result) in each(settings.folds, one).into_iter().enumerate() {
         let (judged, of_fold) = result?;
         let places = fold.iter().enumerate().filter(|(_, k)| **k == f).map(|(i, _)| i);

@@ -32,6 +32,7 @@ mod split;
 mod table;
 mod train;
 mod verdict;
+mod wide;
 
 pub use adam::{Epoch, FitSettings, Fitted, Rows, fit, judge};
 pub use attribution::{Decided, Direction, shares};

@@ -3,6 +3,7 @@
 //! In: normalised features. Out: logits, one a class. Weights lie one row an input (`weights[input * outputs + output]`), so that a
 //! layer is a sum of rows and an input that ReLU has put to zero costs nothing. Spec: `specs/gate.md`.
 
+use super::wide::wide;
 use crate::numeric::random::Random;
 
 /// A network of dense layers.
@@ -85,13 +86,14 @@ impl Network {
         for x in inputs.chunks(d * desk.batch) {
             let rows = x.len() / d;
             desk.activations[0][..x.len()].copy_from_slice(x);
-            self.forward(rows, desk);
+            wide(|| self.forward(rows, desk));
             out.extend(desk.activations[self.layers()][..rows * k].iter().map(|v| f64::from(*v)));
         }
         out
     }
 
     /// Fills the desk's activations from its inputs.
+    #[inline(always)]
     pub(super) fn forward(&self, rows: usize, desk: &mut Desk) {
         for l in 0..self.layers() {
             let (n, m) = (self.sizes[l], self.sizes[l + 1]);

@@ -14,6 +14,8 @@ use serde::{Deserialize, Serialize};
 /// Where the classes lie.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Reference {
+    /// Smallest positive value of each feature that is looked at in its logarithm; none where it is taken as it is.
+    log: Vec<Option<f64>>,
     /// Classes x features.
     centre: Packed64,
     spread: Packed64,
@@ -59,6 +61,13 @@ pub const MOST_FEATURES: usize = 256;
 
 impl Reference {
     fn of(columns: &[&Column], rows: &[usize], class: &[usize], classes: usize) -> Reference {
+        let log: Vec<Option<f64>> = columns.iter().map(|c| takes_log(c, rows, class, classes)).collect();
+        let looked: Vec<Column> = columns
+            .iter()
+            .zip(&log)
+            .map(|(c, l)| Column::new(&c.name, c.values.iter().map(|v| look(*v, *l)).collect()))
+            .collect();
+        let columns: Vec<&Column> = looked.iter().collect();
         let d = columns.len();
         let (mut centre, mut spread, mut tail) = (vec![0.0; classes * d], vec![1.0; classes * d], vec![3.0; d]);
         for (j, c) in columns.iter().enumerate() {
@@ -107,7 +116,13 @@ impl Reference {
             }
         }
         let root = shrunk_root(&z);
-        Reference { centre: Packed64(centre), spread: Packed64(spread), tail: Packed64(tail), root: Packed64(root) }
+        Reference {
+            log,
+            centre: Packed64(centre),
+            spread: Packed64(spread),
+            tail: Packed64(tail),
+            root: Packed64(root),
+        }
     }
 
     /// Both distances of a row from a class, and the feature that lies farthest out with its distance.
@@ -117,7 +132,7 @@ impl Reference {
         let (mut square, mut far, mut which, mut deviations) = (0.0, 0.0, 0, 0.0);
         let mut at = 0;
         for j in 0..d {
-            let z = (row[j] - self.centre.0[class * d + j]) / self.spread.0[class * d + j];
+            let z = (look(row[j], self.log[j]) - self.centre.0[class * d + j]) / self.spread.0[class * d + j];
             let z = if z.is_nan() { 0.0 } else { z.clamp(-1e6, 1e6) };
             let relative = z.abs() / self.tail.0[j];
             if relative > far {
@@ -135,6 +150,41 @@ impl Reference {
         // The floor keeps the logarithm of a row in the very centre finite.
         ([square.max(1e-12).sqrt().ln(), far.max(1e-6).ln()], which, deviations)
     }
+}
+
+/// A value as it is looked at.
+fn look(value: f64, log: Option<f64>) -> f64 {
+    match log {
+        // What is not positive lies below all that was seen: a thousandth of the least.
+        Some(least) => {
+            if value.is_nan() {
+                value
+            } else {
+                value.max(1e-3 * least).ln()
+            }
+        }
+        None => value,
+    }
+}
+
+/// Whether the logarithm of a column spreads more evenly inside the classes than the column: amplitudes do. Evenness is how far the middle
+/// lies from the mean of the 10th and 90th percentile.
+fn takes_log(column: &Column, rows: &[usize], class: &[usize], classes: usize) -> Option<f64> {
+    let present: Vec<usize> = rows.iter().copied().filter(|&r| !column.values[r].is_nan()).collect();
+    let least = present.iter().map(|&r| column.values[r]).fold(f64::INFINITY, f64::min);
+    if !(least > 0.0 && least.is_finite()) {
+        return None;
+    }
+    let skew = |value: &dyn Fn(usize) -> f64| {
+        let middle: Vec<f64> =
+            (0..classes).map(|k| median(present.iter().copied().filter(|&r| class[r] == k).map(value))).collect();
+        let mut away: Vec<f64> = present.iter().map(|&r| value(r) - middle[class[r]]).collect();
+        away.sort_by(f64::total_cmp);
+        let at = |share: usize| away[(away.len() - 1) * share / 100];
+        let width = at(90) - at(10);
+        if width > 0.0 { ((at(90) + at(10)) / width).abs() } else { 0.0 }
+    };
+    (skew(&|r| column.values[r].ln()) < skew(&|r| column.values[r])).then_some(least)
 }
 
 /// Lower triangle of the root of the shrunk second moments of the rows of `z`.
@@ -230,7 +280,8 @@ impl Novelty {
         let d = self.features.len();
         let r = &self.reference;
         let lists = [&r.centre, &r.spread, &r.tail, &r.root, &self.held[0], &self.held[1]];
-        r.centre.0.len() == classes * d
+        r.log.len() == d
+            && r.centre.0.len() == classes * d
             && r.spread.0.len() == classes * d
             && r.tail.0.len() == d
             && r.root.0.len() == d * (d + 1) / 2

@@ -4,11 +4,13 @@
 //! Section 2.9. Spec: `specs/gate.md`.
 
 use super::GateError;
-use super::adam::{Fitted, Rows, fit};
+use super::adam::{FitSettings, Fitted, Rows, fit};
 use super::boost::importance;
 use super::clean::{Removed, clean};
+use super::conformal::top;
 use super::evidence::EVIDENCE;
-use super::scale::Scale;
+use super::network::Desk;
+use super::scale::{Scale, median};
 use super::settings::TrainSettings;
 use super::table::{Column, Table};
 use crate::numeric::random::Random;
@@ -80,6 +82,10 @@ pub(super) fn prepare<'a>(
     Ok(Prepared { evidence, kept, ranking, removed, chosen, scale })
 }
 
+/// Epochs without a better validation loss that a network of a fold or a search waits; the weights kept are those of the best epoch
+/// anyway. The network of the gate goes on to the end, as published.
+pub(super) const PATIENCE: usize = 40;
+
 /// Times a network is started anew where it died.
 const STARTS: u64 = 3;
 
@@ -93,6 +99,7 @@ pub(super) fn learn(
     classes: usize,
     hidden: &[usize],
     settings: &TrainSettings,
+    patience: Option<usize>,
     seed: u64,
 ) -> Result<Fitted, GateError> {
     let sizes: Vec<usize> = [&[p.chosen.len()], hidden, &[classes]].concat();
@@ -110,7 +117,8 @@ pub(super) fn learn(
     let mut best: Option<Fitted> = None;
     for start in 0..STARTS {
         let of = |inputs, class| Rows { inputs, class };
-        let f = fit(&sizes, of(&x, &y), of(&xv, &yv), &settings.fit(), seed_of(seed, start));
+        let f =
+            fit(&sizes, of(&x, &y), of(&xv, &yv), &FitSettings { patience, ..settings.fit() }, seed_of(seed, start));
         let loss = |f: &Fitted| f.history[f.best].validation_loss;
         if best.as_ref().is_none_or(|b| !(loss(b) <= loss(&f))) {
             best = Some(f);
@@ -121,4 +129,16 @@ pub(super) fn learn(
     }
     best.filter(|b| b.history[b.best].validation_loss.is_finite())
         .ok_or(GateError::NotLearned { learning_rate: settings.learning_rate })
+}
+
+/// How far a network's logits typically reach: the median lead of the first class over the second, on rows that chose its epoch. Networks
+/// of different folds differ in it by orders of magnitude; one temperature fits them all only in units of it.
+pub(super) fn reach(p: &Prepared<'_>, f: &Fitted, rows: &[usize], classes: usize) -> f64 {
+    let mut desk = Desk::new(&f.network.sizes, 16);
+    let z = f.network.logits(&p.scale.inputs(&p.chosen, rows), &mut desk);
+    let lead = |z: &[f64]| {
+        let best = top(z);
+        z[best] - z.iter().enumerate().filter(|(k, _)| *k != best).fold(f64::NEG_INFINITY, |m, (_, v)| m.max(*v))
+    };
+    median(z.chunks(classes).map(lead)).max(1e-3)
 }

@@ -103,6 +103,7 @@ impl TrainSettings {
             epochs: self.epochs.unwrap_or(if self.search { 150 } else { 200 }),
             batch: self.batch,
             learning_rate: self.learning_rate,
+            patience: None,
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use super::GateError;
 use super::adam::{Epoch, Fitted};
-use super::calibrate::{calibrate, probabilities};
+use super::calibrate::{Logits, calibrate, probabilities};
 use super::classes::labelled;
 use super::conformal::Conformal;
 use super::costs::Costs;
@@ -17,7 +17,7 @@ use super::gate::Gate;
 use super::network::Desk;
 use super::novelty::{MOST_FEATURES, Novelty};
 use super::parallel::each;
-use super::prepare::{Prepared, learn, prepare, seed_of};
+use super::prepare::{PATIENCE, Prepared, learn, prepare, reach, seed_of};
 use super::report::{Baseline, Candidate, Confusions, Parts, Published, TrainReport};
 use super::settings::TrainSettings;
 use super::split::{Split, folds, split};
@@ -50,10 +50,11 @@ impl Job<'_> {
         p: &Prepared<'_>,
         hidden: &[usize],
         settings: &TrainSettings,
+        patience: Option<usize>,
         unit: u64,
     ) -> Result<Fitted, GateError> {
         let (s, seed) = (self.split, seed_of(self.settings.seed, unit));
-        learn(p, &s.train, &s.validate, self.class, self.classes, hidden, settings, seed)
+        learn(p, &s.train, &s.validate, self.class, self.classes, hidden, settings, patience, seed)
     }
 
     /// Most probable class of each row.
@@ -102,22 +103,25 @@ pub fn train(table: &Table, settings: &TrainSettings) -> Result<Trained, GateErr
     let p = prepare(table, &split.train, &known.class, k, settings.feature_count(), settings)?;
     let (published, candidates, hidden) =
         if settings.search { search(&job)? } else { (None, Vec::new(), settings.hidden.clone()) };
-    // The winner's seed, so that the network is the one that won.
+    // The winner's seed: the same network, trained to the end.
     let unit = candidates.iter().position(|c| c.hidden == hidden).map_or(100, |i| 400 + i as u64);
-    let fitted = job.learn(&p, &hidden, settings, unit)?;
+    let fitted = job.learn(&p, &hidden, settings, None, unit)?;
+    let unit = reach(&p, &fitted, &split.validate, k);
     // Deals for the sets, the novelty and the vote, even where no network is cross-validated.
-    let deal = folds(&taught, &known.class, k, settings.folds.clamp(2, 5).max(settings.folds), settings.seed);
+    let deal = folds(&taught, &known.class, k, if settings.folds == 0 { 5 } else { settings.folds }, settings.seed);
     let (fold_list, held, logits) = if settings.folds > 0 {
         let (list, logits) = crossfit(table, &taught, &known.class, k, &deal, &hidden, settings)?;
         (list, taught.clone(), logits)
     } else {
         let mut desk = Desk::new(&fitted.network.sizes, settings.batch);
         let z = fitted.network.logits(&p.scale.inputs(&p.chosen, &split.validate), &mut desk);
-        (Vec::new(), split.validate.clone(), z.chunks(k).map(<[f64]>::to_vec).collect())
+        (Vec::new(), split.validate.clone(), z.chunks(k).map(|z| Logits { raw: z.to_vec(), unit }).collect())
     };
     let of_held: Vec<usize> = held.iter().map(|&r| known.class[r]).collect();
-    let calibration = calibrate(&logits, &of_held);
-    let held_p: Vec<Vec<f64>> = logits.iter().map(|z| probabilities(z, calibration.temperature)).collect();
+    let mut calibration = calibrate(&logits, &of_held);
+    let held_p: Vec<Vec<f64>> =
+        logits.iter().map(|z| probabilities(&z.raw, calibration.temperature * z.unit)).collect();
+    calibration.temperature *= unit;
     // Chosen features are always looked at, then the plant's, then the rest by importance.
     let watched: Vec<&Column> = {
         let rest = p.kept.iter().skip(p.chosen.len());
@@ -152,7 +156,7 @@ fn search(job: &Job<'_>) -> Result<(Option<Published>, Vec<Candidate>, Vec<usize
     let settings = job.settings;
     let ten = TrainSettings { search: false, ..settings.clone() };
     let wide = prepare(job.table, &job.split.train, job.class, job.classes, ten.feature_count(), &ten)?;
-    let f = job.learn(&wide, &settings.hidden, &ten, 100)?;
+    let f = job.learn(&wide, &settings.hidden, &ten, None, 100)?;
     let published = Published {
         features: wide.scale.features.clone(),
         parameters: f.network.parameters(),
@@ -164,7 +168,7 @@ fn search(job: &Job<'_>) -> Result<(Option<Published>, Vec<Candidate>, Vec<usize
         let mut hidden = settings.hidden.clone();
         let middle = hidden.len() / 2;
         hidden[middle] = settings.candidates[i];
-        let f = job.learn(&p, &hidden, settings, 400 + i as u64)?;
+        let f = job.learn(&p, &hidden, settings, Some(PATIENCE), 400 + i as u64)?;
         let e: Epoch = f.history[f.best];
         Ok(Candidate {
             hidden,
