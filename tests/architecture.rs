@@ -18,10 +18,11 @@ const RANKS: [&[&str]; 10] = [
 ];
 
 /// Outside crates and the places where they may be named.
-const HOMES: [(&str, &[&str]); 8] = [
+const HOMES: [(&str, &[&str]); 9] = [
     ("argmin", &["src/tune/search.rs"]),
     ("rustfft", &["src/numeric/spectrum.rs"]),
     ("rayon", &["src/tune/search.rs", "src/gate/parallel.rs", "src/study/"]),
+    ("pulp", &["src/gate/wide.rs"]),
     ("clap", &["src/cli/"]),
     ("maud", &["src/report/"]),
     ("sha2", &["src/document/digest.rs", "src/frf/"]),

@@ -5,23 +5,11 @@
 //! small to matter are put to zero: numbers below 1e-38 cost a processor many times as much as others. Spec: `specs/gate.md`.
 
 use super::network::{Desk, Network, TILE, softmax};
+use super::settings::FitSettings;
 use super::split::shuffle;
 use super::wide::wide;
 use crate::numeric::random::Random;
 use serde::Serialize;
-
-/// How a network is trained.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FitSettings {
-    /// Passes over the training rows.
-    pub epochs: usize,
-    /// Rows of one step.
-    pub batch: usize,
-    /// Adam's step.
-    pub learning_rate: f64,
-    /// Epochs without a better validation loss after which training stops; none goes on to the end.
-    pub patience: Option<usize>,
-}
 
 /// Losses and accuracies of one epoch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -297,4 +285,107 @@ pub fn fit(sizes: &[usize], train: Rows<'_>, validate: Rows<'_>, settings: &FitS
     }
     network.values = best.2;
     Fitted { network, history, best: best.1 }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// Keeps the derivatives instead of stepping.
+    struct Keep(Vec<f32>);
+
+    impl Sink for Keep {
+        fn row(&mut self, at: usize, live: &[(usize, f32)], deltas: &[f32], w: &mut [f32]) {
+            for (j, g) in self.0[at..at + w.len()].iter_mut().enumerate() {
+                *g = live.iter().map(|&(row, x)| x * deltas[row + j]).sum();
+            }
+        }
+    }
+
+    /// The mean cross-entropy in double precision, written as the formulas stand.
+    fn loss(sizes: &[usize], w: &[f64], x: &[f64], class: &[usize]) -> f64 {
+        let one = |x: &[f64], y: usize| {
+            let (mut a, mut at) = (x.to_vec(), 0);
+            for (l, s) in sizes.windows(2).enumerate() {
+                let sum =
+                    |j: usize| (0..s[0]).map(|i| a[i] * w[at + i * s[1] + j]).sum::<f64>() + w[at + s[0] * s[1] + j];
+                let z: Vec<f64> = (0..s[1]).map(sum).collect();
+                a = if l + 2 == sizes.len() { z } else { z.iter().map(|v| v.max(0.0)).collect() };
+                at += s[0] * s[1] + s[1];
+            }
+            softmax(&mut a);
+            -a[y].ln()
+        };
+        x.chunks(sizes[0]).zip(class).map(|(x, &y)| one(x, y)).sum::<f64>() / class.len() as f64
+    }
+
+    #[test]
+    fn derivatives_are_those_of_finite_differences() {
+        // Widths that use every kernel: 32, 4 and 1 columns.
+        let sizes = [5, 37, 41, 3];
+        let mut random = Random::new(12);
+        let network = Network::start(&sizes, &mut random);
+        let rows = 7;
+        let x: Vec<f32> = (0..rows * 5).map(|_| random.normal() as f32).collect();
+        let class: Vec<usize> = (0..rows).map(|i| i % 3).collect();
+        let mut desk = Desk::new(&sizes, rows);
+        desk.activations[0].copy_from_slice(&x);
+        let mut moved = network.clone();
+        let mut keep = Keep(vec![0.0; network.parameters()]);
+        let found = wide(|| {
+            moved.forward(rows, &mut desk);
+            let found = output(&moved, &class, &mut desk);
+            backward(&mut moved, rows, &mut desk, &mut keep);
+            found.0 / rows as f64
+        });
+        let w: Vec<f64> = network.values.iter().map(|v| f64::from(*v)).collect();
+        let x: Vec<f64> = x.iter().map(|v| f64::from(*v)).collect();
+        // Single precision: seven digits, a few lost in sums of forty terms.
+        assert!((found - loss(&sizes, &w, &x, &class)).abs() < 1e-5);
+        let h = 1e-6;
+        for i in (0..w.len()).step_by(7) {
+            let at = |d: f64| {
+                let mut w = w.clone();
+                w[i] += d;
+                loss(&sizes, &w, &x, &class)
+            };
+            let difference = (at(h) - at(-h)) / (2.0 * h);
+            assert!(
+                (f64::from(keep.0[i]) - difference).abs() < 1e-5 * (1.0 + difference.abs()),
+                "{i}: {} {difference}",
+                keep.0[i]
+            );
+        }
+    }
+
+    #[test]
+    fn the_first_steps_of_adam_by_hand() {
+        // Adam's first step has the size of the rate whatever the derivative; the second after the same derivative too.
+        let mut adam = Adam::new(1, 0.01);
+        let mut w = [1.0f32];
+        for k in 1..=2 {
+            adam.tick();
+            adam.row(0, &[(0, 1.0)], &[-0.37], &mut w);
+            assert!((w[0] - 1.0 - 0.01 * k as f32).abs() < 1e-6, "{w:?}");
+        }
+    }
+
+    #[test]
+    fn a_circle_inside_a_ring_is_learned() {
+        let mut random = Random::new(2);
+        let mut draw = |n: usize| -> (Vec<f32>, Vec<usize>) {
+            let class: Vec<usize> = (0..n).map(|i| i % 2).collect();
+            let point = |&c: &usize| {
+                let (angle, radius) = (random.between(0.0, 6.3), random.between(0.0, 1.0) + 1.5 * c as f64);
+                [(radius * angle.cos()) as f32, (radius * angle.sin()) as f32]
+            };
+            (class.iter().flat_map(point).collect(), class)
+        };
+        let ((x, y), (xv, yv)) = (draw(200), draw(100));
+        let rows = |inputs, class| Rows { inputs, class };
+        let settings = FitSettings { epochs: 60, batch: 10, learning_rate: 0.003, patience: None };
+        let f = fit(&[2, 32, 32, 2], rows(&x, &y), rows(&xv, &yv), &settings, 1);
+        assert!(f.history[f.best].validation_accuracy > 0.97, "{:?}", f.history[f.best]);
+    }
 }

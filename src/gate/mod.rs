@@ -34,7 +34,7 @@ mod train;
 mod verdict;
 mod wide;
 
-pub use adam::{Epoch, FitSettings, Fitted, Rows, fit, judge};
+pub use adam::{Epoch, Fitted, Rows, fit, judge};
 pub use attribution::{Decided, Direction, shares};
 pub use boost::{BoostSettings, importance};
 pub use calibrate::{Calibration, calibrate, calibration_error, log_loss, probabilities};
@@ -57,7 +57,7 @@ pub use report::{
     NoveltyReport, Published, TrainReport, accuracy, confusion, decisions,
 };
 pub use scale::Scale;
-pub use settings::TrainSettings;
+pub use settings::{FitSettings, TrainSettings};
 pub use split::{Split, folds, hold_out, split};
 pub use table::{Column, Table};
 pub use train::{Trained, train};

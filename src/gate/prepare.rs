@@ -4,14 +4,14 @@
 //! Section 2.9. Spec: `specs/gate.md`.
 
 use super::GateError;
-use super::adam::{FitSettings, Fitted, Rows, fit};
+use super::adam::{Fitted, Rows, fit};
 use super::boost::importance;
 use super::clean::{Removed, clean};
 use super::conformal::top;
 use super::evidence::EVIDENCE;
 use super::network::Desk;
 use super::scale::{Scale, median};
-use super::settings::TrainSettings;
+use super::settings::{FitSettings, TrainSettings};
 use super::table::{Column, Table};
 use crate::numeric::random::Random;
 use serde::Serialize;

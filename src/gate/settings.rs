@@ -1,9 +1,21 @@
 //! Choices of the training. Spec: `specs/gate.md`.
 
 use super::GateError;
-use super::adam::FitSettings;
 use super::boost::BoostSettings;
 use std::path::PathBuf;
+
+/// How a network is trained.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FitSettings {
+    /// Passes over the training rows.
+    pub epochs: usize,
+    /// Rows of one step.
+    pub batch: usize,
+    /// Adam's step.
+    pub learning_rate: f64,
+    /// Epochs without a better validation loss after which training stops; none goes on to the end.
+    pub patience: Option<usize>,
+}
 
 /// How a gate is trained; the default is the paper's network (section 2.8).
 #[derive(Clone, Debug, PartialEq)]
