@@ -10,7 +10,7 @@ use super::conformal::Conformal;
 use super::costs::Costs;
 use super::drift::DriftReference;
 use super::evidence::Evidence;
-use super::gate::Gate;
+use super::judge::Gate;
 use super::network::{Network, parameter_count};
 use super::novelty::Novelty;
 use super::packed::Packed32;

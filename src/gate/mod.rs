@@ -2,7 +2,7 @@
 //!
 //! In: a table of features with a class for each machine. Out: a trained gate, and its verdict on any machine: class, calibrated
 //! probability, action, reasons. In doubt it says `inspect`. Reading order: `table`, `classes`, `split`, `clean`, `boost`, `scale`, `network`,
-//! `adam`, `crossfit`, `calibrate`, `conformal`, `novelty`, `evidence`, `costs`, `train`, `gate`, `file`. Spec: `specs/gate.md`.
+//! `adam`, `crossfit`, `calibrate`, `conformal`, `novelty`, `evidence`, `costs`, `train`, `judge`, `file`. Spec: `specs/gate.md`.
 
 mod adam;
 mod attribution;
@@ -19,7 +19,7 @@ mod error;
 mod evidence;
 pub mod features;
 mod file;
-mod gate;
+mod judge;
 mod network;
 mod novelty;
 mod packed;
@@ -48,7 +48,7 @@ pub use drift::{Drift, DriftReference, Moved};
 pub use error::GateError;
 pub use evidence::{EVIDENCE, Evidence, Vote};
 pub use file::SCHEMA;
-pub use gate::Gate;
+pub use judge::Gate;
 pub use network::{Desk, Network, parameter_count, softmax};
 pub use novelty::{Novelty, Strangeness};
 pub use prepare::Ranked;

@@ -140,8 +140,8 @@ impl Reference {
             }
             // Forward substitution, row by row.
             let mut s = z;
-            for i in 0..j {
-                s -= self.root.0[at + i] * y[i];
+            for (l, y) in self.root.0[at..at + j].iter().zip(&y) {
+                s -= l * y;
             }
             y[j] = s / self.root.0[at + j];
             square += y[j] * y[j];

@@ -91,6 +91,7 @@ const STARTS: u64 = 3;
 
 /// Trains on the prepared columns. A network whose best epoch is no better than always saying the classes' shares has died (ReLU
 /// nodes that are zero for every row learn no more); it is started again from other weights.
+#[allow(clippy::too_many_arguments, reason = "rows, classes and choices come from three places")]
 pub(super) fn learn(
     p: &Prepared<'_>,
     train: &[usize],
@@ -120,7 +121,7 @@ pub(super) fn learn(
         let f =
             fit(&sizes, of(&x, &y), of(&xv, &yv), &FitSettings { patience, ..settings.fit() }, seed_of(seed, start));
         let loss = |f: &Fitted| f.history[f.best].validation_loss;
-        if best.as_ref().is_none_or(|b| !(loss(b) <= loss(&f))) {
+        if best.as_ref().is_none_or(|b| loss(&f) < loss(b) || loss(b).is_nan()) {
             best = Some(f);
         }
         if best.as_ref().is_some_and(|b| loss(b) < 0.95 * blind) {

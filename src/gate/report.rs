@@ -12,7 +12,7 @@ use super::costs::Costs;
 use super::crossfit::Fold;
 use super::discriminant::discriminant;
 use super::evidence::Evidence;
-use super::gate::Gate;
+use super::judge::Gate;
 use super::prepare::{Prepared, Ranked};
 use super::split::Split;
 use super::train::Job;
@@ -317,7 +317,7 @@ impl TrainReport {
         let said: Vec<(usize, Action)> = judged.iter().map(|j| (j.class, j.action)).collect();
         let decisions = decisions(&truth, &said, &gate.classes, &gate.costs);
         let unknown =
-            |j: &&super::gate::Judged| j.doubts.iter().any(|d| matches!(d, super::verdict::Doubt::Unknown { .. }));
+            |j: &&super::judge::Judged| j.doubts.iter().any(|d| matches!(d, super::verdict::Doubt::Unknown { .. }));
         let labelled = split.train.len() + split.validate.len() + split.test.len();
         debug_assert_eq!(parts.held.len(), parts.held_p.len());
         Ok(TrainReport {

@@ -13,7 +13,7 @@ use super::costs::Costs;
 use super::crossfit::crossfit;
 use super::drift::DriftReference;
 use super::evidence::Evidence;
-use super::gate::Gate;
+use super::judge::Gate;
 use super::network::Desk;
 use super::novelty::{MOST_FEATURES, Novelty};
 use super::parallel::each;
@@ -151,8 +151,11 @@ pub fn train(table: &Table, settings: &TrainSettings) -> Result<Trained, GateErr
     Ok(Trained { gate, report })
 }
 
+/// The published network, what was tried, and the hidden layers that won.
+type Searched = (Option<Published>, Vec<Candidate>, Vec<usize>);
+
 /// The published network first, then its middle layer over the candidates; the one with the least validation loss wins.
-fn search(job: &Job<'_>) -> Result<(Option<Published>, Vec<Candidate>, Vec<usize>), GateError> {
+fn search(job: &Job<'_>) -> Result<Searched, GateError> {
     let settings = job.settings;
     let ten = TrainSettings { search: false, ..settings.clone() };
     let wide = prepare(job.table, &job.split.train, job.class, job.classes, ten.feature_count(), &ten)?;
