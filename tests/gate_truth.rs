@@ -52,11 +52,7 @@ fn known_machines_pass_and_unknown_kinds_are_stopped() {
         let rows: Vec<_> = (0..60).map(|i| (i % 4, Some(kind))).collect();
         let v = trained.gate.classify(&table(&world.csv(&rows, |c| c.to_string(), true, 6 + kind as u64))).unwrap();
         let stopped = v.iter().filter(|v| v.action == Action::Inspect).count();
-        assert!(
-            stopped >= 57,
-            "kind {kind}: {stopped} of 60; {:?}",
-            v.iter().map(|v| v.novelty.as_ref().map(|n| n.p_value)).collect::<Vec<_>>()
-        );
+        assert!(stopped >= 57, "kind {kind}: {stopped} of 60");
     }
 }
 

@@ -15,14 +15,16 @@ pub struct World {
 const COMMON: usize = 4;
 
 impl World {
-    /// Every class moves a third of the features by about `shift` deviations; five unknown kinds move a sixth by four.
+    /// Every class moves a third of the features by about `shift` deviations; five unknown kinds move a fifth by three.
     pub fn new(seed: u64, features: usize, classes: usize, shift: f64) -> World {
         let mut random = Random::new(seed);
         let mut moved = |share: f64, by: f64| -> Vec<f64> {
             (0..features).map(|_| if random.uniform() < share { by * random.normal() } else { 0.0 }).collect()
         };
         let class = (0..classes).map(|k| if k == 0 { vec![0.0; features] } else { moved(0.33, shift) }).collect();
-        let kind = (0..5).map(|_| moved(0.17, 4.0)).collect();
+        let kind = (0..5usize)
+            .map(|k| (0..features).map(|j| [0.0, 3.0, -3.0][if (j + k) % 5 == 0 { 1 + j % 2 } else { 0 }]).collect())
+            .collect();
         let mix = (0..features * COMMON).map(|_| 0.4 * random.normal()).collect();
         World { features, class, kind, mix }
     }
