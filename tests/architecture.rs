@@ -21,7 +21,7 @@ const RANKS: [&[&str]; 10] = [
 const HOMES: [(&str, &[&str]); 8] = [
     ("argmin", &["src/tune/search.rs"]),
     ("rustfft", &["src/numeric/spectrum.rs"]),
-    ("rayon", &["src/tune/search.rs", "src/study/"]),
+    ("rayon", &["src/tune/search.rs", "src/gate/", "src/twin/", "src/study/"]),
     ("clap", &["src/cli/"]),
     ("maud", &["src/report/"]),
     ("sha2", &["src/document/digest.rs", "src/frf/"]),

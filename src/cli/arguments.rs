@@ -21,6 +21,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     Demo(DemoArguments),
+    Features(FeaturesArguments),
     Identify(Box<IdentifyArguments>),
     Margins(Box<MarginsArguments>),
     Response(ResponseArguments),
@@ -35,6 +36,21 @@ pub(super) enum Command {
 pub(super) struct DemoArguments {
     /// Folder to write to
     #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// Raw machine folders (response.bod, pes.csv, log.toml) to one row of features each
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  servotune features machines --out features.csv
+
+A missing or broken file leaves its features empty, is reported, and ends the command with 1.")]
+pub(super) struct FeaturesArguments {
+    /// Folder with one folder a machine, named by its id
+    #[arg(value_name = "DIR")]
+    pub machines: PathBuf,
+    /// Table to write: id, features, label where any log has one
+    #[arg(long, value_name = "FEATURES")]
     pub out: PathBuf,
 }
 

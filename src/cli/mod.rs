@@ -6,6 +6,7 @@
 mod arguments;
 mod demo;
 mod failure;
+mod features;
 mod identify;
 mod load;
 mod margins;
@@ -45,6 +46,7 @@ pub fn main() -> ExitCode {
     let mut screen = Screen::new(arguments.json);
     let ending = match arguments.command {
         Command::Demo(a) => demo::run(&a, &mut screen),
+        Command::Features(a) => features::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),
         Command::Response(a) => response::run(&a, &mut screen),
