@@ -1,6 +1,7 @@
 //! The words of the command line.
 
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
+use crate::twin::line::UnknownKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -28,6 +29,8 @@ pub(super) enum Command {
     Simulate(SimulateArguments),
     Tune(Box<TuneArguments>),
     Study(StudyArguments),
+    #[command(hide = true)]
+    Twin(TwinArguments),
 }
 
 /// The whole chain on a built-in machine: sweep, identification, tuning, gain table, report
@@ -203,6 +206,61 @@ pub(super) struct TuneArguments {
     pub reading: ReadingArguments,
     #[command(flatten)]
     pub model: ModelArguments,
+}
+
+/// Made-up machines with a known truth, for tests and studies
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  servotune twin line --out line")]
+pub(super) struct TwinArguments {
+    #[command(subcommand)]
+    pub what: TwinCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum TwinCommand {
+    Line(TwinLineArguments),
+}
+
+/// Machine folders of a production line
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  servotune twin line --out line
+  servotune twin line --out small --seed 7 --count 60
+  servotune twin line --out strange --unknown cracked_arm --count 40")]
+pub(super) struct TwinLineArguments {
+    /// Folder to write to
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Fixes every draw
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Machines in all, in the paper's proportions, or four counts A,B,C,D of the classes
+    #[arg(long, value_name = "N", value_parser = counts)]
+    pub count: Option<Counts>,
+    /// Machines of a kind that no class knows instead: amplifier, cracked_arm, vibration, clock, stuck_bearing
+    #[arg(long, value_name = "KIND", value_parser = unknown_kind)]
+    pub unknown: Option<UnknownKind>,
+}
+
+/// How many machines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Counts {
+    Total(usize),
+    OfClass([usize; 4]),
+}
+
+fn counts(text: &str) -> Result<Counts, String> {
+    let numbers: Option<Vec<usize>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([total]) if *total > 0 => Ok(Counts::Total(*total)),
+        Some([a, b, c, d]) if a + b + c + d > 0 => Ok(Counts::OfClass([*a, *b, *c, *d])),
+        _ => Err(format!("found `{text}`; expected a number such as 486 or four such as 198,106,78,104")),
+    }
+}
+
+fn unknown_kind(word: &str) -> Result<UnknownKind, String> {
+    let known = || UnknownKind::ALL.map(UnknownKind::name).join(", ");
+    UnknownKind::named(word).ok_or_else(|| format!("found `{word}`; expected one of: {}", known()))
 }
 
 /// Makes a table or picture of results/ again

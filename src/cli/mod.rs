@@ -17,6 +17,7 @@ mod slot;
 mod study;
 mod sweep_arguments;
 mod tune;
+mod twin;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -53,6 +54,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(a) => simulate::run(&a, &mut screen),
         Command::Tune(a) => tune::run(&a, &mut screen),
         Command::Study(a) => study::run(&a, &mut screen),
+        Command::Twin(a) => twin::run(&a, &mut screen),
     };
     match ending {
         Ok(Ending::Accepted) => ExitCode::SUCCESS,
