@@ -285,6 +285,8 @@ pub(super) enum StudyName {
     Classes,
     /// The ladder of Table 1 and figures 6, 9, 12-14
     Ladder,
+    /// The production line in features (figures 24-34)
+    Line,
     /// 200 random plants of order 22: response, frequency and margin errors
     Plants,
     /// The nine measured responses of a fast steering mirror

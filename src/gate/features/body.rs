@@ -45,7 +45,8 @@ pub fn body_fit(view: &ResponseView) -> Option<BodyFit> {
         let cost = |delay: f64| solve(&w, value, &weight, delay).map_or(f64::INFINITY, |f| f.residual);
         let delay_s = golden_section(cost, 0.0, LONGEST_S, 1e-8).x;
         let fit = solve(&w, value, &weight, delay_s)?;
-        let far = 3.0 * fit.residual;
+        // A fit without any error leaves nobody far off.
+        let far = 3.0 * fit.residual.max(1e-9);
         for ((weight, &w), &g) in weight.iter_mut().zip(&w).zip(value) {
             *weight = (far / (fit.inverse_at(w) * g - 1.0).norm().max(far)).sqrt();
         }
