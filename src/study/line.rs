@@ -101,7 +101,9 @@ fn page(table: &FeatureTable, settings: &LineSettings) -> Result<String, StudyEr
          Made by `servotune study line --out results`. Simulated machines (`specs/gate_twin.md`), seed {}.\n\n\
          Classes: {a} healthy, {b} sensor fault, {c} loose pushpin, {d} tunable; {} in all, as in section 2.9. {} features each, logs\n\
          included; {missing} of {} fields empty.\n\n```text\n{}```\n\n\
-         The text of section 2.9 names Harmonic 15 where the caption of figure 31 names Harmonic 24; both are shown.\n\n{pictures}",
+         The text of section 2.9 names Harmonic 15 where the caption of figure 31 names Harmonic 24; both are shown.\n\n\
+         Where the twin differs from the paper: section 2.9 finds the lowest FF_Factor on loose pushpins; here sensor faults have it, because their\n\
+         acceleration gain is up by half (eq. (33)) while a loose pushpin keeps torque and inertia.\n\n{pictures}",
         settings.seed,
         table.ids.len(),
         table.names.len(),

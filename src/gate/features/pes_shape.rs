@@ -107,7 +107,8 @@ fn settling(x: &[f64], rate: f64, row: &mut Row) {
 
 /// Frequency and damping of the oscillation: two poles of a linear prediction of block means at about 5 kHz.
 fn oscillation(name: &str, x: &[f64], rate: f64, row: &mut Row) {
-    let block = (rate / 5000.0).round().clamp(1.0, 1e3) as usize;
+    // Without a rate the quotient is no number, which becomes 0.
+    let block = ((rate / 5000.0).round().clamp(1.0, 1e3) as usize).max(1);
     let coarse: Vec<f64> = detrended(x).chunks_exact(block).map(mean).collect();
     let (mut a11, mut a12, mut a22, mut b1, mut b2) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for w in coarse.windows(3) {
