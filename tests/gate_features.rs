@@ -1,5 +1,5 @@
 //! Features: closed forms, agreement with the DFT of the PES room, broken files, the practice machines, the twin of the line.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stderr)]
 
 use servotune::gate::features::{
     FeatureError, PesRecord, RawMachine, Reason, features, machine_folders, read_machine, read_machines,
