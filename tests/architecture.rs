@@ -21,7 +21,7 @@ const RANKS: [&[&str]; 10] = [
 const HOMES: [(&str, &[&str]); 9] = [
     ("argmin", &["src/tune/search.rs"]),
     ("rustfft", &["src/numeric/spectrum.rs"]),
-    ("rayon", &["src/tune/search.rs", "src/gate/parallel.rs", "src/study/"]),
+    ("rayon", &["src/tune/search.rs", "src/gate/", "src/twin/", "src/study/", "src/diagnose/"]),
     ("pulp", &["src/gate/wide.rs"]),
     ("clap", &["src/cli/"]),
     ("maud", &["src/report/"]),

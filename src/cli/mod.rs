@@ -7,6 +7,7 @@ mod arguments;
 mod classify;
 mod demo;
 mod failure;
+mod features;
 mod gate_arguments;
 mod identify;
 mod load;
@@ -19,6 +20,7 @@ mod study;
 mod sweep_arguments;
 mod train;
 mod tune;
+mod twin;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -48,6 +50,7 @@ pub fn main() -> ExitCode {
     let mut screen = Screen::new(arguments.json);
     let ending = match arguments.command {
         Command::Demo(a) => demo::run(&a, &mut screen),
+        Command::Features(a) => features::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),
         Command::Response(a) => response::run(&a, &mut screen),
@@ -56,6 +59,7 @@ pub fn main() -> ExitCode {
         Command::Train(a) => train::run(&a, &mut screen),
         Command::Classify(a) => classify::run(&a, &mut screen),
         Command::Study(a) => study::run(&a, &mut screen),
+        Command::Twin(a) => twin::run(&a, &mut screen),
     };
     match ending {
         Ok(Ending::Accepted) => ExitCode::SUCCESS,
