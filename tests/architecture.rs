@@ -18,14 +18,15 @@ const RANKS: [&[&str]; 10] = [
 ];
 
 /// Outside crates and the places where they may be named.
-const HOMES: [(&str, &[&str]); 8] = [
+const HOMES: [(&str, &[&str]); 9] = [
     ("argmin", &["src/tune/search.rs"]),
     ("rustfft", &["src/numeric/spectrum.rs"]),
-    ("rayon", &["src/tune/search.rs", "src/study/"]),
+    ("rayon", &["src/tune/search.rs", "src/gate/", "src/twin/", "src/study/", "src/diagnose/"]),
+    ("pulp", &["src/gate/wide.rs"]),
     ("clap", &["src/cli/"]),
     ("maud", &["src/report/"]),
     ("sha2", &["src/document/digest.rs", "src/frf/"]),
-    ("csv", &["src/frf/", "src/recording/"]),
+    ("csv", &["src/frf/", "src/recording/", "src/gate/table.rs", "src/gate/error.rs"]),
     ("flate2", &["src/frf/", "src/recording/"]),
 ];
 

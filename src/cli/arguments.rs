@@ -1,6 +1,8 @@
 //! The words of the command line.
 
+pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
+use crate::twin::line::UnknownKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -21,12 +23,17 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     Demo(DemoArguments),
+    Features(FeaturesArguments),
     Identify(Box<IdentifyArguments>),
     Margins(Box<MarginsArguments>),
     Response(ResponseArguments),
     Simulate(SimulateArguments),
     Tune(Box<TuneArguments>),
+    Train(Box<TrainArguments>),
+    Classify(ClassifyArguments),
     Study(StudyArguments),
+    #[command(hide = true)]
+    Twin(TwinArguments),
 }
 
 /// The whole chain on a built-in machine: sweep, identification, tuning, gain table, report
@@ -35,6 +42,21 @@ pub(super) enum Command {
 pub(super) struct DemoArguments {
     /// Folder to write to
     #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// Raw machine folders (response.bod, pes.csv, log.toml) to one row of features each
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  servotune features machines --out features.csv
+
+A missing or broken file leaves its features empty, is reported, and ends the command with 1.")]
+pub(super) struct FeaturesArguments {
+    /// Folder with one folder a machine, named by its id
+    #[arg(value_name = "DIR")]
+    pub machines: PathBuf,
+    /// Table to write: id, features, label where any log has one
+    #[arg(long, value_name = "FEATURES")]
     pub out: PathBuf,
 }
 
@@ -189,6 +211,61 @@ pub(super) struct TuneArguments {
     pub model: ModelArguments,
 }
 
+/// Made-up machines with a known truth, for tests and studies
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  servotune twin line --out line")]
+pub(super) struct TwinArguments {
+    #[command(subcommand)]
+    pub what: TwinCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum TwinCommand {
+    Line(TwinLineArguments),
+}
+
+/// Machine folders of a production line
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  servotune twin line --out line
+  servotune twin line --out small --seed 7 --count 60
+  servotune twin line --out strange --unknown cracked_arm --count 40")]
+pub(super) struct TwinLineArguments {
+    /// Folder to write to
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Fixes every draw
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Machines in all, in the paper's proportions, or four counts A,B,C,D of the classes
+    #[arg(long, value_name = "N", value_parser = counts)]
+    pub count: Option<Counts>,
+    /// Machines of a kind that no class knows instead: amplifier, cracked_arm, vibration, clock, stuck_bearing
+    #[arg(long, value_name = "KIND", value_parser = unknown_kind)]
+    pub unknown: Option<UnknownKind>,
+}
+
+/// How many machines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Counts {
+    Total(usize),
+    OfClass([usize; 4]),
+}
+
+fn counts(text: &str) -> Result<Counts, String> {
+    let numbers: Option<Vec<usize>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([total]) if *total > 0 => Ok(Counts::Total(*total)),
+        Some([a, b, c, d]) if a + b + c + d > 0 => Ok(Counts::OfClass([*a, *b, *c, *d])),
+        _ => Err(format!("found `{text}`; expected a number such as 486 or four such as 198,106,78,104")),
+    }
+}
+
+fn unknown_kind(word: &str) -> Result<UnknownKind, String> {
+    let known = || UnknownKind::ALL.map(UnknownKind::name).join(", ");
+    UnknownKind::named(word).ok_or_else(|| format!("found `{word}`; expected one of: {}", known()))
+}
+
 /// Makes a table or picture of results/ again
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  servotune study classes --out results")]
@@ -211,6 +288,8 @@ pub(super) enum StudyName {
     Classes,
     /// The ladder of Table 1 and figures 6, 9, 12-14
     Ladder,
+    /// The production line in features (figures 24-34)
+    Line,
     /// 200 random plants of order 22: response, frequency and margin errors
     Plants,
     /// The nine measured responses of a fast steering mirror

@@ -4,6 +4,8 @@ use crate::controller::ControllerError;
 use crate::document::DocumentError;
 use crate::feedback::FeedbackError;
 use crate::frf::{FrfError, FrfShapeError};
+use crate::gate::GateError;
+use crate::gate::features::FeatureError;
 use crate::identify::IdentifyError;
 use crate::lti::LtiError;
 use crate::pes::{PesError, ProfileError};
@@ -31,6 +33,8 @@ pub enum Failure {
     Physics { file: PathBuf, effect: String, command: &'static str },
     #[error(transparent)]
     Frf(#[from] FrfError),
+    #[error(transparent)]
+    Features(#[from] FeatureError),
     #[error("{}: {source}", file.display())]
     Identify { file: PathBuf, source: IdentifyError },
     #[error("the result cannot be written as TOML: {source}")]
@@ -55,6 +59,8 @@ pub enum Failure {
     Twin(#[from] TwinError),
     #[error(transparent)]
     Sweep(#[from] FrfShapeError),
+    #[error(transparent)]
+    Gate(#[from] GateError),
     #[error(transparent)]
     Study(#[from] StudyError),
     /// Two algorithms that share no code disagree: no answer can be trusted.

@@ -4,8 +4,11 @@
 //! 1 (done, something was rejected) or 2 (could not do it). Commands: `specs/files.md` and `servotune --help`.
 
 mod arguments;
+mod classify;
 mod demo;
 mod failure;
+mod features;
+mod gate_arguments;
 mod identify;
 mod load;
 mod margins;
@@ -15,7 +18,9 @@ mod simulate;
 mod slot;
 mod study;
 mod sweep_arguments;
+mod train;
 mod tune;
+mod twin;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -45,12 +50,16 @@ pub fn main() -> ExitCode {
     let mut screen = Screen::new(arguments.json);
     let ending = match arguments.command {
         Command::Demo(a) => demo::run(&a, &mut screen),
+        Command::Features(a) => features::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),
         Command::Response(a) => response::run(&a, &mut screen),
         Command::Simulate(a) => simulate::run(&a, &mut screen),
         Command::Tune(a) => tune::run(&a, &mut screen),
+        Command::Train(a) => train::run(&a, &mut screen),
+        Command::Classify(a) => classify::run(&a, &mut screen),
         Command::Study(a) => study::run(&a, &mut screen),
+        Command::Twin(a) => twin::run(&a, &mut screen),
     };
     match ending {
         Ok(Ending::Accepted) => ExitCode::SUCCESS,

@@ -15,6 +15,7 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
     let made = match a.study {
         StudyName::Classes => study::classes()?,
         StudyName::Ladder => study::ladder()?,
+        StudyName::Line => study::line_study()?,
         StudyName::Plants => study::plants()?,
         StudyName::Mirror => study::mirror(&a.data)?,
         StudyName::Motor => study::motor(&a.data)?,

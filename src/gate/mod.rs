@@ -1,2 +1,64 @@
 //! The gate: which machines are worth tuning.
+//!
+//! In: a table of features with a class for each machine. Out: a trained gate, and its verdict on any machine: class, calibrated
+//! probability, action, reasons. In doubt it says `inspect`. Reading order: `table`, `classes`, `split`, `clean`, `boost`, `scale`, `network`,
+//! `adam`, `crossfit`, `calibrate`, `conformal`, `novelty`, `evidence`, `costs`, `train`, `judge`, `file`. Spec: `specs/gate.md`.
+
+mod adam;
+mod attribution;
+mod boost;
+mod calibrate;
+mod classes;
+mod clean;
+mod conformal;
+mod costs;
+mod crossfit;
+mod discriminant;
+mod drift;
+mod error;
+mod evidence;
 pub mod features;
+mod file;
+mod judge;
+mod network;
+mod novelty;
+mod packed;
+mod parallel;
+mod prepare;
+mod report;
+mod scale;
+mod settings;
+mod split;
+mod table;
+mod train;
+mod verdict;
+mod wide;
+
+pub use adam::{Epoch, Fitted, Rows, fit, judge};
+pub use attribution::{Decided, Direction, shares};
+pub use boost::{BoostSettings, importance};
+pub use calibrate::{Calibration, calibrate, calibration_error, log_loss, probabilities};
+pub use classes::{Action, Classes, Label, Labelled, labelled};
+pub use clean::{Cause, Removed, clean};
+pub use conformal::Conformal;
+pub use costs::Costs;
+pub use crossfit::Fold;
+pub use discriminant::{Discriminant, discriminant};
+pub use drift::{Drift, DriftReference, Moved};
+pub use error::GateError;
+pub use evidence::{EVIDENCE, Evidence, Vote};
+pub use file::SCHEMA;
+pub use judge::Gate;
+pub use network::{Desk, Network, parameter_count, softmax};
+pub use novelty::{Novelty, Strangeness};
+pub use prepare::Ranked;
+pub use report::{
+    Baseline, CalibrationReport, Candidate, ConformalReport, Confusion, Confusions, Counts, Decisions, MissedBroken,
+    NoveltyReport, Published, TrainReport, accuracy, confusion, decisions,
+};
+pub use scale::Scale;
+pub use settings::{FitSettings, TrainSettings};
+pub use split::{Split, folds, hold_out, split};
+pub use table::{Column, Table};
+pub use train::{Trained, train};
+pub use verdict::{Doubt, PlantEvidence, Verdict};

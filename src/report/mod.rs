@@ -14,7 +14,9 @@ mod ticks;
 mod words;
 
 pub mod bode;
+pub mod boxplot;
 pub mod figure;
+pub mod histogram;
 pub mod identified;
 pub mod margins;
 pub mod number;

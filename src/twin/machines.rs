@@ -1,9 +1,10 @@
 //! The paper's four machine classes, from the files in `specs/` that are built into the program.
 
-use crate::controller::Controller;
+use crate::controller::{Controller, ControllerError};
 use crate::document::{DocumentError, parse_toml};
+use crate::frf::{FrfError, FrfShapeError};
 use crate::lti::{LtiError, Plant, PlantFile};
-use crate::pes::Profile;
+use crate::pes::{Profile, ProfileError};
 use std::path::Path;
 use thiserror::Error;
 
@@ -20,7 +21,7 @@ pub enum MachineClass {
     Tunable,
 }
 
-/// Why a built-in file could not be read.
+/// Why a made-up machine could not be made.
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "each variant carries its own message")]
 pub enum TwinError {
@@ -28,6 +29,14 @@ pub enum TwinError {
     Document(#[from] DocumentError),
     #[error(transparent)]
     Lti(#[from] LtiError),
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
+    #[error(transparent)]
+    Profile(#[from] ProfileError),
+    #[error(transparent)]
+    Sweep(#[from] FrfShapeError),
+    #[error(transparent)]
+    Frf(#[from] FrfError),
 }
 
 impl MachineClass {

@@ -1,0 +1,97 @@
+"""Times the published network's training beside PyTorch and, where installed, Keras, in one run; writes gate_speed.md and gate_speed.json.
+
+Usage: python benches/peers/gate_speed.py --out results
+Needs torch and numpy; keras with tensorflow is timed where it is installed. Same sizes, batch, epochs and rate; like classes of rows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import time
+from pathlib import Path
+from statistics import median
+
+os.environ.setdefault("KERAS_BACKEND", "tensorflow")
+try:
+    import numpy as np
+    import torch
+except ImportError as missing:
+    sys.exit(f"{missing}; install it with: python -m pip install torch numpy")
+try:
+    import keras
+except ImportError:
+    keras = None
+
+EPOCHS, BATCH, RATE, REPEATS = 200, 10, 0.01, 3
+
+
+def rows() -> tuple[np.ndarray, np.ndarray]:
+    draw = np.random.default_rng(1)
+    y = np.arange(291) % 4
+    return (draw.normal(size=(291, 10)) + 3.0 * (np.arange(10) % 4 == y[:, None])).astype(np.float32), y
+
+
+def torch_once(threads: int) -> float:
+    torch.set_num_threads(threads)
+    torch.set_flush_denormal(True)
+    x, y = (torch.from_numpy(v) for v in rows())
+    layers = [torch.nn.Linear(10, 200), torch.nn.Linear(200, 500), torch.nn.Linear(500, 200), torch.nn.Linear(200, 4)]
+    relu = torch.nn.ReLU
+    net = torch.nn.Sequential(layers[0], relu(), layers[1], relu(), layers[2], relu(), layers[3])
+    step = torch.optim.Adam(net.parameters(), lr=RATE)
+    loss_of = torch.nn.CrossEntropyLoss()
+    start = time.perf_counter()
+    for _ in range(EPOCHS):
+        for part in torch.randperm(len(y)).split(BATCH):
+            step.zero_grad()
+            loss_of(net(x[part]), y[part]).backward()
+            step.step()
+    return time.perf_counter() - start
+
+
+def keras_once() -> float:
+    x, y = rows()
+    dense = keras.layers.Dense
+    net = keras.Sequential([dense(200, "relu"), dense(500, "relu"), dense(200, "relu"), dense(4, "softmax")])
+    net.compile(optimizer=keras.optimizers.Adam(RATE), loss="sparse_categorical_crossentropy")
+    start = time.perf_counter()
+    net.fit(x, y, epochs=EPOCHS, batch_size=BATCH, verbose=0)
+    return time.perf_counter() - start
+
+
+def main() -> None:
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--out", type=Path, default=Path("results"))
+    a = arguments.parse_args()
+    words = ["cargo", "bench", "--quiet", "--bench", "gate"]
+    ran = subprocess.run(words, check=True, capture_output=True, text=True)
+    found = {"servotune, 1 thread": json.loads(ran.stdout.strip().splitlines()[-1])}
+    for threads in (1, 2):
+        name = f"PyTorch {torch.__version__}, {threads} thread{'s' if threads > 1 else ''}, denormals flushed"
+        found[name] = [torch_once(threads) for _ in range(REPEATS)]
+    if keras is not None:
+        found[f"Keras {keras.__version__}, {keras.backend.backend()}"] = [keras_once() for _ in range(REPEATS)]
+    lines = [
+        "# Training time of the published network",
+        "",
+        f"Made by `python benches/peers/gate_speed.py`, Python {platform.python_version()}, {platform.processor() or platform.machine()}.",
+        "10-200-500-200-4, 291 rows, 200 epochs, batch 10, Adam 0.01; servotune also judges 97 validation rows each epoch, the peers do not.",
+        "",
+        "| what | median (s) | fastest (s) |",
+        "|---|---|---|",
+    ]
+    lines += [f"| {k} | {median(v):.2f} | {min(v):.2f} |" for k, v in found.items()]
+    if keras is None:
+        lines += ["", "Keras was not installed and is not timed."]
+    a.out.mkdir(parents=True, exist_ok=True)
+    (a.out / "gate_speed.md").write_text("\n".join(lines) + "\n")
+    (a.out / "gate_speed.json").write_text(json.dumps(found, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

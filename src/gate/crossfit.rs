@@ -1,0 +1,74 @@
+//! Cross-validation: every row judged by a network that has not seen it (section 3.2, Table 3).
+//!
+//! In: a table and the rows to deal into folds. Out: loss and accuracy of each fold, and every row's logits. Each fold is cleaned, ranked,
+//! normalised and trained anew on the other folds; a fifth of those, not the fold itself, chooses the epoch. Spec: `specs/gate.md`.
+
+use super::GateError;
+use super::adam::{Rows, judge};
+use super::calibrate::Logits;
+use super::network::Desk;
+use super::parallel::each;
+use super::prepare::{PATIENCE, learn, prepare, reach, seed_of};
+use super::settings::TrainSettings;
+use super::split::hold_out;
+use super::table::Table;
+use crate::numeric::random::Random;
+use serde::Serialize;
+
+/// One fold.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Fold {
+    /// Mean cross-entropy of its rows (nat).
+    pub loss: f64,
+    /// Share of its rows whose class was the most probable one.
+    pub accuracy: f64,
+    /// Its rows.
+    pub rows: usize,
+}
+
+/// Share of the rows outside a fold that choose its epoch.
+const CHOOSE: f64 = 0.2;
+
+/// Folds and, in the order of `rows`, the logits.
+pub(super) fn crossfit(
+    table: &Table,
+    rows: &[usize],
+    class: &[usize],
+    classes: usize,
+    fold: &[usize],
+    hidden: &[usize],
+    settings: &TrainSettings,
+) -> Result<(Vec<Fold>, Vec<Logits>), GateError> {
+    let one = |f: usize| -> Result<(Fold, Vec<Logits>), GateError> {
+        let pick = |inside: bool| {
+            rows.iter().zip(fold).filter(|(_, k)| (**k == f) == inside).map(|(r, _)| *r).collect::<Vec<usize>>()
+        };
+        let (held, others) = (pick(true), pick(false));
+        let mut random = Random::stream(settings.seed, 300 + f as u64);
+        let (train, choose) = hold_out(&others, class, classes, CHOOSE, &mut random);
+        let p = prepare(table, &train, class, classes, settings.feature_count(), settings)?;
+        let seed = seed_of(settings.seed, 200 + f as u64);
+        let fitted = learn(&p, &train, &choose, class, classes, hidden, settings, Some(PATIENCE), seed)?;
+        let unit = reach(&p, &fitted, if choose.is_empty() { &train } else { &choose }, classes);
+        let mut desk = Desk::new(&fitted.network.sizes, settings.batch);
+        let inputs = p.scale.inputs(&p.chosen, &held);
+        let of_held: Vec<usize> = held.iter().map(|&r| class[r]).collect();
+        let (loss, accuracy) = judge(&fitted.network, Rows { inputs: &inputs, class: &of_held }, &mut desk);
+        let logits = fitted
+            .network
+            .logits(&inputs, &mut desk)
+            .chunks(classes)
+            .map(|z| Logits { raw: z.to_vec(), unit })
+            .collect();
+        Ok((Fold { loss, accuracy, rows: held.len() }, logits))
+    };
+    let mut found = Vec::new();
+    let mut logits = vec![Logits { raw: Vec::new(), unit: 1.0 }; rows.len()];
+    for (f, result) in each(settings.folds, one).into_iter().enumerate() {
+        let (judged, of_fold) = result?;
+        let places = fold.iter().enumerate().filter(|(_, k)| **k == f).map(|(i, _)| i);
+        places.zip(of_fold).for_each(|(i, z)| logits[i] = z);
+        found.push(judged);
+    }
+    Ok((found, logits))
+}
