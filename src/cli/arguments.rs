@@ -1,5 +1,6 @@
 //! The words of the command line.
 
+pub(super) use super::diagnose_arguments::DiagnoseArguments;
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
 use crate::twin::line::UnknownKind;
@@ -23,6 +24,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     Demo(DemoArguments),
+    Diagnose(Box<DiagnoseArguments>),
     Features(FeaturesArguments),
     Identify(Box<IdentifyArguments>),
     Margins(Box<MarginsArguments>),

@@ -1,6 +1,7 @@
 //! Why a command could not be done: one message, exit code 2.
 
 use crate::controller::ControllerError;
+use crate::diagnose::DiagnoseError;
 use crate::document::DocumentError;
 use crate::feedback::FeedbackError;
 use crate::frf::{FrfError, FrfShapeError};
@@ -53,6 +54,8 @@ pub enum Failure {
     GainTable(#[from] GainTableError),
     #[error("no machine: expected --plant PLANT or --frf FRF")]
     NoMachine,
+    #[error(transparent)]
+    Diagnose(#[from] DiagnoseError),
     #[error(transparent)]
     Recording(#[from] RecordingError),
     #[error(transparent)]

@@ -1,5 +1,6 @@
 //! Everything that a diagnosis works on, made in order: given plant, noise, filter, refit, motion.
 
+use super::columns::raw_columns;
 use super::linear::{Carrier, LinearForm, Sampled};
 use super::refit::{Chosen, Fit, simulation_error};
 use super::run::{Run, mean_run};
@@ -7,7 +8,7 @@ use super::stack::Stack;
 use super::trajectory::{Smoother, Trajectory};
 use super::whiten::{NoiseLevels, Whitener};
 use crate::lti::{LtiError, Plant};
-use crate::physics::Scene;
+use crate::physics::{Entry, Port, Scene};
 use crate::recording::Role;
 
 /// The ground of a diagnosis.
@@ -133,6 +134,30 @@ impl Bench {
         let speeds = self.trajectories.iter().flat_map(|t| t.samples.iter().map(|s| s.v.abs()));
         self.scene.speed = speeds.fold(0.0f64, f64::max).max(1e-12);
         Ok(())
+    }
+
+    /// Takes what the sensor adds out of the motion: the laws act on where the arm is, not on what the encoder says.
+    pub fn correct(&mut self, chosen: &[Chosen]) {
+        let carrier = self.form.carrier(&self.p);
+        let Ok(sampled) = Sampled::of(&carrier.plant, self.scene.sample_time_s) else { return };
+        let mut means = self.means.clone();
+        for (i, run) in means.iter_mut().enumerate() {
+            for c in chosen {
+                let facts = c.effect.facts();
+                if facts.entry != Entry::Position || !matches!(facts.port, Port::Sensor | Port::Disk) {
+                    continue;
+                }
+                let raw = raw_columns(c.effect, &c.setting.inner, &self.scene, &self.trajectories[i]);
+                let own =
+                    if facts.per_record { &c.setting.strengths[i * facts.columns..] } else { &c.setting.strengths[..] };
+                for (column, s) in raw.iter().zip(own) {
+                    run.position.iter_mut().zip(column).for_each(|(y, v)| *y -= s * v);
+                }
+            }
+        }
+        let spindle_hz = self.scene.spindle_hz.unwrap_or(0.0);
+        let smoother = Smoother::of(&carrier.plant, &sampled.delayed, self.levels.sensor_rms, &means[0]);
+        self.trajectories = means.iter().map(|r| smoother.smooth(r, &sampled.delayed, spindle_hz)).collect();
     }
 
     /// Without repeats there is only what the model leaves: the error of the carrier along the recorded motion, which holds

@@ -32,7 +32,7 @@ pub struct LinearForm {
     pub given: Plant,
     /// Free parameters, in order.
     pub knobs: Vec<Knob>,
-    sample_time_s: f64,
+    pub(super) sample_time_s: f64,
 }
 
 /// Share of half the sample rate above which a mode is left as it is: records hold nothing about it.

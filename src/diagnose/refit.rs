@@ -78,7 +78,7 @@ impl Problem<'_, '_> {
             all[e].strengths[i] = *v;
         }
         for (v, &(e, i)) in x[p + self.strengths.len()..].iter().zip(&self.inner) {
-            all[e].inner[i] = v.exp();
+            all[e].inner[i] = v.exp().copysign(all[e].inner[i]);
         }
         all
     }
@@ -93,7 +93,8 @@ impl Problem<'_, '_> {
         let settings = self.settings(x);
         let effects: Vec<(&dyn Effect, &Setting)> = fit.chosen.iter().map(|c| c.effect).zip(&settings).collect();
         let mut all = fit.stack.series(|i| {
-            let mut e = simulation_error(&sampled, &carrier, &effects, fit.scene, &fit.means[i], &fit.trajectories[i], i);
+            let mut e =
+                simulation_error(&sampled, &carrier, &effects, fit.scene, &fit.means[i], &fit.trajectories[i], i);
             fit.whitener.apply(&mut e);
             e
         });
@@ -125,7 +126,11 @@ pub fn simulation_error(
         let raw = raw_columns(*effect, &setting.inner, scene, trajectory);
         let facts = effect.facts();
         // Effects that differ from record to record have their strengths segment by segment.
-        let own = if facts.per_record { setting.strengths.get(segment * facts.columns..).unwrap_or(&[]) } else { &setting.strengths };
+        let own = if facts.per_record {
+            setting.strengths.get(segment * facts.columns..).unwrap_or(&[])
+        } else {
+            &setting.strengths
+        };
         for (column, s) in raw.iter().zip(own) {
             let into = match facts.entry {
                 Entry::Command => &mut command,
@@ -178,7 +183,7 @@ impl Residuals for Problem<'_, '_> {
         let p = self.fit.form.knobs.len();
         if i >= p + self.strengths.len() {
             let (e, k) = self.inner[i - p - self.strengths.len()];
-            let at = self.fit.chosen[e].setting.inner[k].ln();
+            let at = self.fit.chosen[e].setting.inner[k].abs().ln();
             return Limit { low: at - 3.0, high: at + 3.0, step: 0.3 };
         }
         if i >= p {
@@ -226,7 +231,7 @@ impl Fit<'_> {
     fn start(&self, p: &[f64], problem: &Problem) -> Vec<f64> {
         let mut x = p.to_vec();
         x.extend(problem.strengths.iter().map(|&(e, i)| self.chosen[e].setting.strengths[i]));
-        x.extend(problem.inner.iter().map(|&(e, i)| self.chosen[e].setting.inner[i].ln()));
+        x.extend(problem.inner.iter().map(|&(e, i)| self.chosen[e].setting.inner[i].abs().ln()));
         x
     }
 

@@ -27,7 +27,7 @@ pub struct Candidate {
     pub strengths: usize,
     /// Which inner parameters are continuous.
     pub continuous: Vec<bool>,
-    /// Range of each inner parameter on the grid.
+    /// Range of each inner parameter's magnitude on the grid.
     pub range: Vec<[f64; 2]>,
 }
 
@@ -45,22 +45,22 @@ pub fn log_tail(g: f64, m: usize) -> f64 {
     if g <= m { 0.0 } else { 0.5 * (m - g) + 0.5 * m * (g / m).ln() }
 }
 
-/// Inner parameters that take more than three values over the grid, not all whole: these may be refined.
+/// Inner parameters that take more than three magnitudes over the grid, not all whole: these may be refined, sign kept.
 fn continuous(grid: &[Vec<f64>]) -> Vec<bool> {
     let count = grid.first().map_or(0, Vec::len);
     (0..count)
         .map(|i| {
-            let mut values: Vec<f64> = grid.iter().map(|p| p[i]).collect();
+            let mut values: Vec<f64> = grid.iter().map(|p| p[i].abs()).collect();
             values.sort_by(f64::total_cmp);
             values.dedup();
-            values.len() > 3 && values.iter().any(|v| v.fract() != 0.0) && values.iter().all(|v| *v > 0.0)
+            values.len() > 3 && values.iter().any(|v| v.fract() != 0.0) && values[0] > 0.0
         })
         .collect()
 }
 
 fn range(grid: &[Vec<f64>]) -> Vec<[f64; 2]> {
     let count = grid.first().map_or(0, Vec::len);
-    let over = |i: usize, pick: fn(f64, f64) -> f64, from: f64| grid.iter().map(|p| p[i]).fold(from, pick);
+    let over = |i: usize, pick: fn(f64, f64) -> f64, from: f64| grid.iter().map(|p| p[i].abs()).fold(from, pick);
     (0..count).map(|i| [over(i, f64::min, f64::INFINITY), over(i, f64::max, f64::NEG_INFINITY)]).collect()
 }
 
@@ -126,7 +126,10 @@ impl Ground<'_, '_> {
                 if !s.gain.is_finite() {
                     continue;
                 }
-                let same = |c: &Candidate| free.iter().enumerate().all(|(i, f)| *f || c.setting.inner[i] == point[i]);
+                let same = |c: &Candidate| {
+                    let at = &c.setting.inner;
+                    (0..at.len()).all(|i| at[i] == point[i] || (free[i] && at[i].signum() == point[i].signum()))
+                };
                 let setting = Setting { inner: point.clone(), strengths: s.strengths.clone() };
                 match all[first..].iter_mut().find(|c| same(c)) {
                     Some(c) if s.gain > c.gain => (c.setting, c.gain, c.concealed) = (setting, s.gain, s.concealed),
@@ -163,7 +166,7 @@ impl Ground<'_, '_> {
                 for way in [1.0, -1.0] {
                     let mut inner = candidate.setting.inner.clone();
                     let [low, high] = candidate.range[i];
-                    inner[i] = (inner[i] * (way * step[i]).exp()).clamp(low, high);
+                    inner[i] = (inner[i].abs() * (way * step[i]).exp()).clamp(low, high).copysign(inner[i]);
                     let s = self.explain(&sampled, candidate.effect, &inner);
                     if s.gain > candidate.gain {
                         candidate.gain = s.gain;

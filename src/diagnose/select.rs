@@ -3,7 +3,7 @@
 use super::bench::Bench;
 use super::refit::{Chosen, Refitted};
 use super::scan::{Candidate, Ground, log_tail};
-use crate::physics::Effect;
+use crate::physics::{Effect, Setting};
 use rayon::prelude::*;
 
 /// How the search decides.
@@ -23,7 +23,7 @@ pub struct SelectSettings {
 
 impl Default for SelectSettings {
     fn default() -> SelectSettings {
-        SelectSettings { most: 3, refits: 5, false_alarm: 1e-4, share: 0.35, iterations: 8 }
+        SelectSettings { most: 4, refits: 5, false_alarm: 1e-4, share: 0.35, iterations: 8 }
     }
 }
 
@@ -114,11 +114,22 @@ pub fn select(
     while model.chosen.len() < settings.most {
         progress(&format!("scan of {} effects for finding {}", library.len(), model.chosen.len() + 1));
         let mut step = scan(bench, library, &model);
-        let worth: Vec<usize> = (0..step.candidates.len())
-            .filter(|&i| step.candidates[i].log_p_value(library.len()) < limit && step.candidates[i].concealed < 0.9995)
-            .filter(|&i| model.chosen.iter().all(|c| c.effect.facts().name != step.candidates[i].effect.facts().name))
-            .take(settings.refits)
-            .collect();
+        // Two forms of the leading effect, one of each other.
+        let mut worth: Vec<usize> = Vec::new();
+        for (i, c) in step.candidates.iter().enumerate() {
+            let name = c.effect.facts().name;
+            let seen = worth.iter().filter(|&&j| step.candidates[j].effect.facts().name == name).count();
+            let leads = worth.first().is_none_or(|&j| step.candidates[j].effect.facts().name == name);
+            let new = model.chosen.iter().all(|m| m.effect.facts().name != name || again(name, &m.setting, &c.setting));
+            if new
+                && c.log_p_value(library.len()) < limit
+                && c.concealed < 0.9995
+                && seen < 1 + usize::from(leads)
+                && worth.len() < settings.refits
+            {
+                worth.push(i);
+            }
+        }
         for &i in &worth {
             progress(&format!("refit with {}", step.candidates[i].effect.facts().name));
             let c = &step.candidates[i];
@@ -127,7 +138,10 @@ pub fn select(
             let tried = fitted_from_both(bench, &chosen, &model.refitted.p, settings.iterations);
             step.tried.push((i, tried));
         }
-        step.taken = (0..step.tried.len()).min_by(|&a, &b| step.tried[a].1.cost.total_cmp(&step.tried[b].1.cost));
+        // Each number of a law is paid for (Schwarz 1978): of two that fit alike, the one with fewer.
+        let price = (bench.stack.total as f64).ln();
+        let paid = |t: &(usize, Model)| t.1.cost + price * numbers(&step.candidates[t.0]);
+        step.taken = (0..step.tried.len()).min_by(|&a, &b| paid(&step.tried[a]).total_cmp(&paid(&step.tried[b])));
         let accepted = step.taken.and_then(|t| {
             let (i, next) = &step.tried[t];
             let c = &step.candidates[*i];
@@ -141,7 +155,10 @@ pub fn select(
         }
         steps.push(step);
         match accepted {
-            Some(next) => model = next,
+            Some(next) => {
+                model = next;
+                bench.correct(&model.chosen);
+            }
             None => break,
         }
     }
@@ -149,6 +166,18 @@ pub fn select(
         baseline.cost = given;
     }
     Selection { given, baseline, steps, model }
+}
+
+/// Free numbers of a candidate.
+fn numbers(c: &Candidate) -> f64 {
+    let strengths = if c.effect.facts().fixed { 0 } else { c.strengths };
+    (strengths + c.setting.inner.iter().filter(|v| **v != 0.0).count()) as f64
+}
+
+/// Whether a second one of the same effect can be another thing: another line, another mode, another grating.
+fn again(name: &str, a: &Setting, b: &Setting) -> bool {
+    let many = ["repeatable_runout", "line_disturbance", "unmodelled_resonance", "shock"];
+    many.contains(&name) && (a.inner[0] - b.inner[0]).abs() > 0.02 * a.inner[0].abs()
 }
 
 fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {

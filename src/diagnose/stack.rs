@@ -108,7 +108,11 @@ impl Basis {
         let mut out = Vec::with_capacity(self.dimension());
         for (start, q) in &self.local {
             let (low, high) = (span[0].max(*start), span[1].min(start + q.len()));
-            out.push(if low < high { dot(&x[low - span[0]..high - span[0]], &q[low - start..high - start]) } else { 0.0 });
+            out.push(if low < high {
+                dot(&x[low - span[0]..high - span[0]], &q[low - start..high - start])
+            } else {
+                0.0
+            });
         }
         out.extend(self.global.iter().map(|q| dot(x, &q[span[0]..span[1]])));
         out
@@ -168,7 +172,11 @@ pub fn explain(basis: &Basis, residual: &[f64], columns: &[Vec<f64>], spans: &[[
     let taken: Vec<Vec<f64>> = (0..m).map(|i| basis.coordinates(part(i), spans[i])).collect();
     let inner = |i: usize, j: usize| {
         let [low, high] = [spans[i][0].max(spans[j][0]), spans[i][1].min(spans[j][1])];
-        let own = if low < high { dot(&part(i)[low - spans[i][0]..high - spans[i][0]], &part(j)[low - spans[j][0]..high - spans[j][0]]) } else { 0.0 };
+        let own = if low < high {
+            dot(&part(i)[low - spans[i][0]..high - spans[i][0]], &part(j)[low - spans[j][0]..high - spans[j][0]])
+        } else {
+            0.0
+        };
         (own, own - dot(&taken[i], &taken[j]))
     };
     let right: Vec<f64> = (0..m).map(|i| dot(part(i), &residual[spans[i][0]..spans[i][1]])).collect();

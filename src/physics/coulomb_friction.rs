@@ -1,11 +1,12 @@
 //! Dry friction: a constant drag against the motion, optionally higher at low speed.
 //!
 //! Coulomb with Stribeck's rise: level (1 + rise exp(-(v/v_s)²)) (Armstrong-Helouvry, Dupont, Canudas de Wit 1994). At rest the
-//! torque is what holds the arm: a spring-slider of a pre-sliding length below what the sensor resolves, never sgn(v). The
+//! torque is what holds the arm: Dahl's law with a pre-sliding length near what the sensor resolves, never sgn(v). The
 //! viscous part belongs to the linear plant; a mean offset belongs to the torque offset.
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
-use super::sample::{Sample, Scene};
+use super::pivot_friction::dahl;
+use super::sample::{Sample, Scene, logarithmic};
 
 /// Inner: pre-sliding length, Stribeck speed (0 for none), Stribeck rise. Strength: the level at speed.
 pub struct CoulombFriction;
@@ -17,7 +18,7 @@ static FACTS: Facts = Facts {
     columns: 1,
     fixed: false,
     per_record: false,
-    equation: "tau = -F (1 + rise exp(-(v/v_s)^2)) z, z = clip(z + dx/length, -1, 1) (spring-slider; z is sgn(v) when sliding)",
+    equation: "tau = -F (1 + rise exp(-(v/v_s)^2)) z, dz/dx = (1 - sgn(dx) z)/length (sgn(v) once sliding)",
     says: "the arm drags with the same force at every speed, and the force turns round with the motion",
     confused_with: &["pivot_friction", "backlash", "dead_band", "torque_ripple"],
     experiment: "constant-velocity moves in both directions at six speeds over two decades",
@@ -33,7 +34,7 @@ struct Slider {
 
 impl Slider {
     fn moved(&self, from: &Sample, to: &Sample) -> f64 {
-        (self.z + (to.x - from.x) / self.length).clamp(-1.0, 1.0)
+        dahl(self.z, to.x - from.x, self.length)
     }
 
     fn level(&self, v: f64) -> f64 {
@@ -44,10 +45,9 @@ impl Slider {
 impl Law for Slider {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
         let z = self.moved(from, to);
-        // The slide within an interval is linear in dx: the mean of z is exact when the yield point is passed too.
-        let reach = (to.x - from.x) / self.length;
-        let share = if reach == 0.0 { 1.0 } else { ((z - self.z) / reach).clamp(0.0, 1.0) };
-        let mean = share * 0.5 * (self.z + z) + (1.0 - share) * z;
+        // The mean over a straight path: s - (s - z0) (1 - exp(-r))/r with r the path in lengths.
+        let (path, s) = ((to.x - from.x).abs() / self.length, (to.x - from.x).signum());
+        let mean = if path < 1e-6 { 0.5 * (self.z + z) } else { s + (s - self.z) * (-path).exp_m1() / path };
         out[0] = -mean * self.level(0.5 * (from.v + to.v));
     }
 
@@ -62,12 +62,11 @@ impl Effect for CoulombFriction {
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        // At most six times the sensor's noise: shorter than what pre-sliding friction could be seen at.
+        // At most some twelve times the sensor's noise: shorter than what pre-sliding friction could be seen at.
         let floor = 1e-5 * scene.travel;
-        let long = (6.0 * scene.noise).max(floor);
-        let short = (2.0 * scene.noise).max(0.3 * floor);
-        let mut all = vec![vec![long, 0.0, 0.0], vec![short, 0.0, 0.0]];
-        all.extend([0.02, 0.06, 0.2].map(|share| vec![long, share * scene.speed, 0.5]));
+        let (short, long) = ((1.5 * scene.noise).max(0.3 * floor), (12.0 * scene.noise).max(2.0 * floor));
+        let mut all: Vec<Vec<f64>> = logarithmic(short, long, 5).into_iter().map(|l| vec![l, 0.0, 0.0]).collect();
+        all.extend([0.02, 0.06, 0.2].map(|share| vec![0.5 * long, share * scene.speed, 0.5]));
         all
     }
 

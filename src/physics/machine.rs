@@ -41,6 +41,7 @@ pub struct Machine {
     x: [f64; 3],
     w: f64,
     k: usize,
+    origin: f64,
 }
 
 /// Fixed-point steps before the secant.
@@ -49,6 +50,13 @@ const STEPS: usize = 3;
 const BISECTIONS: usize = 60;
 
 impl Machine {
+    /// The same machine, started at rest at `origin` instead of at 0 (a free inertia stays wherever it is put).
+    pub fn started_at(mut self, origin: f64) -> Machine {
+        self.origin = origin;
+        self.x = [origin; 3];
+        self
+    }
+
     /// A machine with these effects; `scene` says what the laws need to know of it.
     pub fn new(plant: &Plant, effects: &[(&dyn Effect, &Setting)], scene: &Scene) -> Result<Machine, LtiError> {
         let t = scene.sample_time_s;
@@ -84,13 +92,14 @@ impl Machine {
             x: [0.0; 3],
             w: 0.0,
             k: 0,
+            origin: 0.0,
         })
     }
 
     /// The position as the sensor gives it at this sample, without noise (position_unit).
     pub fn measure(&mut self, spindle_rad: f64, temperature: f64) -> f64 {
         let t = self.delayed.sample_time_s();
-        let x = self.pushed.position() + self.torqued.position();
+        let x = self.origin + self.pushed.position() + self.torqued.position();
         self.x = [x, self.x[0], self.x[1]];
         // Second-order backward difference.
         let v = (3.0 * self.x[0] - 4.0 * self.x[1] + self.x[2]) / (2.0 * t);
@@ -124,7 +133,7 @@ impl Machine {
         self.torqued.command(self.w);
         self.torqued.advance(&self.direct);
         if !self.torque.is_empty() {
-            let to = self.ahead(self.pushed.position() + self.torqued.position());
+            let to = self.ahead(self.origin + self.pushed.position() + self.torqued.position());
             for part in &mut self.torque {
                 part.law.commit(&self.now, &to);
             }
@@ -143,7 +152,7 @@ impl Machine {
         self.trial.clone_from(&self.torqued);
         self.trial.command(0.0);
         self.trial.advance(&self.direct);
-        let free = self.pushed.position() + self.trial.position();
+        let free = self.origin + self.pushed.position() + self.trial.position();
         let law = |w: f64| {
             let to = self.ahead(free + self.reach * w);
             self.torque.iter().map(|p| p.value(&self.now, &to)).sum::<f64>()

@@ -34,7 +34,8 @@ struct Dahl {
     z: f64,
 }
 
-fn dahl(z: f64, dx: f64, length: f64) -> f64 {
+/// Dahl's law over a step `dx`, exact.
+pub(super) fn dahl(z: f64, dx: f64, length: f64) -> f64 {
     let s = dx.signum();
     s - (s - z) * (-dx.abs() / length).exp()
 }
@@ -138,7 +139,10 @@ impl Effect for PivotFriction {
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        let inner = vec![given.positive("sliding_length")?, given.or("shape", 0.0)];
+        // Reports give the length that a person means beside the one of the law, where a spring below zero parts them.
+        let length =
+            if given.has("law_length") { given.positive("law_length")? } else { given.positive("sliding_length")? };
+        let inner = vec![length, given.or("shape", 0.0)];
         Ok(Setting { inner, strengths: vec![given.need("level_command")?] })
     }
 }
