@@ -32,12 +32,14 @@ pub struct Bench {
     pub stack: Stack,
     /// Machine and size of its motion.
     pub scene: Scene,
+    /// What repeats differ by, whitened, with the run it belongs to; empty without repeats.
+    pub repeats: Vec<(usize, Vec<f64>)>,
     /// Linear parameters of the last refit.
     pub p: Vec<f64>,
 }
 
 /// Series that hold noise only: each repeat less the mean of its group, scaled back to the noise of one record.
-fn noise_series(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<Vec<f64>> {
+fn noise_series(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<(usize, Vec<f64>)> {
     let mut out = Vec::new();
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, (r, e)) in errors.iter().enumerate() {
@@ -55,9 +57,10 @@ fn noise_series(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<Vec<f64>> {
         let len = errors[g[0]].1.len();
         let mean: Vec<f64> = (0..len).map(|k| g.iter().map(|&i| errors[i].1[k]).sum::<f64>() / n).collect();
         let scale = (n / (n - 1.0)).sqrt();
-        out.extend(
-            g.iter().map(|&i| errors[i].1.iter().zip(&mean).map(|(e, m)| scale * (e - m)).collect::<Vec<f64>>()),
-        );
+        out.extend(g.iter().map(|&i| {
+            let (run, error) = &errors[i];
+            (*run, error.iter().zip(&mean).map(|(e, m)| scale * (e - m)).collect::<Vec<f64>>())
+        }));
     }
     out
 }
@@ -97,7 +100,7 @@ impl Bench {
         let whitener = Whitener::new(&levels, &given.body, sample_time_s);
         let p = vec![0.0; form.knobs.len()];
         let mut bench =
-            Bench { form, runs, fit_runs, levels, whitener, means, trajectories: Vec::new(), stack, scene, p };
+            Bench { form, runs, fit_runs, levels, whitener, means, trajectories: Vec::new(), stack, scene, repeats: Vec::new(), p };
         bench.renew()?;
         Ok(bench)
     }
@@ -114,7 +117,12 @@ impl Bench {
         let errors: Vec<(usize, Vec<f64>)> = self.fit_runs.iter().map(|&r| (r, error(r))).collect();
         let repeats = noise_series(&errors, &self.runs);
         let from_repeats = !repeats.is_empty();
-        let series = if from_repeats { repeats } else { self.residual_series(&sampled, &carrier) };
+        let owners: Vec<usize> = repeats.iter().map(|r| r.0).collect();
+        let series = if from_repeats {
+            repeats.into_iter().map(|r| r.1).collect()
+        } else {
+            self.residual_series(&sampled, &carrier)
+        };
         let weight = vec![1.0; series.len()];
         self.levels = NoiseLevels::fit(&series, &weight, &carrier.plant.body, t, from_repeats);
         self.whitener = Whitener::new(&self.levels, &carrier.plant.body, t);
@@ -126,6 +134,7 @@ impl Bench {
             })
             .collect();
         self.whitener.refine(&filtered, &weight);
+        self.repeats = owners.into_iter().zip(filtered).collect();
         self.scene.noise = self.levels.sensor_rms;
         self.scene.plant = carrier.plant.clone();
         let spindle_hz = self.scene.spindle_hz.unwrap_or(0.0);

@@ -296,6 +296,65 @@ pub(super) fn unexplained(bench: &Bench, selection: &Selection, explained: f64) 
     }
 }
 
+/// What the noise itself tells: a coarse sensor grid, or noise that grows with the speed. Names it only where the mean of the
+/// records is explained.
+pub(super) fn noise_story(bench: &Bench) -> Option<Finding> {
+    let whole: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
+    let command = &bench.form.given.position_unit;
+    let steps: Vec<f64> = whole.iter().filter_map(|r| super::hygiene::quantum(&r.position)).collect();
+    if steps.len() == whole.len() && !steps.is_empty() {
+        let q = steps.iter().copied().fold(f64::INFINITY, f64::min);
+        // Rounding to a grid makes noise of step/√12; below a quarter of the noise's power it is nobody's concern.
+        if q * q / 12.0 > 0.25 * bench.levels.sensor_rms.powi(2) {
+            return Some(statistic("quantisation", ("step", plain(q, command)), 1e-300, &whole));
+        }
+    }
+    // Squares of the whitened repeats against the square of the speed.
+    let (mut n, mut sx, mut sy, mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (run, series) in &bench.repeats {
+        let Some(segment) = bench.stack.segments.iter().position(|s| s.runs.contains(run)) else { continue };
+        for (e, m) in series.iter().zip(&bench.trajectories[segment].samples) {
+            let (x, y) = ((m.v / bench.scene.speed).powi(2), e * e);
+            n += 1.0;
+            sx += x;
+            sy += y;
+            sxx += x * x;
+            sxy += x * y;
+            syy += y * y;
+        }
+    }
+    if n < 100.0 {
+        return None;
+    }
+    let spread = sxx - sx * sx / n;
+    let slope = (sxy - sx * sy / n) / spread;
+    let left = (syy - sy * sy / n - slope * (sxy - sx * sy / n)) / n;
+    let sigma = (left / spread).sqrt();
+    let floor = (sy - slope * sx) / n;
+    // Seven standard errors, and at the highest speed half as much again as at rest.
+    if !(slope > 7.0 * sigma && slope > 0.5 * floor) {
+        return None;
+    }
+    let seconds = (slope * bench.levels.sensor_rms.powi(2)).sqrt() / bench.scene.speed;
+    let z = slope / sigma;
+    let mut f = statistic("jitter", ("rms_s", plain(seconds, "s")), log_tail(z * z, 1).exp().max(1e-300), &whole);
+    f.family.push("encoder_noise".into());
+    Some(f)
+}
+
+fn statistic(name: &str, parameter: (&str, Estimate), p_value: f64, runs: &[&Run]) -> Finding {
+    let (says, port) = text_of(name);
+    Finding {
+        effect: name.into(),
+        family: vec![name.into()],
+        port,
+        p_value,
+        says: format!("{says}."),
+        parameters: BTreeMap::from([(parameter.0.to_owned(), parameter.1)]),
+        place: everywhere(runs),
+    }
+}
+
 /// Sum of squares with only some of the linear parameters free.
 fn restricted(bench: &Bench, keep: impl Fn(Knob) -> bool, selection: &Selection) -> (f64, Vec<f64>, usize) {
     let knobs: Vec<Knob> = bench.form.knobs.iter().copied().filter(|k| keep(*k)).collect();

@@ -32,8 +32,6 @@ pub fn acting(plant: &DiscretePlant, input: &[f64]) -> Vec<f64> {
 pub struct Smoother {
     step: Matrix3<f64>,
     push: Vector3<f64>,
-    noise: Matrix3<f64>,
-    sensor: f64,
     steady: Steady,
 }
 
@@ -68,7 +66,7 @@ impl Smoother {
                 let g = [b * t * t / 6.0, b * t / 2.0, 1.0];
                 g[r] * g[s] * walk * walk
             });
-            let smoother = Smoother { steady: steady(&step, &noise, sensor), step, push, noise, sensor };
+            let smoother = Smoother { steady: steady(&step, &noise, sensor), step, push };
             let cost = smoother.cost(&run.position, &i);
             if best.as_ref().is_none_or(|(c, _)| cost < *c) {
                 best = Some((cost, smoother));
@@ -78,8 +76,6 @@ impl Smoother {
             steady: steady(&step, &Matrix3::identity(), sensor),
             step,
             push,
-            noise: Matrix3::identity(),
-            sensor,
         })
     }
 
@@ -131,11 +127,6 @@ impl Smoother {
             })
             .collect();
         Trajectory { samples, unexplained: after.iter().map(|z| z[2]).collect() }
-    }
-
-    /// Variances that the smoother was made for: of the sensor and of the torque's walk per sample.
-    pub fn variances(&self) -> (f64, f64) {
-        (self.sensor, self.noise[(2, 2)])
     }
 }
 

@@ -40,11 +40,12 @@ impl Effect for EncoderCyclicError {
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        // Evenly in 1/P, a quarter of a wave over the whole travel apart: no period falls between two points.
-        let finest = (8.0 * scene.noise).max(scene.travel / 150.0);
+        // Evenly in 1/P, seven tenths of a wave over twice the travel apart: the nearest point still sees more than half of any
+        // wave, and refinement finds the rest.
+        let finest = (8.0 * scene.noise).max(scene.travel / 100.0);
         // A longer wave over the stroke is a scale error, not one of the grating.
         let coarse = 0.6 * scene.travel;
-        let step = 0.2 / scene.travel;
+        let step = 0.35 / scene.travel;
         let count = (((1.0 / finest - 1.0 / coarse) / step).ceil() as usize).clamp(1, 700);
         (0..count).map(|i| vec![1.0 / (1.0 / coarse + step * i as f64)]).collect()
     }

@@ -52,7 +52,7 @@ impl Effect for LineDisturbance {
             all.extend((1..=6).map(|h| base * f64::from(h)).filter(|&f| f < high).map(|f| vec![f]));
         }
         if scene.duration_s > 0.0 {
-            let step = 0.5 / scene.duration_s;
+            let step = 0.8 / scene.duration_s;
             let first = 1.0 / scene.duration_s;
             all.extend((0..POINTS).map(|i| first + step * i as f64).take_while(|&f| f < high).map(|f| vec![f]));
         }

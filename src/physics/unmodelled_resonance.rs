@@ -54,7 +54,7 @@ pub(super) fn scan(low: f64, high: f64, damping: f64, scene: &Scene) -> Vec<Vec<
     let mut hz = low;
     while hz <= high && all.len() < 2000 {
         all.push(vec![hz, damping]);
-        hz += (2.0 * damping * hz).max(finest);
+        hz += (3.0 * damping * hz).max(finest);
     }
     all
 }
