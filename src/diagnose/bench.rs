@@ -137,36 +137,54 @@ impl Bench {
         self.repeats = owners.into_iter().zip(filtered).collect();
         self.scene.noise = self.levels.sensor_rms;
         self.scene.plant = carrier.plant.clone();
-        let spindle_hz = self.scene.spindle_hz.unwrap_or(0.0);
-        let smoother = Smoother::of(&carrier.plant, &sampled.delayed, self.levels.sensor_rms, &self.means[0]);
-        self.trajectories = self.means.iter().map(|r| smoother.smooth(r, &sampled.delayed, spindle_hz)).collect();
+        self.smooth(&carrier, &sampled, &self.means.clone(), &vec![Vec::new(); self.means.len()]);
         let speeds = self.trajectories.iter().flat_map(|t| t.samples.iter().map(|s| s.v.abs()));
         self.scene.speed = speeds.fold(0.0f64, f64::max).max(1e-12);
         Ok(())
     }
 
-    /// Takes what the sensor adds out of the motion: the laws act on where the arm is, not on what the encoder says.
-    pub fn correct(&mut self, chosen: &[Chosen]) {
-        let carrier = self.form.carrier(&self.p);
+    /// The motion behind each mean run, with a known torque beside the carrier.
+    fn smooth(&mut self, carrier: &Carrier, sampled: &Sampled, means: &[Run], known: &[Vec<f64>]) {
+        let spindle_hz = self.scene.spindle_hz.unwrap_or(0.0);
+        let noise = self.levels.sensor_rms;
+        let smoother = Smoother::of(&carrier.plant, &sampled.delayed, noise, means, known);
+        self.trajectories =
+            means.iter().zip(known).map(|(r, w)| smoother.smooth(r, w, &sampled.delayed, spindle_hz)).collect();
+    }
+
+    /// The motion anew for a model that was found: what the sensor adds is taken out of the position, because laws act on where
+    /// the arm is and not on what the encoder says; and the torques of the model help the smoother.
+    pub fn correct(&mut self, p: &[f64], chosen: &[Chosen]) {
+        let carrier = self.form.carrier(p);
         let Ok(sampled) = Sampled::of(&carrier.plant, self.scene.sample_time_s) else { return };
         let mut means = self.means.clone();
+        let mut known: Vec<Vec<f64>> = Vec::with_capacity(means.len());
         for (i, run) in means.iter_mut().enumerate() {
+            let motion = &self.trajectories[i];
+            let mut torque: Vec<f64> =
+                motion.samples.iter().map(|s| carrier.spring * s.x + carrier.damper * s.v).collect();
             for c in chosen {
                 let facts = c.effect.facts();
-                if facts.entry != Entry::Position || !matches!(facts.port, Port::Sensor | Port::Disk) {
+                let sensed = facts.entry == Entry::Position && matches!(facts.port, Port::Sensor | Port::Disk);
+                if !sensed && facts.entry != Entry::Torque {
                     continue;
                 }
-                let raw = raw_columns(c.effect, &c.setting.inner, &self.scene, &self.trajectories[i]);
-                let own =
-                    if facts.per_record { &c.setting.strengths[i * facts.columns..] } else { &c.setting.strengths[..] };
+                let raw = raw_columns(c.effect, &c.setting.inner, &self.scene, motion);
+                let own = match facts.per_record {
+                    true => c.setting.strengths.get(i * facts.columns..).unwrap_or(&[]),
+                    false => &c.setting.strengths[..],
+                };
                 for (column, s) in raw.iter().zip(own) {
-                    run.position.iter_mut().zip(column).for_each(|(y, v)| *y -= s * v);
+                    if sensed {
+                        run.position.iter_mut().zip(column).for_each(|(y, v)| *y -= s * v);
+                    } else {
+                        torque.iter_mut().zip(column).for_each(|(w, v)| *w += s * v);
+                    }
                 }
             }
+            known.push(torque);
         }
-        let spindle_hz = self.scene.spindle_hz.unwrap_or(0.0);
-        let smoother = Smoother::of(&carrier.plant, &sampled.delayed, self.levels.sensor_rms, &means[0]);
-        self.trajectories = means.iter().map(|r| smoother.smooth(r, &sampled.delayed, spindle_hz)).collect();
+        self.smooth(&carrier, &sampled, &means, &known);
     }
 
     /// Without repeats there is only what the model leaves: the error of the carrier along the recorded motion, which holds

@@ -319,7 +319,10 @@ fn fit_report(
         simulation: if closed.is_some() { Simulation::ClosedLoop } else { Simulation::OpenLoop },
         holdout: of_role(&chosen, Role::Holdout),
         fit: of_role(&chosen, Role::Fit).unwrap_or(zero),
-        open_loop: of_role(&open, Role::Holdout).or_else(|| of_role(&open, Role::Fit)),
+        // A loop can hold a model that runs away on its own; its open-loop figures then say nothing.
+        open_loop: of_role(&open, Role::Holdout)
+            .or_else(|| of_role(&open, Role::Fit))
+            .filter(|f| f.rms_after.is_finite() && f.rms_after < 10.0 * f.rms_before),
         records,
     };
     (report, chosen)

@@ -108,6 +108,9 @@ pub fn select(
     };
     progress("refit of the linear parameters");
     let mut baseline = fitted(bench, vec![], &zero, settings.iterations);
+    // A refit moves the motion that it was made along; once more, from there.
+    bench.correct(&baseline.refitted.p, &[]);
+    baseline = fitted(bench, vec![], &baseline.refitted.p, settings.iterations);
     let mut model = baseline.clone();
     let mut steps = Vec::new();
     let limit = settings.false_alarm.ln();
@@ -156,8 +159,9 @@ pub fn select(
         steps.push(step);
         match accepted {
             Some(next) => {
-                model = next;
-                bench.correct(&model.chosen);
+                bench.correct(&next.refitted.p, &next.chosen);
+                let again = fitted(bench, next.chosen.clone(), &next.refitted.p, settings.iterations);
+                model = again;
             }
             None => break,
         }

@@ -27,6 +27,13 @@ pub fn acting(plant: &DiscretePlant, input: &[f64]) -> Vec<f64> {
     (0..input.len()).map(|k| share * at(k, whole + 1) + (1.0 - share) * at(k, whole)).collect()
 }
 
+/// The acting command and a torque that is known beside it.
+fn pushed(sampled: &DiscretePlant, run: &Run, known: &[f64]) -> Vec<f64> {
+    let mut i = acting(sampled, &run.input);
+    i.iter_mut().zip(known).for_each(|(i, w)| *i += w);
+    i
+}
+
 /// The smoother of one machine.
 #[derive(Clone, Debug)]
 pub struct Smoother {
@@ -43,16 +50,17 @@ struct Steady {
 }
 
 impl Smoother {
-    /// The smoother under which `run` is most likely; `sensor_rms` is the sensor's white noise.
-    pub fn of(plant: &Plant, sampled: &DiscretePlant, sensor_rms: f64, run: &Run) -> Smoother {
+    /// The smoother under which the runs are most likely; `sensor_rms` is the sensor's white noise and `known` a torque beyond
+    /// the plant, run by run.
+    pub fn of(plant: &Plant, sampled: &DiscretePlant, sensor_rms: f64, runs: &[Run], known: &[Vec<f64>]) -> Smoother {
         let t = sampled.sample_time_s();
         let (b, k, c) = body_numbers(&plant.body);
         let b = b * plant.resonance_gain;
         let f = Matrix3::new(0.0, 1.0, 0.0, -k, -c, b, 0.0, 0.0, 0.0);
         let step = (f * t).exp();
         let push = Vector3::new(step[(0, 2)], step[(1, 2)], 0.0);
-        let i = acting(sampled, &run.input);
-        let largest = run.input.iter().fold(0.0f64, |m, u| m.max(u.abs())).max(1e-12);
+        let pushes: Vec<Vec<f64>> = runs.iter().zip(known).map(|(r, w)| pushed(sampled, r, w)).collect();
+        let largest = runs.iter().flat_map(|r| &r.input).fold(0.0f64, |m, u| m.max(u.abs())).max(1e-12);
         let sensor = sensor_rms.powi(2).max(1e-24);
         let mut best: Option<(f64, Smoother)> = None;
         for j in 0..14 {
@@ -67,7 +75,7 @@ impl Smoother {
                 g[r] * g[s] * walk * walk
             });
             let smoother = Smoother { steady: steady(&step, &noise, sensor), step, push };
-            let cost = smoother.cost(&run.position, &i);
+            let cost = runs.iter().zip(&pushes).map(|(r, i)| smoother.cost(&r.position, i)).sum();
             if best.as_ref().is_none_or(|(c, _)| cost < *c) {
                 best = Some((cost, smoother));
             }
@@ -93,9 +101,10 @@ impl Smoother {
     }
 
     /// Smooths a run; `spindle_hz` stands in for a spindle index that was not recorded.
-    pub fn smooth(&self, run: &Run, sampled: &DiscretePlant, spindle_hz: f64) -> Trajectory {
+    pub fn smooth(&self, run: &Run, known: &[f64], sampled: &DiscretePlant, spindle_hz: f64) -> Trajectory {
         let (y, n, t) = (&run.position, run.len(), sampled.sample_time_s());
-        let i = acting(sampled, &run.input);
+        let acts = acting(sampled, &run.input);
+        let i = pushed(sampled, run, known);
         let s = &self.steady;
         let mut ahead = Vec::with_capacity(n);
         let mut after = Vec::with_capacity(n);
@@ -118,7 +127,7 @@ impl Smoother {
                 x: after[k][0],
                 v: after[k][1],
                 u: run.input[k],
-                i: i[k],
+                i: acts[k],
                 spindle_rad: run
                     .spindle_rad
                     .as_ref()
