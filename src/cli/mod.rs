@@ -9,6 +9,7 @@ mod failure;
 mod identify;
 mod load;
 mod margins;
+mod physics;
 mod response;
 mod screen;
 mod simulate;
