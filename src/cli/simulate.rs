@@ -60,6 +60,9 @@ pub(super) fn run(a: &SimulateArguments, screen: &mut Screen) -> Result<Ending, 
         }
         None => text += "The closed loop is UNSTABLE: a PES has no figures. See `servotune margins`.\n",
     }
+    if let Some(physics) = &physics {
+        text += &format!("\nSimulated with: {}.\n", physics.names().join(", "));
+    }
     if run.limited {
         screen.say("note: the command reached output_limit; the loop was not linear during the write");
     }

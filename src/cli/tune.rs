@@ -38,6 +38,13 @@ struct Physics<'a> {
     after: &'a crate::tune::PhysicalProof,
 }
 
+/// What a tuning came to, for its page.
+struct Reached<'a> {
+    outcome: &'a Outcome,
+    table: &'a GainTable,
+    physics: Option<(&'a Restored, &'a PhysicalTuning)>,
+}
+
 /// What is tuned, as files gave it.
 enum Given {
     Model(Box<Plant>, Option<Box<Restored>>),
@@ -127,7 +134,8 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     }
     if let Some(file) = &a.report {
         let physics = with.as_ref().map(|(p, t)| (p.as_ref(), t));
-        let page = report(a, &given, &spec, start.as_ref(), &settings, &outcome, &table, physics)?;
+        let reached = Reached { outcome: &outcome, table: &table, physics };
+        let page = report(a, &given, &spec, start.as_ref(), &settings, &reached)?;
         write_text(file, &page)?;
         screen.say(&format!("wrote {}", file.display()));
     }
@@ -196,10 +204,9 @@ fn report(
     spec: &Spec,
     start: Option<&crate::controller::Controller>,
     settings: &TuneSettings,
-    outcome: &Outcome,
-    table: &GainTable,
-    physics: Option<(&Restored, &PhysicalTuning)>,
+    reached: &Reached<'_>,
 ) -> Result<String, Failure> {
+    let Reached { outcome, table, physics } = *reached;
     let (plant, sweep, identified, over_model) = match given {
         Given::Model(plant, _) => (plant.as_ref(), None, None, None),
         Given::Response { sweep, hold, identified } => {

@@ -167,7 +167,7 @@ impl<'a> Described<'a> {
         (torque, acting)
     }
 
-    /// 1 - P N: what the feedback through the torque effects makes of the plant.
+    /// -P N: the loop from the position through the torque effects and back.
     fn inner(&self, w: f64) -> Complex<f64> {
         -self.plant.direct.at(w) * self.balance(w).0 / self.amplitude
     }
