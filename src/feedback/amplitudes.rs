@@ -95,8 +95,9 @@ pub fn described_margins(
 ) -> Result<DescribedMargins, FeedbackError> {
     let judge = |a: f64| -> Result<(AmplitudeRow, Margins), FeedbackError> {
         let at = plant.at_amplitude(a);
+        let command = at.command();
         let m = margins(&DescribedLoop::new(at, sections)?);
-        Ok((row(a, at.command(), &m), m))
+        Ok((row(a, command, &m), m))
     };
     let list = if plant.bends() { amplitudes.list() } else { vec![amplitudes.high] };
     let judged = list.iter().map(|&a| judge(a)).collect::<Result<Vec<_>, _>>()?;
@@ -121,8 +122,9 @@ pub fn described_margins(
             limit_cycles.push(LimitCycle { amplitude: at.amplitude, hz, sustained: !a.stable });
         }
     }
-    let mut worst = small_signal.1.clone();
-    for (_, m) in &judged {
+    // The small-signal end is shown, not counted: it lies outside the range that was asked for.
+    let mut worst = judged.first().map_or_else(|| small_signal.1.clone(), |(_, m)| m.clone());
+    for (_, m) in judged.iter().skip(1) {
         take_worse(&mut worst, m);
     }
     let large_signal = judged.last().map_or(small_signal.0, |(r, _)| *r);

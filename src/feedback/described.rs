@@ -87,15 +87,29 @@ impl<'a> DescribedPlant<'a> {
 
     /// The response at a position amplitude (position_unit, above 0).
     pub fn at_amplitude(&'a self, amplitude: f64) -> Described<'a> {
-        Described { plant: self, amplitude, command: Command::AtCrossover }
+        self.described(amplitude, amplitude / self.size)
     }
 
-    fn sum(&self, entry: Entry, w: f64, motion: &Motion, input: Complex<f64>) -> Complex<f64> {
-        let each = |p: &Part<'_>| match p.effect.share(p.setting, self.scene, w) {
-            Share::Ratio(r) => r * input,
-            _ => self.cycle.added(p.effect, p.setting, self.scene, motion),
+    fn described(&'a self, amplitude: f64, command: f64) -> Described<'a> {
+        let steady = self.parts.iter().map(|p| self.steady(p, amplitude, command)).collect();
+        Described { plant: self, amplitude, command, steady }
+    }
+
+    /// What an effect adds where neither the frequency nor the acting command matters, as for most friction and springs:
+    /// one cycle then serves the whole curve.
+    fn steady(&self, p: &Part<'_>, amplitude: f64, command: f64) -> Option<Complex<f64>> {
+        if p.linear {
+            return None;
+        }
+        let added = |w_rad_s: f64, acting: f64| {
+            let acting = Complex::new(acting, 0.0);
+            let motion = Motion { w_rad_s, position: amplitude, acting, command };
+            self.cycle.added(p.effect, p.setting, self.scene, &motion)
         };
-        self.parts.iter().filter(|p| p.entry == entry).map(each).sum()
+        let first = added(PROBES[0], 0.0);
+        let same = |other: Complex<f64>| (other - first).norm() <= SAME * first.norm();
+        (same(added(PROBES[1], 0.0)) && same(added(PROBES[0], command)) && same(added(PROBES[2], -command)))
+            .then_some(first)
     }
 
     fn has(&self, entry: Entry) -> bool {
@@ -103,21 +117,18 @@ impl<'a> DescribedPlant<'a> {
     }
 }
 
-/// The amplitude of the command that effects of the amplifier are described at.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Command {
-    /// A/|P| at the crossover, for all frequencies: the curve of one describing function is one gain.
-    AtCrossover,
-    /// This one (command_unit).
-    Fixed(f64),
-}
+/// Frequencies (rad/s) at which an effect that is the same at all of them is steady, and how much the same.
+const PROBES: [f64; 3] = [7.0, 130.0, 11_000.0];
+const SAME: f64 = 1e-12;
 
 /// A plant at one amplitude.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Described<'a> {
     plant: &'a DescribedPlant<'a>,
     amplitude: f64,
-    command: Command,
+    command: f64,
+    /// For each part what it adds, where that is the same at every frequency.
+    steady: Vec<Option<Complex<f64>>>,
 }
 
 /// Rounds of the balance where a torque depends on the command; each shrinks the rest by the share of that torque.
@@ -130,7 +141,7 @@ const LEAST: f64 = 1e-9;
 impl<'a> Described<'a> {
     /// The same with the command's amplitude given (command_unit).
     pub fn with_command(self, amplitude: f64) -> Described<'a> {
-        Described { command: Command::Fixed(amplitude), ..self }
+        self.plant.described(self.amplitude, amplitude)
     }
 
     /// Amplitude of the position (position_unit).
@@ -140,10 +151,18 @@ impl<'a> Described<'a> {
 
     /// Amplitude of the command that effects of the amplifier are described at (command_unit).
     pub fn command(&self) -> f64 {
-        match self.command {
-            Command::AtCrossover => self.amplitude / self.plant.size,
-            Command::Fixed(u) => u,
-        }
+        self.command
+    }
+
+    fn sum(&self, entry: Entry, w: f64, motion: &Motion, input: Complex<f64>) -> Complex<f64> {
+        let p = self.plant;
+        let each = |(part, steady): (&Part<'_>, &Option<Complex<f64>>)| {
+            steady.unwrap_or_else(|| match part.effect.share(part.setting, p.scene, w) {
+                Share::Ratio(r) => r * input,
+                _ => p.cycle.added(part.effect, part.setting, p.scene, motion),
+            })
+        };
+        p.parts.iter().zip(&self.steady).filter(|(part, _)| part.entry == entry).map(each).sum()
     }
 
     /// The torque effects over the cycle, and the acting command that balances them (command_unit, against the position).
@@ -156,7 +175,7 @@ impl<'a> Described<'a> {
         let (mut acting, mut torque) = (free, Complex::new(f64::NAN, 0.0));
         for _ in 0..ROUNDS {
             let motion = Motion { w_rad_s: w, position: self.amplitude, acting, command: 0.0 };
-            let next = p.sum(Entry::Torque, w, &motion, acting);
+            let next = self.sum(Entry::Torque, w, &motion, acting);
             let settled = (next - torque).norm() <= BALANCED * free.norm().max(next.norm());
             torque = next;
             acting = free - torque;
@@ -186,7 +205,7 @@ impl FrequencyResponse for Described<'_> {
         let gain = if p.has(Entry::Command) {
             let u = Complex::new(command, 0.0);
             let motion = Motion { w_rad_s: w, position: 0.0, acting: u, command };
-            1.0 + p.sum(Entry::Command, w, &motion, u) / command
+            1.0 + self.sum(Entry::Command, w, &motion, u) / command
         } else {
             Complex::new(1.0, 0.0)
         };
@@ -194,7 +213,7 @@ impl FrequencyResponse for Described<'_> {
         let mut y = x;
         if p.has(Entry::Position) {
             let motion = Motion { w_rad_s: w, position: self.amplitude, acting, command: 0.0 };
-            y += p.sum(Entry::Position, w, &motion, x);
+            y += self.sum(Entry::Position, w, &motion, x);
         }
         if let Some(rings) = &p.rings {
             y += rings.at(w) * behind;
@@ -245,7 +264,7 @@ impl OpenLoop for DescribedLoop<'_> {
     }
 
     fn unstable_poles(&self) -> usize {
-        let inner = Inner { plant: self.plant, sections: self.sections };
+        let inner = Inner { plant: self.plant.clone(), sections: self.sections };
         let own = if self.plant.plant.has(Entry::Torque) {
             nyquist_count(&inner, &Trace::of(&inner)).unstable_closed_loop_poles.max(0) as usize
         } else {

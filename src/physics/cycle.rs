@@ -14,7 +14,7 @@ const STEPS: usize = 512;
 /// Most cycles: what has not settled by then is memory far slower than the cycle, and as good as constant over it.
 const CYCLES: usize = 48;
 /// Change from cycle to cycle that counts as settled, relative.
-const SETTLED: f64 = 1e-9;
+const SETTLED: f64 = 1e-7;
 
 /// A sine, its table made once.
 #[derive(Clone, Debug)]

@@ -100,7 +100,7 @@ pub fn judge_physical(
 fn farthest_crossover(m: &DescribedMargins, band: Option<[f64; 2]>) -> Option<f64> {
     let Some([from, to]) = band else { return m.worst.gain_crossover_hz };
     let off = |hz: f64| (from / hz).max(hz / to);
-    let all = m.by_amplitude.iter().chain([&m.small_signal]).filter_map(|r| r.gain_crossover_hz);
+    let all = m.by_amplitude.iter().filter_map(|r| r.gain_crossover_hz);
     all.max_by(|a, b| off(*a).total_cmp(&off(*b)))
 }
 
