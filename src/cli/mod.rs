@@ -14,6 +14,7 @@ mod gate_arguments;
 mod identify;
 mod load;
 mod margins;
+mod physics;
 mod response;
 mod screen;
 mod simulate;

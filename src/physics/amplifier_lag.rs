@@ -4,6 +4,8 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene, logarithmic};
+use super::share::Share;
+use nalgebra::Complex;
 use std::f64::consts::TAU;
 
 /// Inner: the time constant.
@@ -68,6 +70,14 @@ impl Effect for AmplifierLag {
             Parameter::new("time_constant_s", setting.inner[0], Unit::Second),
             Parameter::new("bandwidth_hz", 1.0 / (TAU * setting.inner[0]), Unit::Hertz),
         ]
+    }
+
+    fn share(&self, setting: &Setting, scene: &Scene, w_rad_s: f64) -> Share {
+        let ratio = scene.sample_time_s / setting.inner[0];
+        let keep = (-ratio).exp();
+        // Current over command at the samples, then the mean over the interval.
+        let arrived = (1.0 - keep) / (Complex::from_polar(1.0, w_rad_s * scene.sample_time_s) - keep);
+        Share::Ratio((arrived - 1.0) * -(-ratio).exp_m1() / ratio)
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {

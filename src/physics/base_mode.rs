@@ -4,7 +4,8 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::Scene;
-use super::unmodelled_resonance::{Ringing, scan};
+use super::share::Share;
+use super::unmodelled_resonance::{Ringing, scan, term};
 
 /// Inner: frequency (Hz), damping ratio. Strength: the base's displacement per constant command.
 pub struct BaseMode;
@@ -43,6 +44,10 @@ impl Effect for BaseMode {
             Parameter::new("damping_ratio", setting.inner[1], Unit::Ratio),
             Parameter::new("static_gain", setting.strengths[0], Unit::PositionPerCommand),
         ]
+    }
+
+    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Terms(vec![term(setting.inner[0], setting.inner[1], setting.strengths[0], 0.0)])
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {

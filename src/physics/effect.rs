@@ -4,6 +4,7 @@
 //! law turns the motion into columns; strengths times columns, summed, enter the loop at one place ([`Entry`]).
 
 use super::sample::{Sample, Scene};
+use super::share::Share;
 use std::collections::BTreeMap;
 use thiserror::Error;
 
@@ -184,6 +185,9 @@ pub enum PhysicsError {
     /// A parameter has no meaning here.
     #[error("effect `{effect}`: parameter `{parameter}` is unknown; expected {expected}")]
     Parameter { effect: String, parameter: String, expected: String },
+    /// A parameter is no number.
+    #[error("effect `{effect}`: {parameter} = {found}; expected a finite number")]
+    Finite { effect: &'static str, parameter: String, found: f64 },
     /// A parameter is out of its range.
     #[error("effect `{effect}`: {parameter} = {found}; expected {expected}")]
     Range { effect: &'static str, parameter: &'static str, found: f64, expected: &'static str },
@@ -262,6 +266,11 @@ pub trait Effect: Sync {
 
     /// The parameters as reports name them.
     fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter>;
+
+    /// Its part in the loop's response at `w_rad_s`, sampled as the law samples it.
+    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Cycle
+    }
 
     /// The setting from named parameters; the inverse of [`Effect::parameters`].
     fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError>;

@@ -4,6 +4,7 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene};
+use super::share::Share;
 
 /// Inner: the delay.
 pub struct ExtraDelay;
@@ -89,6 +90,10 @@ impl Effect for ExtraDelay {
 
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         vec![Parameter::new("delay_s", setting.inner[0], Unit::Second)]
+    }
+
+    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Delay(setting.inner[0])
     }
 
     fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {

@@ -5,6 +5,8 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene, logarithmic};
+use super::share::Share;
+use nalgebra::Complex;
 
 /// Inner: thermal time constant (0: by the recorded temperature). Strength: final change, or change per degree.
 pub struct GainDrift;
@@ -65,6 +67,11 @@ impl Effect for GainDrift {
         } else {
             vec![Parameter::new("gain_per_degree", setting.strengths[0], Unit::PerDegreeCelsius)]
         }
+    }
+
+    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        // Fully warm: the machine after a long session. With a recorded temperature the cold machine.
+        Share::Ratio(Complex::new(if setting.inner[0] > 0.0 { setting.strengths[0] } else { 0.0 }, 0.0))
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {

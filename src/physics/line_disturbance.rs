@@ -4,6 +4,7 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene};
+use super::share::Share;
 use std::f64::consts::{PI, TAU};
 
 /// Inner: frequency (Hz). Strengths: cosine and sine, per record.
@@ -71,6 +72,10 @@ impl Effect for LineDisturbance {
             Parameter::new("amplitude_command", a.hypot(b), Unit::Command),
             Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
         ]
+    }
+
+    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Outside
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {

@@ -3,13 +3,15 @@
 //! A torque depends on the motion that it causes: each step solves w = law(x + g w) for the mean torque w over the sample, by
 //! fixed-point steps and, where a stiff contact makes those crawl, by a bracketed secant. Second order in the sample time.
 
-use super::effect::{COLUMNS, Effect, Entry, Law, Setting};
+use super::effect::{COLUMNS, Effect, Entry, Law, Port, Setting};
 use super::sample::{Sample, Scene};
-use crate::lti::{DiscretePlant, LtiError, Plant, PlantState};
+use crate::lti::{DiscretePlant, Intersample, LtiError, Plant, PlantState};
 
 struct Part {
     law: Box<dyn Law>,
     strengths: Vec<f64>,
+    /// Whether the head moves by it: what the sensor alone adds, the head does not see.
+    head: bool,
 }
 
 impl Part {
@@ -29,6 +31,10 @@ pub struct Machine {
     pushed: PlantState,
     torqued: PlantState,
     trial: PlantState,
+    /// Both as they were when the last command was taken, for instants before the next sample.
+    held: [PlantState; 2],
+    /// What the position effects add at the head at this sample.
+    offset: f64,
     /// Position that a unit torque adds within one sample.
     reach: f64,
     command: Vec<Part>,
@@ -68,7 +74,11 @@ impl Machine {
         unit.advance(&direct);
         let (mut command, mut torque, mut position) = (Vec::new(), Vec::new(), Vec::new());
         for (effect, setting) in effects {
-            let part = Part { law: effect.law(&setting.inner, scene), strengths: setting.strengths.clone() };
+            let part = Part {
+                law: effect.law(&setting.inner, scene),
+                strengths: setting.strengths.clone(),
+                head: effect.facts().port != Port::Sensor,
+            };
             match effect.facts().entry {
                 Entry::Command => command.push(part),
                 Entry::Torque => torque.push(part),
@@ -79,6 +89,8 @@ impl Machine {
         Ok(Machine {
             reach: unit.position(),
             trial: torqued.clone(),
+            held: [pushed.clone(), torqued.clone()],
+            offset: 0.0,
             delayed,
             direct,
             pushed,
@@ -105,11 +117,31 @@ impl Machine {
         let v = (3.0 * self.x[0] - 4.0 * self.x[1] + self.x[2]) / (2.0 * t);
         self.now = Sample { t: self.k as f64 * t, x, v, u: self.last.u, i: self.last.i, spindle_rad, temperature };
         let mut y = x;
+        self.offset = 0.0;
         for part in &mut self.position {
-            y += part.value(&self.last, &self.now);
+            let added = part.value(&self.last, &self.now);
+            y += added;
+            self.offset += if part.head { added } else { 0.0 };
             part.law.commit(&self.last, &self.now);
         }
         y
+    }
+
+    /// What the position effects add at the head at the sample last measured: everything but the sensor's own errors.
+    pub fn head_offset(&self) -> f64 {
+        self.offset
+    }
+
+    /// The plant as the command meets it, and without its delay, as a torque does: what [`Machine::between`] is read with.
+    pub fn plants(&self) -> [&DiscretePlant; 2] {
+        [&self.delayed, &self.direct]
+    }
+
+    /// Position of the arm between the last sample and the next, after [`Machine::command`]; readings of [`Machine::plants`].
+    ///
+    /// Exact for the command. The torque is taken at its mean over the interval: second order in the sample time.
+    pub fn between(&self, at: [&Intersample; 2]) -> f64 {
+        self.held[0].between(at[0]) + self.held[1].between(at[1])
     }
 
     /// Takes the command of this sample (controller plus excitation) and moves on to the next.
@@ -126,11 +158,13 @@ impl Machine {
         let share = self.delayed.fractional_delay_s() / self.delayed.sample_time_s();
         self.now.i = share * self.history[0] + (1.0 - share) * self.history[1];
         self.pushed.command(acting);
+        self.held[0].clone_from(&self.pushed);
         self.pushed.advance(&self.delayed);
         if !self.torque.is_empty() {
             self.w = self.solve();
         }
         self.torqued.command(self.w);
+        self.held[1].clone_from(&self.torqued);
         self.torqued.advance(&self.direct);
         if !self.torque.is_empty() {
             let to = self.ahead(self.origin + self.pushed.position() + self.torqued.position());

@@ -3,13 +3,16 @@
 //! In: the motion, sample by sample. Out: columns that enter the loop at the command, at the torque or at the position.
 //! Convention: a torque is counted in command units, positive in the direction of motion. Spec: `specs/mismatch.md`.
 
+mod cycle;
 mod describing;
 mod effect;
 mod library;
 mod machine;
 mod oscillator;
 mod pair;
+mod restored;
 mod sample;
+mod share;
 
 pub mod aerodynamic_drag;
 pub mod aliased_mode;
@@ -50,8 +53,11 @@ pub mod torque_ripple;
 pub mod unexplained;
 pub mod unmodelled_resonance;
 
+pub use cycle::{Cycle, Motion};
 pub use describing::describing;
 pub use effect::{COLUMNS, Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 pub use library::{data_facts, effect, facts, library};
 pub use machine::Machine;
+pub use restored::{Context, Restored};
 pub use sample::{Sample, Scene, logarithmic};
+pub use share::Share;

@@ -4,6 +4,7 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene};
+use super::share::Share;
 
 /// Strengths: slope and curvature, per record.
 pub struct OffsetDrift;
@@ -49,6 +50,10 @@ impl Effect for OffsetDrift {
             Parameter::new("slope", setting.strengths[0], Unit::CommandPerSecond),
             Parameter::new("curvature", setting.strengths[1], Unit::CommandPerSecondSquared),
         ]
+    }
+
+    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Outside
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {

@@ -4,6 +4,7 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene};
+use super::share::Share;
 use std::f64::consts::{PI, TAU};
 
 /// Inner: frequency (Hz), order of the spindle (0: time). Strengths: of i cos and i sin.
@@ -78,6 +79,10 @@ impl Effect for ParametricGain {
             Parameter::new("spindle_order", setting.inner[1], Unit::Ratio),
             Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
         ]
+    }
+
+    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Outside
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {

@@ -5,6 +5,7 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene};
+use super::share::Share;
 use std::f64::consts::TAU;
 
 /// Inner: the base frequency (Hz). Strengths: cosine and sine of three harmonics.
@@ -67,6 +68,10 @@ impl Effect for RepeatableRunout {
             all.push(Parameter::new(PHASES[h], (-pair[1]).atan2(pair[0]).to_degrees(), Unit::Degree));
         }
         all
+    }
+
+    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Outside
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {

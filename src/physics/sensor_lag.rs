@@ -4,6 +4,8 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene, logarithmic};
+use super::share::Share;
+use nalgebra::Complex;
 use std::f64::consts::TAU;
 
 /// Inner: the time constant.
@@ -70,6 +72,13 @@ impl Effect for SensorLag {
             Parameter::new("time_constant_s", setting.inner[0], Unit::Second),
             Parameter::new("bandwidth_hz", 1.0 / (TAU * setting.inner[0]), Unit::Hertz),
         ]
+    }
+
+    fn share(&self, setting: &Setting, scene: &Scene, w_rad_s: f64) -> Share {
+        let (step, tau) = (scene.sample_time_s, setting.inner[0]);
+        let keep = (-step / tau).exp();
+        let z = Complex::from_polar(1.0, w_rad_s * step);
+        Share::Ratio((z - 1.0) / (z - keep) * (keep - 1.0) * tau / step)
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {

@@ -4,6 +4,7 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene, logarithmic};
+use super::share::Share;
 use std::f64::consts::PI;
 
 /// Inner: start, width. Strength: the peak, per record.
@@ -69,6 +70,10 @@ impl Effect for Shock {
             Parameter::new("time_s", setting.inner[0], Unit::Second),
             Parameter::new("width_s", setting.inner[1], Unit::Second),
         ]
+    }
+
+    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Outside
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {

@@ -6,6 +6,9 @@
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::oscillator::Oscillator;
 use super::sample::{Sample, Scene};
+use super::share::Share;
+use crate::lti::ModalTerm;
+use nalgebra::Complex;
 use std::f64::consts::TAU;
 
 /// Inner: frequency (Hz), damping ratio. Strengths: gains at rest and of the rate.
@@ -59,6 +62,14 @@ pub(super) fn scan(low: f64, high: f64, damping: f64, scene: &Scene) -> Vec<Vec<
     all
 }
 
+/// (a w² + b w s)/(s² + 2 z w s + w²) by its pole and residue.
+pub(super) fn term(hz: f64, damping: f64, a: f64, b: f64) -> ModalTerm {
+    let w = TAU * hz;
+    let turning = w * ((1.0 - damping) * (1.0 + damping)).sqrt();
+    let pole = Complex::new(-damping * w, turning);
+    ModalTerm { pole, residue: (pole * b * w + a * w * w) / Complex::new(0.0, 2.0 * turning) }
+}
+
 impl Effect for UnmodelledResonance {
     fn facts(&self) -> &'static Facts {
         &FACTS
@@ -82,6 +93,10 @@ impl Effect for UnmodelledResonance {
             Parameter::new("rate_gain", b, Unit::PositionPerCommand),
             Parameter::new("peak_gain", a.hypot(b) / (2.0 * setting.inner[1]), Unit::PositionPerCommand),
         ]
+    }
+
+    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Terms(vec![term(setting.inner[0], setting.inner[1], setting.strengths[0], setting.strengths[1])])
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
