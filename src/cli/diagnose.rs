@@ -48,7 +48,7 @@ fn case(a: &DiagnoseArguments) -> Result<Case, Failure> {
 
 pub(super) fn run(a: &DiagnoseArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     let case = case(a)?;
-    let plant = load::plant(&case.plant, "diagnose")?;
+    let plant = load::plant(&case.plant)?;
     let controller = case.controller.as_ref().map(|f| load::controller(f)).transpose()?;
     let made = diagnose(&case, &plant, controller.as_ref(), &DiagnoseSettings::default(), |m| {
         screen.say(&format!("{}: {m}", case.id))

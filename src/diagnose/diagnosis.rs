@@ -34,6 +34,9 @@ pub enum DiagnoseError {
         "sample time {controller_s} s in the controller, {records_s} s in the records: expected the same within 0.1 %"
     )]
     SampleTime { controller_s: f64, records_s: f64 },
+    /// The plant holds physics already.
+    #[error("the plant holds [[plant.physics]] effect \"{effect}\": a diagnosis starts from a linear plant; remove the table, and the effect is found again if it is there")]
+    Physics { effect: String },
     /// Nothing moves.
     #[error("record `{record}`: the command never changes; expected a record in which the machine is driven")]
     Still { record: String },
@@ -142,6 +145,9 @@ pub fn diagnose(
     {
         return Err(DiagnoseError::SampleTime { controller_s: c.sample_time_s, records_s: sample_time_s });
     }
+    if let Some(entry) = given.physics.first() {
+        return Err(DiagnoseError::Physics { effect: entry.effect.clone() });
+    }
     let mut all = runs(case);
     for run in &all {
         if run.input.iter().all(|u| *u == run.input[0]) {
@@ -152,8 +158,7 @@ pub fn diagnose(
     let sample_time_s = controller.map_or(sample_time_s, |c| c.sample_time_s);
     progress("checking the logs");
     let hygiene = check(case, &mut all, controller, sample_time_s)?;
-    let bare = Plant { physics: Vec::new(), ..given.clone() };
-    let mut bench = Bench::new(&bare, all, sample_time_s, case.spindle_hz)?;
+    let mut bench = Bench::new(given, all, sample_time_s, case.spindle_hz)?;
     // Records whose samples slipped hold nothing that a model could be fitted to.
     let selection = select(&mut bench, library(), &settings.select, &mut progress);
     progress("simulating all records");
@@ -163,7 +168,7 @@ pub fn diagnose(
         Some(c) if hygiene.closed => Some(Loop { controller: c, chain: c.sections()?.chain }),
         _ => None,
     };
-    let (figures, errors) = fit_report(&bench, &bare, &refitted, &fixed, closed.as_ref());
+    let (figures, errors) = fit_report(&bench, given, &refitted, &fixed, closed.as_ref());
     let sse = bench.stack.total as f64;
     let whitened = [selection.given / sse, selection.baseline.cost / sse, selection.model.cost / sse];
     let mut diagnosis = Diagnosis {
