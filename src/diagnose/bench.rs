@@ -157,12 +157,13 @@ impl Bench {
     pub fn correct(&mut self, p: &[f64], chosen: &[Chosen]) {
         let carrier = self.form.carrier(p);
         let Ok(sampled) = Sampled::of(&carrier.plant, self.scene.sample_time_s) else { return };
+        let arm = self.scene.arm_over_record();
         let mut means = self.means.clone();
         let mut known: Vec<Vec<f64>> = Vec::with_capacity(means.len());
         for (i, run) in means.iter_mut().enumerate() {
             let motion = &self.trajectories[i];
             let mut torque: Vec<f64> =
-                motion.samples.iter().map(|s| carrier.spring * s.x + carrier.damper * s.v).collect();
+                motion.samples.iter().map(|s| arm * (carrier.spring * s.x + carrier.damper * s.v)).collect();
             for c in chosen {
                 let facts = c.effect.facts();
                 let sensed = facts.entry == Entry::Position && matches!(facts.port, Port::Sensor | Port::Disk);

@@ -16,6 +16,7 @@ pub fn raw_columns(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectory
     let mut out = vec![vec![0.0; n]; facts.columns];
     let mut value = [0.0; COLUMNS];
     let samples = &trajectory.samples;
+    let by = if facts.entry == Entry::Torque { scene.arm_over_record() } else { 1.0 };
     let ahead = usize::from(facts.entry == Entry::Torque);
     for k in 0..n {
         // A torque's column belongs to the interval that starts at the sample, the others' to the sample itself.
@@ -24,8 +25,10 @@ pub fn raw_columns(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectory
         } else {
             (&samples[k.saturating_sub(1)], &samples[k])
         };
-        law.columns(from, to, &mut value[..facts.columns]);
-        law.commit(from, to);
+        // A torque acts on the arm itself, in front of the modes.
+        let (from, to) = (from.scaled(by), to.scaled(by));
+        law.columns(&from, &to, &mut value[..facts.columns]);
+        law.commit(&from, &to);
         for (column, v) in out.iter_mut().zip(&value) {
             column[k] = *v;
         }

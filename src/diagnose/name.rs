@@ -136,7 +136,7 @@ fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String
         moved.push(effect.parameters(&s, scene));
     }
     let (position, command) = (&bench.form.given.position_unit, &bench.form.given.command_unit);
-    let mut out: BTreeMap<String, Estimate> = base
+    let out: BTreeMap<String, Estimate> = base
         .iter()
         .enumerate()
         .map(|(k, p)| {
@@ -150,32 +150,7 @@ fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String
             (p.name.to_owned(), e)
         })
         .collect();
-    if effect.facts().name == "pivot_friction" {
-        effective_length(bench, selection, chosen.setting.inner[1], &mut out);
-    }
     out
-}
-
-/// The sliding length as a person means it: sliding level over the stiffness of small motions. Where the fit leaves the body a
-/// spring below zero, that spring belongs to the bearing's curve.
-fn effective_length(bench: &Bench, selection: &Selection, shape: f64, out: &mut BTreeMap<String, Estimate>) {
-    let carrier = bench.form.carrier(&selection.model.refitted.p);
-    let (b, k, _) = body_numbers(&carrier.plant.body);
-    let gain = b * bench.form.given.resonance_gain;
-    let rest = k / gain - carrier.spring;
-    let (Some(level), Some(length)) = (out.get("level_command").cloned(), out.get("sliding_length").cloned()) else {
-        return;
-    };
-    // First slope of each shape's loading curve, in levels per sliding length.
-    let slope = if (0.5..1.5).contains(&shape) { 2.0 } else { 1.0 };
-    let stiffness = slope * level.value / length.value + rest.min(0.0);
-    if stiffness > 0.0 && level.value > 0.0 {
-        let value = level.value / stiffness;
-        let share = (length.high - length.value).abs() / length.value + 0.02;
-        out.insert("law_length".into(), length.clone());
-        let e = Estimate { value, low: value * (1.0 - share), high: value * (1.0 + share), unit: length.unit };
-        out.insert("sliding_length".into(), e);
-    }
 }
 
 /// The position log is shifted.

@@ -117,7 +117,8 @@ pub fn simulation_error(
     let mut command = run.input.clone();
     let mut torque: Option<Vec<f64>> = (carrier.spring != 0.0 || carrier.damper != 0.0).then(|| {
         // The mean over each interval, by the trapezium.
-        let at = |s: &Sample| carrier.spring * s.x + carrier.damper * s.v;
+        let by = scene.arm_over_record();
+        let at = |s: &Sample| by * (carrier.spring * s.x + carrier.damper * s.v);
         let samples = &trajectory.samples;
         (0..run.len()).map(|k| 0.5 * (at(&samples[k]) + at(&samples[(k + 1).min(run.len() - 1)]))).collect()
     });

@@ -55,7 +55,9 @@ impl Smoother {
     pub fn of(plant: &Plant, sampled: &DiscretePlant, sensor_rms: f64, runs: &[Run], known: &[Vec<f64>]) -> Smoother {
         let t = sampled.sample_time_s();
         let (b, k, c) = body_numbers(&plant.body);
-        let b = b * plant.resonance_gain;
+        // The recorded position follows the arm through the modes' static gain.
+        let at_rest: f64 = plant.modes.iter().map(|m| (m.zero_rad_s / m.pole_rad_s).powi(2)).product();
+        let b = b * plant.resonance_gain * at_rest;
         let f = Matrix3::new(0.0, 1.0, 0.0, -k, -c, b, 0.0, 0.0, 0.0);
         let step = (f * t).exp();
         let push = Vector3::new(step[(0, 2)], step[(1, 2)], 0.0);

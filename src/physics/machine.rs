@@ -48,6 +48,8 @@ pub struct Machine {
     w: f64,
     k: usize,
     origin: f64,
+    /// The arm's own position over the recorded one.
+    arm: f64,
 }
 
 /// Fixed-point steps before the secant.
@@ -105,6 +107,7 @@ impl Machine {
             w: 0.0,
             k: 0,
             origin: 0.0,
+            arm: scene.arm_over_record(),
         })
     }
 
@@ -168,8 +171,9 @@ impl Machine {
         self.torqued.advance(&self.direct);
         if !self.torque.is_empty() {
             let to = self.ahead(self.origin + self.pushed.position() + self.torqued.position());
+            let (from, to) = (self.now.scaled(self.arm), to.scaled(self.arm));
             for part in &mut self.torque {
-                part.law.commit(&self.now, &to);
+                part.law.commit(&from, &to);
             }
         }
         self.last = self.now;
@@ -187,9 +191,10 @@ impl Machine {
         self.trial.command(0.0);
         self.trial.advance(&self.direct);
         let free = self.origin + self.pushed.position() + self.trial.position();
+        let from = self.now.scaled(self.arm);
         let law = |w: f64| {
-            let to = self.ahead(free + self.reach * w);
-            self.torque.iter().map(|p| p.value(&self.now, &to)).sum::<f64>()
+            let to = self.ahead(free + self.reach * w).scaled(self.arm);
+            self.torque.iter().map(|p| p.value(&from, &to)).sum::<f64>()
         };
         let mut w = self.w;
         for _ in 0..STEPS {

@@ -139,10 +139,7 @@ impl Effect for PivotFriction {
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        // Reports give the length that a person means beside the one of the law, where a spring below zero parts them.
-        let length =
-            if given.has("law_length") { given.positive("law_length")? } else { given.positive("sliding_length")? };
-        let inner = vec![length, given.or("shape", 0.0)];
+        let inner = vec![given.positive("sliding_length")?, given.or("shape", 0.0)];
         Ok(Setting { inner, strengths: vec![given.need("level_command")?] })
     }
 }

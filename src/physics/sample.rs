@@ -56,9 +56,23 @@ impl Scene {
         0.5 / self.sample_time_s
     }
 
+    /// The arm's own position over the recorded one, at rest: monic modes carry a static gain of their own, and what acts on the
+    /// arm (friction, springs, the torque factor) acts in front of them.
+    pub fn arm_over_record(&self) -> f64 {
+        let at_rest: f64 = self.plant.modes.iter().map(|m| (m.zero_rad_s / m.pole_rad_s).powi(2)).product();
+        if at_rest > 0.0 && at_rest.is_finite() { at_rest.recip() } else { 1.0 }
+    }
+
     /// Acceleration per command of the body, resonance gain included (position_unit/s² per command_unit).
     pub fn acceleration_gain(&self) -> f64 {
         self.plant.body.acceleration_gain() * self.plant.resonance_gain
+    }
+}
+
+impl Sample {
+    /// The same sample with the motion scaled: from the recorded position to the arm's own.
+    pub fn scaled(self, by: f64) -> Sample {
+        Sample { x: self.x * by, v: self.v * by, ..self }
     }
 }
 
