@@ -6,9 +6,11 @@
 mod arguments;
 mod classify;
 mod demo;
+mod demo_gate;
 mod failure;
 mod features;
 mod gate_arguments;
+mod gated;
 mod identify;
 mod load;
 mod margins;
@@ -20,6 +22,7 @@ mod study;
 mod sweep_arguments;
 mod train;
 mod tune;
+mod tune_machines;
 mod twin;
 
 use arguments::{Arguments, Command};

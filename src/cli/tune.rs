@@ -2,7 +2,7 @@
 
 use super::arguments::{ModelArguments, TuneArguments};
 use super::slot::{self, Slot};
-use super::{Ending, Failure, Screen, load};
+use super::{Ending, Failure, Screen, load, tune_machines};
 use crate::document::{read_text, sha256_hex, write_text};
 use crate::frf::Sweep;
 use crate::identify::{self, Identified, IdentifySettings, identify};
@@ -51,6 +51,9 @@ impl Given {
 }
 
 pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    if let (Some(machines), Some(gate)) = (&a.machines, &a.gate) {
+        return tune_machines::run(a, machines, gate, screen);
+    }
     let spec = Spec::read(&a.spec).map_err(crate::tune::TuneError::from)?;
     let spec_sha256 = sha256_hex(read_text(&a.spec)?.as_bytes());
     let mut inputs = Vec::new();
@@ -102,7 +105,7 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
 }
 
 /// Settings of the model that continues the sweep: a sweep with the hold in it has it divided out first.
-fn model_settings(a: &TuneArguments) -> IdentifySettings {
+pub(super) fn model_settings(a: &TuneArguments) -> IdentifySettings {
     let asked = a.model.settings();
     let hold = match (a.hold_included, asked.hold) {
         (true, identify::Hold::NotIncluded) => identify::Hold::Included { sample_time_s: a.sample_time_s },
