@@ -44,7 +44,8 @@ pub(super) fn run(
     let learned: Vec<RawMachine> = line(&settings)?.into_iter().map(|m| m.record).collect();
     let table = Table::parse(Path::new("the demo's line"), &features(&learned).csv(), Some("label"))?;
     // A small network learns this line as well as the paper's does, in a few seconds.
-    let small = TrainSettings { hidden: vec![64, 32], epochs: Some(80), learning_rate: 0.003, ..TrainSettings::default() };
+    let small =
+        TrainSettings { hidden: vec![64, 32], epochs: Some(80), learning_rate: 0.003, ..TrainSettings::default() };
     let trained = train(&table, &small)?;
     let gate_file = out.join("gate.json");
     trained.gate.write(&gate_file)?;

@@ -137,10 +137,7 @@ const GAINS: &str = "gains.toml";
 pub(super) const TABLE: &str = "machines.csv";
 
 /// Verdicts in the order of the machines, and the gate's columns that none of them has.
-fn judge(
-    gate: &Gate,
-    machines: &[crate::gate::features::RawMachine],
-) -> Result<(Vec<Verdict>, Vec<String>), Failure> {
+fn judge(gate: &Gate, machines: &[crate::gate::features::RawMachine]) -> Result<(Vec<Verdict>, Vec<String>), Failure> {
     let mut table = features(machines);
     let needed = gate.scale.features.iter().chain(&gate.novelty.features).map(String::as_str);
     let added = table.complete(needed);
