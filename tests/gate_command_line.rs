@@ -91,7 +91,11 @@ fn only_what_the_gate_calls_tunable_is_tuned_and_every_machine_has_its_row() {
         assert!(!row["why"].as_str().unwrap().is_empty());
         let asked = row["action"] == "tune" || id == "L0002";
         assert_eq!(asked, row["gains"].is_string(), "{row}");
-        assert_eq!(broken, row["error"].as_str().is_some_and(|e| e.contains("not there") || e.contains("oops")), "{row}");
+        assert_eq!(
+            broken,
+            row["error"].as_str().is_some_and(|e| e.contains("not there") || e.contains("oops")),
+            "{row}"
+        );
         let gains = dir.join("tuned").join(id).join("gains.toml");
         assert_eq!(asked, gains.exists());
         if asked {

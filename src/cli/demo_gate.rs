@@ -104,6 +104,7 @@ fn sheet(rows: &[Row], truth: &BTreeMap<String, String>, learned: &str) -> Resul
     };
     let of = |f: &dyn Fn(&Row) -> bool| rows.iter().filter(|r| f(r)).count();
     let repair = |r: &Row| r.action.repairs();
+    let reasons = rows.iter().map(|r| Block::Prose(format!("{}: {}.", r.id, r.why))).collect();
     let made: Vec<String> = truth.iter().map(|(id, class)| format!("{id} {class}")).collect();
     Ok(Page {
         title: "Machines at the gate".into(),
@@ -120,6 +121,7 @@ fn sheet(rows: &[Row], truth: &BTreeMap<String, String>, learned: &str) -> Resul
             blocks: vec![
                 Block::Table(gated::sheet(rows)?),
                 Block::Prose(gated::summary(rows)),
+                Block::Details("What decided, machine by machine".into(), reasons),
                 Block::Details("What they were made as".into(), vec![Block::Prose(made.join("; "))]),
             ],
         }],

@@ -240,7 +240,8 @@ pub(super) fn sheet(rows: &[Row]) -> Result<table::Table, Failure> {
         ],
     );
     for r in rows {
-        let mut why = r.why.clone();
+        // Which features decided stands in machines.csv; here the reason is enough.
+        let mut why = r.why.split("; decided by").next().unwrap_or_default().to_owned();
         if let Some(error) = &r.error {
             why = format!("{error}; {why}");
         }

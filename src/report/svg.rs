@@ -63,7 +63,8 @@ fn render(figure: &Figure, size: Size, id: &str, alone: bool) -> String {
         escape(&figure.caption)
     );
     if alone {
-        let _ = write!(svg, "<style>{STRUCTURE}{}</style>", LIGHT.rules());
+        // A screen narrower than the picture shows all of it, smaller.
+        let _ = write!(svg, "<style>svg.plot{{max-width:100%;height:auto}}{STRUCTURE}{}</style>", LIGHT.rules());
     }
     let _ = write!(svg, r#"<rect class="paper" width="{w}" height="{h}"/>"#);
     if let Some(title) = layout.title {
