@@ -2,9 +2,8 @@
 //!
 //! In: a [`ResponseView`] and its body. Out: [`Resonance`]s with frequency, damping, height and significance.
 //! Method: measured / body is smooth but for the pairs. In a window around a trial frequency a pair 1 + (a + j w b)/D(w),
-//! D = wp² - w² + 2 j zp wp w, is linear in a and b once a complex parabola in ln w has taken the rest away. The background that the pair
-//! multiplies is a parabola through logarithms, where a pole and its zero weigh alike. The trial that explains most is refined with each point
-//! weighed by its own size, as noise is relative, divided out, and the search starts again until nothing is explained that noise would not.
+//! D = wp² - w² + 2 j zp wp w, is linear in a and b once a complex parabola in ln w has taken the rest away. The trial that
+//! explains most is refined, divided out, and the search starts again until nothing is explained that noise would not.
 
 use super::body::BodyFit;
 use super::statistics::median;
@@ -40,11 +39,7 @@ const STEP: f64 = 0.02;
 const LEAST_STRENGTH: f64 = 20.0;
 /// Least swing from depth to height (dB): what is smaller moves no loop.
 const LEAST_SWING_DB: f64 = 0.4;
-/// Swing of a remnant between a pair's zero and pole, as a share of the pair's own: what a few per cent of error leave.
-const REMNANT: f64 = 0.25;
-/// As long as no more pairs than this are found, all are revised after each new one.
-const REVISED: usize = 6;
-/// Most pairs described.
+/// Most pairs looked for.
 const MOST: usize = 8;
 
 impl Resonance {
@@ -52,21 +47,6 @@ impl Resonance {
     fn at(&self, w: f64) -> Complex<f64> {
         let p = TAU * self.hz;
         1.0 + Complex::new(self.a, w * self.b) / Complex::new(p * p - w * w, 2.0 * self.damping * p * w)
-    }
-
-    /// Frequency of the zero (Hz).
-    fn zero_hz(&self) -> f64 {
-        let p = TAU * self.hz;
-        (p * p + self.a).max(0.0).sqrt() / TAU
-    }
-
-    /// Whether `other` is what dividing this pair out may leave: close to its pole, or small and between its zero and its pole.
-    fn leaves(&self, other: &Resonance) -> bool {
-        let near = 2.0 * self.damping.max(other.damping);
-        let zero = self.zero_hz();
-        let (low, high) = (zero.min(self.hz) * (-near).exp(), zero.max(self.hz) * near.exp());
-        let small = other.height_db - other.depth_db < REMNANT * (self.height_db - self.depth_db);
-        (self.hz / other.hz).ln().abs() <= near || (small && (low..=high).contains(&other.hz))
     }
 
     /// The pair with its height and depth, read over six of its widths either way.
@@ -79,16 +59,15 @@ impl Resonance {
     }
 }
 
-/// Points around a trial frequency, with an orthonormal basis of weighed parabolas in ln w.
+/// Points around a trial frequency, with an orthonormal basis of parabolas in ln w.
 struct Window {
     range: std::ops::Range<usize>,
     w: Vec<f64>,
-    weight: Vec<f64>,
     basis: [Vec<f64>; 3],
 }
 
 impl Window {
-    fn around(view: &ResponseView, hz: f64, weigh: impl Fn(f64) -> f64) -> Option<Window> {
+    fn around(view: &ResponseView, hz: f64) -> Option<Window> {
         let range = view.between(hz * (-WINDOW).exp(), hz * WINDOW.exp());
         // Six real numbers of background, two of the pair, and some to judge by; points on both sides of the trial.
         let sides = view.between(hz * (-WINDOW).exp(), hz).len().min(view.between(hz, hz * WINDOW.exp()).len());
@@ -96,10 +75,7 @@ impl Window {
             return None;
         }
         let x: Vec<f64> = view.ln_hz[range.clone()].iter().map(|l| (l - hz.ln()) / WINDOW).collect();
-        let w: Vec<f64> = view.hz[range.clone()].iter().map(|f| TAU * f).collect();
-        let weight: Vec<f64> = w.iter().map(|w| weigh(*w)).collect();
-        let of = |f: fn(f64) -> f64| x.iter().zip(&weight).map(|(x, c)| c * f(*x)).collect::<Vec<f64>>();
-        let mut basis = [of(|_| 1.0), of(|x| x), of(|x| x * x)];
+        let mut basis = [vec![1.0; x.len()], x.clone(), x.iter().map(|x| x * x).collect::<Vec<f64>>()];
         for i in 0..3 {
             for j in 0..i {
                 let share: f64 = basis[i].iter().zip(&basis[j]).map(|(a, b)| a * b).sum();
@@ -112,7 +88,8 @@ impl Window {
             }
             basis[i].iter_mut().for_each(|v| *v /= size);
         }
-        Some(Window { range, w, weight, basis })
+        let w = view.hz[range.clone()].iter().map(|f| TAU * f).collect();
+        Some(Window { range, w, basis })
     }
 
     /// Takes the background away from a column.
@@ -123,16 +100,16 @@ impl Window {
         }
     }
 
-    /// Measured over body, over the background that the pair multiplies, weighed and bare; `log` holds the logarithms that the
-    /// background is read from.
-    fn bare_relative(&self, ratio: &[Complex<f64>], log: &[Complex<f64>]) -> Vec<Complex<f64>> {
-        let mut rest: Vec<Complex<f64>> = log.iter().zip(&self.weight).map(|(l, c)| l * *c).collect();
+    /// The background of a column, at every point.
+    fn background(&self, column: &[Complex<f64>]) -> Vec<Complex<f64>> {
+        let mut rest = column.to_vec();
         self.bare(&mut rest);
-        let background = log.iter().zip(&rest).zip(&self.weight).map(|((l, r), c)| (l - r / *c).exp());
-        let here = ratio[self.range.clone()].iter().zip(&self.weight);
-        let mut y: Vec<Complex<f64>> = here.zip(background).map(|((r, c), b)| r / b * *c).collect();
-        self.bare(&mut y);
-        y
+        column.iter().zip(&rest).map(|(c, r)| c - r).collect()
+    }
+
+    /// Measured over body, over the background that the pair multiplies.
+    fn relative(&self, ratio: &[Complex<f64>], background: &[Complex<f64>]) -> Vec<Complex<f64>> {
+        ratio[self.range.clone()].iter().zip(background).map(|(r, b)| r / b).collect()
     }
 }
 
@@ -151,9 +128,8 @@ impl Trial {
     fn new(window: &Window, hz: f64, damping: f64) -> Option<Trial> {
         let p = TAU * hz;
         let shape = |w: f64| Complex::new(p * p - w * w, 2.0 * damping * p * w).inv();
-        let points = || window.w.iter().zip(&window.weight);
-        let mut first: Vec<Complex<f64>> = points().map(|(&w, c)| shape(w) * (p * p * c)).collect();
-        let mut second: Vec<Complex<f64>> = points().map(|(&w, c)| shape(w) * Complex::new(0.0, w * p * c)).collect();
+        let mut first: Vec<Complex<f64>> = window.w.iter().map(|&w| shape(w) * (p * p)).collect();
+        let mut second: Vec<Complex<f64>> = window.w.iter().map(|&w| shape(w) * Complex::new(0.0, w * p)).collect();
         window.bare(&mut first);
         window.bare(&mut second);
         let (aa, ab, bb) = (dot(&first, &first), dot(&first, &second), dot(&second, &second));
@@ -193,7 +169,7 @@ impl Comb {
     fn new(view: &ResponseView, hz: impl Iterator<Item = f64>) -> Comb {
         Comb(
             hz.filter_map(|hz| {
-                let window = Window::around(view, hz, |_| 1.0)?;
+                let window = Window::around(view, hz)?;
                 let trials = DAMPINGS.iter().filter_map(|d| Trial::new(&window, hz, *d)).collect();
                 Some((window, trials))
             })
@@ -204,9 +180,10 @@ impl Comb {
     /// The trial that explains most.
     fn best(&self, ratio: &[Complex<f64>], floor: f64) -> Option<Resonance> {
         let mut best: Option<Resonance> = None;
-        let log = logarithms(ratio);
         for (window, trials) in &self.0 {
-            let y = window.bare_relative(ratio, &log[window.range.clone()]);
+            let here = &ratio[window.range.clone()];
+            let mut y = window.relative(ratio, &window.background(here));
+            window.bare(&mut y);
             for trial in trials {
                 let pair = trial.pair(&y, floor);
                 if best.is_none_or(|b| pair.strength > b.strength) {
@@ -234,58 +211,21 @@ pub fn resonances(view: &ResponseView, body: &BodyFit) -> Vec<Resonance> {
     let mut found: Vec<Resonance> = Vec::new();
     for _ in 0..2 * MOST {
         let best = comb.best(&ratio, floor).and_then(|b| refined(view, &ratio, b, floor));
-        let Some(best) = best.filter(stands_out) else { break };
-        scale(&mut ratio, view, &best, false);
-        found.push(best);
-        if found.len() <= REVISED {
-            revise(view, &mut ratio, &mut found, floor);
+        let Some(best) = best.filter(|b| b.strength >= LEAST_STRENGTH && b.height_db.is_finite()) else { break };
+        for (r, f) in ratio.iter_mut().zip(&view.hz) {
+            *r /= best.at(TAU * f);
         }
-    }
-    revise(view, &mut ratio, &mut found, floor);
-    found.sort_by(|x, y| (y.height_db - y.depth_db).total_cmp(&(x.height_db - x.depth_db)));
-    let mut kept: Vec<Resonance> = Vec::new();
-    for pair in found {
         // What is left of a pair that is not quite of this shape is no pair of its own.
-        if pair.height_db - pair.depth_db >= LEAST_SWING_DB
-            && !kept.iter().any(|f| f.leaves(&pair))
-            && kept.len() < MOST
-        {
-            kept.push(pair);
+        let own = |f: &Resonance| (f.hz / best.hz).ln().abs() > 2.0 * f.damping.max(best.damping);
+        if best.height_db - best.depth_db >= LEAST_SWING_DB && found.iter().all(own) {
+            found.push(best);
+        }
+        if found.len() == MOST {
+            break;
         }
     }
-    kept.sort_by(|x, y| x.hz.total_cmp(&y.hz));
-    kept
-}
-
-fn stands_out(pair: &Resonance) -> bool {
-    pair.strength >= LEAST_STRENGTH && pair.height_db.is_finite() && pair.depth_db.is_finite()
-}
-
-/// Divides a pair out of the response, or puts it back.
-fn scale(ratio: &mut [Complex<f64>], view: &ResponseView, pair: &Resonance, back: bool) {
-    for (r, f) in ratio.iter_mut().zip(&view.hz) {
-        let at = pair.at(TAU * f);
-        *r = if back { *r * at } else { *r / at };
-    }
-}
-
-/// Each pair once more, with all others divided out: the first ones were found while the others still stood in the way, and what
-/// looked like a pair on the flank of a greater one goes.
-fn revise(view: &ResponseView, ratio: &mut [Complex<f64>], found: &mut Vec<Resonance>, floor: f64) {
-    let mut i = 0;
-    while i < found.len() {
-        scale(ratio, view, &found[i], true);
-        match refined(view, ratio, found[i], floor).filter(stands_out) {
-            Some(better) => {
-                scale(ratio, view, &better, false);
-                found[i] = better;
-                i += 1;
-            }
-            None => {
-                found.remove(i);
-            }
-        }
-    }
+    found.sort_by(|x, y| x.hz.total_cmp(&y.hz));
+    found
 }
 
 fn over_body(view: &ResponseView, body: &BodyFit) -> Vec<Complex<f64>> {
@@ -304,10 +244,11 @@ fn refined(view: &ResponseView, ratio: &[Complex<f64>], start: Resonance, floor:
     let mut best = start;
     for _ in 0..3 {
         // One window for all trials, so that their strengths compare; the background is that of the data less the pair.
-        let window = Window::around(view, best.hz, |w| 1.0 / best.at(w).norm().clamp(1e-3, 1e3))?;
+        let window = Window::around(view, best.hz)?;
         let less: Vec<Complex<f64>> =
             ratio[window.range.clone()].iter().zip(&window.w).map(|(r, w)| r / best.at(*w)).collect();
-        let y = window.bare_relative(ratio, &logarithms(&less));
+        let mut y = window.relative(ratio, &window.background(&less));
+        window.bare(&mut y);
         let pair = |hz: f64, damping: f64| Trial::new(&window, hz, damping).map(|t| t.pair(&y, floor));
         let loss = |hz: f64, damping: f64| pair(hz, damping).map_or(0.0, |p| -p.strength);
         let (hz, damping) = (best.hz, best.damping);
@@ -316,20 +257,6 @@ fn refined(view: &ResponseView, ratio: &[Complex<f64>], start: Resonance, floor:
         best = pair(hz, (damping * wide.exp()).clamp(1e-3, 0.3))?;
     }
     Some(best.sized())
-}
-
-/// Logarithms with the phase unwrapped.
-fn logarithms(values: &[Complex<f64>]) -> Vec<Complex<f64>> {
-    let mut turned = 0.0f64;
-    values
-        .iter()
-        .map(|v| {
-            let phase = v.arg();
-            // The turn nearest to the point before.
-            turned += phase - turned - TAU * ((phase - turned) / TAU).round();
-            Complex::new(v.norm().max(f64::MIN_POSITIVE).ln(), turned)
-        })
-        .collect()
 }
 
 /// Variance per real number of the relative noise, from second differences of neighbours: what is smooth drops out.
