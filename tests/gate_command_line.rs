@@ -42,7 +42,21 @@ fn gate_in(dir: &Path) {
     assert_eq!(ran.code, 0, "{}", ran.err);
     let ran = servotune(dir, &["features", "line", "--out", "features.csv", "--json"]);
     assert_eq!((ran.code, json(&ran)["machines"].as_u64()), (0, Some(56)), "{}", ran.err);
-    let small = ["--hidden", "16,8", "--epochs", "30", "--folds", "3", "--learning-rate", "0.003"];
+    // So dear an inspection that a small gate decides; the default would leave most of these machines to a person.
+    let costs = [
+        ("healthy", [0, 10, 10, 2]),
+        ("sensor_fault", [20, 0, 10, 50]),
+        ("loose_pushpin", [20, 10, 0, 50]),
+        ("tunable", [5, 10, 10, 0]),
+    ];
+    let table = |(class, [none, sensor, pushpin, tune]): (&str, [u32; 4])| {
+        format!(
+            "[{class}]\nnone = {none}.0\nrepair_sensor = {sensor}.0\nrepair_pushpin = {pushpin}.0\ntune = {tune}.0\ninspect = 30.0\n"
+        )
+    };
+    std::fs::write(dir.join("costs.toml"), costs.map(table).concat()).unwrap();
+    let small =
+        ["--costs", "costs.toml", "--hidden", "16,8", "--epochs", "30", "--folds", "3", "--learning-rate", "0.003"];
     let words = [&["train", "features.csv", "--label", "label", "--out", "gate.json", "--json"][..], &small].concat();
     let ran = servotune(dir, &words);
     assert_eq!(ran.code, 0, "{}", ran.err);
@@ -105,6 +119,8 @@ fn only_what_the_gate_calls_tunable_is_tuned_and_every_machine_has_its_row() {
             assert_eq!(id == "L0002", text.contains("gate_override = \"sensor replaced, record lost\""));
         }
     }
+    // Otherwise nothing was seen of the gate's own decision to tune.
+    assert!(found.iter().any(|r| r["action"] == "tune" && r["override"].is_null() && r["fate"] == "tuned"));
     let table = std::fs::read_to_string(dir.join("tuned/machines.csv")).unwrap();
     assert_eq!(table.lines().count(), 6);
     assert!(table.starts_with("id,class,class_name,probability,action,abstained,result,gains,override,error,why\n"));
