@@ -6,7 +6,7 @@
 
 use super::GateError;
 use super::attribution::{Decided, Direction, shares};
-use super::calibrate::Calibration;
+use super::calibrate::{Calibration, probabilities};
 use super::classes::{Action, Classes};
 use super::conformal::{Conformal, top};
 use super::costs::Costs;
@@ -123,12 +123,12 @@ impl Gate {
         Ok(Found { chosen, members, novelty, evidence: columns.iter().map(optional).collect::<Result<_, _>>()? })
     }
 
-    /// Probabilities by the published training's judge, and by that of each fold.
+    /// Logits by the published training's judge, and by that of each fold.
     fn ask(&self, found: &Found<'_>, row: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
         let one = |m: &Member, columns: &[&Column]| {
             let mut desk = Desk::new(&m.network.sizes, 1);
             let said = m.say(&m.scale.inputs(columns, &[row]), &mut desk);
-            said.first().map_or_else(Vec::new, |s| self.mix.probabilities(s))
+            said.first().map_or_else(Vec::new, |s| self.mix.logits(s))
         };
         let folds = self.members.iter().zip(&found.members).map(|(m, c)| one(m, c)).collect();
         (one(&self.main, &found.chosen), folds)
@@ -137,9 +137,10 @@ impl Gate {
     fn judge(&self, found: &Found<'_>, row: usize) -> Judged {
         let (main, mut all) = self.ask(found, row);
         let judges = if all.is_empty() { std::slice::from_ref(&main) } else { &all };
-        let mut set = self.conformal.set(judges);
+        let each: Vec<Vec<f64>> = judges.iter().map(|z| probabilities(z, 1.0)).collect();
+        let mut set = self.conformal.set(&each);
         all.push(main);
-        let p = mean(&all);
+        let p = probabilities(&mean(&all), 1.0);
         let class = top(&p);
         let runner_up =
             (0..p.len()).filter(|&k| k != class).fold(usize::from(class == 0), |b, k| if p[k] > p[b] { k } else { b });
@@ -161,8 +162,9 @@ impl Gate {
             set.push(class);
             set.sort_unstable();
         }
-        // A dispute matters where the action would cost more than an inspection, were the other class the truth.
-        if set.iter().any(|&k| self.costs.decide[k][class] > self.costs.inspect[k]) {
+        // A dispute matters where the action would cost more than an inspection, were the other class the truth. Sets of too few
+        // rows keep no promise; they are told and left to the costs.
+        if self.conformal.enough && set.iter().any(|&k| self.costs.decide[k][class] > self.costs.inspect[k]) {
             let possible = set.iter().map(|&k| name(k)).collect();
             doubts.push(Doubt::SeveralClasses { possible, coverage: self.conformal.coverage });
         }
@@ -207,7 +209,8 @@ impl Gate {
         let network = shares(&m.network, &from, &x, judged.class, judged.runner_up, &mut desk);
         let linear = m.linear.shares(&wide(&from), &wide(&x), judged.class, judged.runner_up);
         let w = self.mix.network_share;
-        let (n, l) = (w / (self.mix.network_temperature * m.unit), (1.0 - w) / self.mix.linear_temperature);
+        let t = self.mix.temperature;
+        let (n, l) = (w / (t * m.unit), (1.0 - w) / (t * self.mix.linear_unit));
         let share: Vec<f64> = network.iter().zip(&linear).map(|(a, b)| n * a + l * b).collect();
         let mut order: Vec<usize> = (0..share.len()).collect();
         order.sort_by(|&a, &b| share[b].abs().total_cmp(&share[a].abs()).then(a.cmp(&b)));

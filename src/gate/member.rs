@@ -1,14 +1,15 @@
 //! One judge of the gate: a network and a discriminant on the same features.
 //!
-//! In: a row. Out: the probability of each class. The two are mixed in shares that rows held out from both have chosen: a network
-//! that has learned little from few rows counts for little. The gate has one judge for each fold and one of the published training;
-//! its probabilities are their mean. Spec: `specs/gate.md`.
+//! In: a row. Out: the leads of the classes. The two are added, each in its own unit, in shares that rows held out from both have
+//! chosen: a network that has learned little from few rows counts for little. The gate has one judge for each fold and one of the
+//! published training; the mean of their leads gives its probabilities. Spec: `specs/gate.md`.
 
 use super::GateError;
 use super::calibrate::{Calibration, Logits, calibrate, calibration_error, log_loss, probabilities};
+use super::conformal::top;
 use super::discriminant::{Discriminant, steadied};
 use super::network::{Desk, Network};
-use super::scale::Scale;
+use super::scale::{Scale, median};
 use super::table::Column;
 use serde::{Deserialize, Serialize};
 
@@ -25,18 +26,18 @@ pub struct Member {
     pub linear: Discriminant,
 }
 
-/// How the network's and the discriminant's word are mixed.
+/// How the network's and the discriminant's word are added.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mix {
-    /// Share of the network's probabilities.
+    /// Share of the network.
     pub network_share: f64,
-    /// The network's logits are divided by this, in its own unit.
-    pub network_temperature: f64,
-    /// The discriminant's scores are divided by this.
-    pub linear_temperature: f64,
-    /// Log loss of the calibrated network on held-out rows (nat).
+    /// How far the discriminant's scores typically reach.
+    pub linear_unit: f64,
+    /// The sum is divided by this.
+    pub temperature: f64,
+    /// Log loss of the network alone on held-out rows, calibrated (nat).
     pub network_loss: f64,
-    /// Log loss of the calibrated discriminant on the same rows (nat).
+    /// Log loss of the discriminant alone on the same rows, calibrated (nat).
     pub linear_loss: f64,
 }
 
@@ -75,56 +76,73 @@ impl Member {
     }
 }
 
-/// Steps of the mixing share's fixed point; each raises the likelihood.
-const STEPS: usize = 200;
+/// Shares tried: 0 to 1 in as many steps.
+const STEPS: usize = 20;
 
 impl Mix {
-    /// Learns temperatures and shares from rows that neither had seen.
+    /// Learns shares and temperature from rows that neither had seen.
     pub(super) fn of(said: &[Said], class: &[usize]) -> (Mix, Calibration) {
-        let network: Vec<Logits> = said.iter().map(|s| s.network.clone()).collect();
-        let linear: Vec<Logits> = said.iter().map(|s| Logits { raw: s.linear.clone(), unit: 1.0 }).collect();
-        let (a, b) = (calibrate(&network, class), calibrate(&linear, class));
-        let mut mix = Mix {
-            network_share: 0.5,
-            network_temperature: a.temperature,
-            linear_temperature: b.temperature,
-            network_loss: a.loss_after,
-            linear_loss: b.loss_after,
+        let lead = |s: &Said| {
+            let best = top(&s.linear);
+            let others = s.linear.iter().enumerate().filter(|(k, _)| *k != best);
+            s.linear[best] - others.fold(f64::NEG_INFINITY, |m, (_, v)| m.max(*v))
         };
-        let both: Vec<[f64; 2]> = said.iter().zip(class).map(|(s, &y)| mix.parts(s).map(|p| p[y].max(1e-12))).collect();
-        // The likelihood of a mixture is concave in its share: expectation and maximisation climb it. One row for each side is
-        // counted besides, so that a handful of rows does not silence either.
-        for _ in 0..STEPS {
-            let w = mix.network_share;
-            let sum: f64 = both.iter().map(|[n, l]| w * n / (w * n + (1.0 - w) * l)).sum();
-            mix.network_share = (sum + 1.0) / (both.len() as f64 + 2.0);
-        }
-        let p: Vec<Vec<f64>> = said.iter().map(|s| mix.probabilities(s)).collect();
-        let after = Calibration { error_after: calibration_error(&p, class), loss_after: log_loss(&p, class), ..a };
-        (mix, after)
+        let linear_unit = median(said.iter().map(lead)).max(1e-3);
+        let mix =
+            |network_share| Mix { network_share, linear_unit, temperature: 1.0, network_loss: 0.0, linear_loss: 0.0 };
+        let tried: Vec<Calibration> = (0..=STEPS)
+            .map(|i| {
+                let m = mix(i as f64 / STEPS as f64);
+                let sum: Vec<Logits> = said.iter().map(|s| Logits { raw: m.leads(s), unit: 1.0 }).collect();
+                calibrate(&sum, class)
+            })
+            .collect();
+        // Of equals the one nearest to even shares.
+        let order = |i: &usize, j: &usize| {
+            let from_even = |i: usize| (2 * i).abs_diff(STEPS);
+            tried[*i].loss_after.total_cmp(&tried[*j].loss_after).then(from_even(*i).cmp(&from_even(*j)))
+        };
+        let best = (0..=STEPS).min_by(order).unwrap_or(STEPS);
+        let found = Mix {
+            temperature: tried[best].temperature,
+            network_loss: tried[STEPS].loss_after,
+            linear_loss: tried[0].loss_after,
+            ..mix(best as f64 / STEPS as f64)
+        };
+        // Before: the networks by themselves, as they stand.
+        let raw: Vec<Vec<f64>> = said.iter().map(|s| probabilities(&s.network.raw, 1.0)).collect();
+        let before = Calibration {
+            error_before: calibration_error(&raw, class),
+            loss_before: log_loss(&raw, class),
+            ..tried[best].clone()
+        };
+        (found, before)
     }
 
-    fn parts(&self, said: &Said) -> [Vec<f64>; 2] {
-        let n = &said.network;
-        [probabilities(&n.raw, self.network_temperature * n.unit), probabilities(&said.linear, self.linear_temperature)]
-    }
-
-    /// The mixture's probability of each class.
-    pub(super) fn probabilities(&self, said: &Said) -> Vec<f64> {
-        let [n, l] = self.parts(said);
+    /// Leads of the classes before the temperature.
+    fn leads(&self, said: &Said) -> Vec<f64> {
         let w = self.network_share;
-        n.iter().zip(&l).map(|(n, l)| w * n + (1.0 - w) * l).collect()
+        let n = &said.network;
+        n.raw.iter().zip(&said.linear).map(|(n_, l)| w * n_ / n.unit + (1.0 - w) * l / self.linear_unit).collect()
+    }
+
+    /// The sum, as logits.
+    pub(super) fn logits(&self, said: &Said) -> Vec<f64> {
+        self.leads(said).into_iter().map(|z| z / self.temperature).collect()
+    }
+
+    /// The sum's probability of each class.
+    pub(super) fn probabilities(&self, said: &Said) -> Vec<f64> {
+        probabilities(&self.logits(said), 1.0)
     }
 
     pub(super) fn sound(&self) -> bool {
         let positive = |v: f64| v.is_finite() && v > 0.0;
-        (0.0..=1.0).contains(&self.network_share)
-            && positive(self.network_temperature)
-            && positive(self.linear_temperature)
+        (0.0..=1.0).contains(&self.network_share) && positive(self.temperature) && positive(self.linear_unit)
     }
 }
 
-/// Mean of several judges' probabilities.
+/// Mean of several judges' logits.
 pub(super) fn mean(p: &[Vec<f64>]) -> Vec<f64> {
     let n = p.len().max(1) as f64;
     let k = p.first().map_or(0, Vec::len);
@@ -148,6 +166,6 @@ mod tests {
         let said: Vec<Said> = class.iter().enumerate().map(row).collect();
         let (mix, c) = Mix::of(&said, &class);
         // The entropy of one in ten is 0.325 nat.
-        assert!(mix.network_share < 0.1 && c.loss_after < 0.36, "{mix:?} {c:?}");
+        assert!(mix.network_share < 0.1 && c.loss_after < 0.34, "{mix:?} {c:?}");
     }
 }

@@ -124,9 +124,9 @@ pub fn train(table: &Table, settings: &TrainSettings) -> Result<Trained, GateErr
     };
     let of_held: Vec<usize> = held.iter().map(|&r| known.class[r]).collect();
     let fold_of_held = if settings.folds > 0 { deal.clone() } else { vec![0; held.len()] };
-    let (mix, mut calibration) = Mix::of(&said, &of_held);
+    let (mix, calibration) = Mix::of(&said, &of_held);
     let held_p: Vec<Vec<f64>> = said.iter().map(|s| mix.probabilities(s)).collect();
-    calibration.temperature *= unit;
+
     // Chosen features are always looked at, then the plant's, then the rest by importance: the most in combination, others one by one.
     let rest = p.kept.iter().skip(p.chosen.len());
     let mut watched: Vec<&Column> = p.chosen.iter().chain(&p.evidence).chain(rest).copied().collect();
