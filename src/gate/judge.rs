@@ -81,6 +81,8 @@ struct Found<'a> {
 /// Features shown with a verdict.
 const SHOWN: usize = 3;
 const DESK_ROWS: usize = 16;
+/// How many times likelier than said a possible class is thought to be where the set is disputed.
+const CAUTION: f64 = 5.0;
 /// Share of the columns that strangers are known by which a table may lack.
 const ABSENT: f64 = 0.1;
 
@@ -162,9 +164,10 @@ impl Gate {
             set.push(class);
             set.sort_unstable();
         }
-        // A dispute matters where the action would cost more than an inspection, were the other class the truth. Sets of too few
-        // rows keep no promise; they are told and left to the costs.
-        if self.conformal.enough && set.iter().any(|&k| self.costs.decide[k][class] > self.costs.inspect[k]) {
+        // A dispute matters where the other class could make the action dear, were it likelier than said. Sets of too few rows keep
+        // no promise; they are told and left to the costs.
+        let dear = |&k: &usize| CAUTION * p[k] * self.costs.decide[k][class] > self.costs.inspect[k];
+        if self.conformal.enough && set.iter().any(dear) {
             let possible = set.iter().map(|&k| name(k)).collect();
             doubts.push(Doubt::SeveralClasses { possible, coverage: self.conformal.coverage });
         }
