@@ -139,7 +139,7 @@ pub(super) const TABLE: &str = "machines.csv";
 /// Verdicts in the order of the machines, and the gate's columns that none of them has.
 fn judge(gate: &Gate, machines: &[crate::gate::features::RawMachine]) -> Result<(Vec<Verdict>, Vec<String>), Failure> {
     let mut table = features(machines);
-    let needed = gate.scale.features.iter().chain(&gate.novelty.features).map(String::as_str);
+    let needed = gate.main.scale.features.iter().chain(&gate.novelty.features).map(String::as_str);
     let added = table.complete(needed);
     let table = Table::parse(Path::new("features of the machines"), &table.csv(), Some(&gate.label))?;
     Ok((gate.classify(&table)?, added))

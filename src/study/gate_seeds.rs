@@ -18,7 +18,7 @@ const SEEDS: u64 = 20;
 /// A fresh line has another seed than any training line.
 const FRESH: u64 = 1000;
 /// Machines of each unknown kind for each seed.
-const STRANGERS: usize = 40;
+const STRANGERS: usize = 20;
 
 /// What one seed gave.
 #[derive(Clone, Debug, Serialize)]
