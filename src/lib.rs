@@ -42,6 +42,7 @@ pub mod numeric;
 pub mod frf;
 pub mod gate;
 pub mod lti;
+pub mod physics;
 pub mod recording;
 
 pub mod controller;
@@ -51,6 +52,7 @@ pub mod identify;
 
 pub mod pes;
 
+pub mod diagnose;
 pub mod tune;
 
 pub mod twin;

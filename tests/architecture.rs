@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 /// Rooms by rank; a room uses lower ranks only (`specs/decisions/rooms.md`).
 const RANKS: [&[&str]; 10] = [
     &["units", "document", "numeric"],
-    &["frf", "recording", "lti", "physics"],
-    &["controller"],
+    &["frf", "recording", "lti"],
+    &["controller", "physics"],
     &["identify", "feedback"],
     &["pes"],
     &["tune", "gate", "diagnose"],

@@ -217,3 +217,33 @@ fn help_shows_examples_and_ends_with_0() {
         assert!(command.is_empty() || ran.out.contains("Example"), "{command}: {}", ran.out);
     }
 }
+
+#[test]
+fn physics_of_a_plant_file_is_used_or_refused_by_name() {
+    let dir = folder("physics");
+    let with = |name: &str, tables: &str| {
+        let file = dir.join(name);
+        std::fs::write(&file, std::fs::read_to_string(root(HEALTHY)).unwrap() + tables).unwrap();
+        file.to_str().unwrap().to_owned()
+    };
+    let dry = with(
+        "dry.toml",
+        "\n[[plant.physics]]\neffect = \"coulomb_friction\"\nlevel_command = 0.02\n[[plant.physics]]\neffect = \"quantisation\"\n",
+    );
+    let ran = servotune(&["margins", "--plant", &dry, "--controller", NOMINAL, "--amplitudes", "0.3:15", "--json"]);
+    let m = json(&ran);
+    assert!(ran.err.contains("quantisation"), "{}", ran.err);
+    assert_eq!(m["physics"], serde_json::json!(["coulomb_friction"]));
+    let rows = m["by_amplitude"].as_array().unwrap();
+    for key in ["amplitude", "phase_margin_deg", "gain_margin_db", "gain_crossover_hz", "max_sensitivity", "stable"] {
+        assert!(rows.iter().all(|r| !r[key].is_null()), "{key}");
+    }
+    let worst = rows.iter().map(|r| r["phase_margin_deg"].as_f64().unwrap()).fold(f64::INFINITY, f64::min);
+    assert_eq!(m["phase_margin_deg"].as_f64().unwrap(), worst);
+    let ran = servotune(&["simulate", "--plant", &dry, "--controller", NOMINAL, "--profile", SPIRAL, "--json"]);
+    assert_eq!((ran.code, &json(&ran)["physics"]), (0, &serde_json::json!(["coulomb_friction"])));
+    let odd = with("odd.toml", "\n[[plant.physics]]\neffect = \"gremlins\"\n");
+    let ran = servotune(&["simulate", "--plant", &odd, "--controller", NOMINAL, "--profile", SPIRAL]);
+    assert_eq!(ran.code, 2);
+    assert!(ran.err.contains("odd.toml") && ran.err.contains("gremlins"), "{}", ran.err);
+}

@@ -1,5 +1,6 @@
 //! The words of the command line.
 
+pub(super) use super::diagnose_arguments::DiagnoseArguments;
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
 use crate::twin::line::UnknownKind;
@@ -23,6 +24,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     Demo(DemoArguments),
+    Diagnose(Box<DiagnoseArguments>),
     Features(FeaturesArguments),
     Identify(Box<IdentifyArguments>),
     Margins(Box<MarginsArguments>),
@@ -84,6 +86,7 @@ pub(super) struct IdentifyArguments {
 #[command(group = clap::ArgGroup::new("machine").required(true))]
 #[command(after_help = "Examples:
   servotune margins --plant specs/machines/healthy.toml --controller specs/controllers/nominal.toml
+  servotune margins --plant plant_corrected.toml --controller specs/controllers/nominal.toml --amplitudes 0.02:15
   servotune margins --frf slot07.bod --controller specs/controllers/nominal.toml")]
 pub(super) struct MarginsArguments {
     /// Plant model (plant.toml)
@@ -98,6 +101,9 @@ pub(super) struct MarginsArguments {
     /// Controller (controller.toml) or gain table (gains.toml)
     #[arg(long, value_name = "CONTROLLER")]
     pub controller: PathBuf,
+    /// Amplitudes of the position at which physics beyond linear is described (position_unit)
+    #[arg(long, value_name = "LOW:HIGH", default_value = "0.15:15", value_parser = amplitudes, conflicts_with = "frf")]
+    pub amplitudes: (f64, f64),
     #[command(flatten)]
     pub reading: ReadingArguments,
 }
@@ -142,6 +148,15 @@ fn lines(text: &str) -> Result<(usize, usize), String> {
     let (first, last) = text.split_once(':').ok_or_else(wrong)?;
     match (first.parse::<usize>(), last.parse::<usize>()) {
         (Ok(first), Ok(last)) if 0 < first && first <= last => Ok((first, last)),
+        _ => Err(wrong()),
+    }
+}
+
+fn amplitudes(text: &str) -> Result<(f64, f64), String> {
+    let wrong = || format!("found `{text}`; expected LOW:HIGH with 0 < LOW <= HIGH, such as 0.15:15");
+    let (low, high) = text.split_once(':').ok_or_else(wrong)?;
+    match (low.parse::<f64>(), high.parse::<f64>()) {
+        (Ok(low), Ok(high)) if 0.0 < low && low <= high && high.is_finite() => Ok((low, high)),
         _ => Err(wrong()),
     }
 }

@@ -89,6 +89,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
         over_model: Some(&over_model),
         table: &table,
         provenance: provenance(&table),
+        physics: None,
     })?;
     let report = file("report.html");
     write_text(&report, &page.html())?;

@@ -1,6 +1,7 @@
 //! Why a command could not be done: one message, exit code 2.
 
 use crate::controller::ControllerError;
+use crate::diagnose::DiagnoseError;
 use crate::document::DocumentError;
 use crate::feedback::FeedbackError;
 use crate::frf::{FrfError, FrfShapeError};
@@ -9,6 +10,7 @@ use crate::gate::features::FeatureError;
 use crate::identify::IdentifyError;
 use crate::lti::LtiError;
 use crate::pes::{PesError, ProfileError};
+use crate::physics::PhysicsError;
 use crate::recording::RecordingError;
 use crate::report::ReportError;
 use crate::study::StudyError;
@@ -29,8 +31,8 @@ pub enum Failure {
     Controller { file: PathBuf, source: ControllerError },
     #[error("{}: {source}", file.display())]
     Profile { file: PathBuf, source: ProfileError },
-    #[error("{}: [[plant.physics]] effect \"{effect}\": `{command}` works on the linear plant only; remove the table to judge the linear part", file.display())]
-    Physics { file: PathBuf, effect: String, command: &'static str },
+    #[error("{}: [[plant.physics]] {source}", file.display())]
+    Physics { file: PathBuf, source: PhysicsError },
     #[error(transparent)]
     Frf(#[from] FrfError),
     #[error(transparent)]
@@ -59,6 +61,8 @@ pub enum Failure {
     TwiceOverridden { id: String },
     #[error("{}: already there; give a new folder, so that old gains are not taken for new ones", file.display())]
     AlreadyThere { file: PathBuf },
+    #[error(transparent)]
+    Diagnose(#[from] DiagnoseError),
     #[error(transparent)]
     Recording(#[from] RecordingError),
     #[error(transparent)]

@@ -10,14 +10,10 @@ use crate::pes::Profile;
 use crate::tune::GainTable;
 use std::path::Path;
 
-/// A plant. `command` names who asks: effects beyond linear are refused by name.
-pub(super) fn plant(file: &Path, command: &'static str) -> Result<Plant, Failure> {
+/// A plant, its physics entries not looked at yet.
+pub(super) fn plant(file: &Path) -> Result<Plant, Failure> {
     let read: PlantFile = parse_toml(file, &read_text(file)?)?;
-    let plant = Plant::try_from(read).map_err(|source| Failure::Plant { file: file.into(), source })?;
-    match plant.physics.first() {
-        Some(entry) => Err(Failure::Physics { file: file.into(), effect: entry.effect.clone(), command }),
-        None => Ok(plant),
-    }
+    Plant::try_from(read).map_err(|source| Failure::Plant { file: file.into(), source })
 }
 
 /// A controller, from controller.toml or from the gain table that holds one.

@@ -1,10 +1,16 @@
 //! `servotune margins`: one loop judged, of a model or of a measured response.
 
 use super::arguments::MarginsArguments;
-use super::{Ending, Failure, Screen, load};
-use crate::feedback::{Margins, MeasuredLoop, ModelLoop, closed_loop_poles, margins, measured_margins};
+use super::{Ending, Failure, Screen, load, physics};
+use crate::feedback::{
+    Amplitudes, DescribedMargins, DescribedPlant, Margins, MeasuredLoop, ModelLoop, closed_loop_poles,
+    described_margins, linear_crossover_hz, margins, measured_margins,
+};
 use crate::lti::{DiscretePlant, Sections};
+use crate::physics::Context;
 use crate::report::margins::{margins_text, measured_text};
+use crate::report::physical::{amplitude_table, limit_cycle_sentences};
+use serde::Serialize;
 use std::path::Path;
 
 /// A pole this close to the unit circle counts for either side: the eigenvalues of a matrix of order 40 are no surer.
@@ -15,7 +21,17 @@ pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, F
     let sections =
         controller.sections().map_err(|source| Failure::Controller { file: a.controller.clone(), source })?;
     let stable = match (&a.plant, &a.frf) {
-        (Some(file), _) => of_model(file, &sections, screen)?,
+        (Some(file), _) => {
+            let fallback = Context::default();
+            let context = Context {
+                sample_time_s: sections.sample_time_s,
+                travel: fallback.travel.max(a.amplitudes.1),
+                command: controller.output_limit.unwrap_or(fallback.command),
+                ..fallback
+            };
+            let amplitudes = Amplitudes { low: a.amplitudes.0, high: a.amplitudes.1, ..Amplitudes::default() };
+            of_model(file, &sections, &context, &amplitudes, screen)?
+        }
         (None, Some(file)) => {
             let sweep = load::sweep(file, &a.reading, screen)?;
             let judged = measured_margins(&MeasuredLoop::new(&sweep.frf, &sections, a.hold_included)?);
@@ -28,11 +44,48 @@ pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, F
     Ok(if stable { Ending::Accepted } else { Ending::Rejected })
 }
 
-fn of_model(file: &Path, sections: &Sections, screen: &mut Screen) -> Result<bool, Failure> {
-    let plant = load::plant(file, "margins")?;
+/// Margins of a plant with physics; the flattened ones are the worst over the amplitudes.
+#[derive(Serialize)]
+struct Described<'a> {
+    #[serde(flatten)]
+    margins: &'a DescribedMargins,
+    physics: Vec<&'static str>,
+    /// Disturbances: not in the margins.
+    outside: Vec<&'static str>,
+    /// Margins of the linear plant alone.
+    linear: &'a Margins,
+}
+
+fn of_model(
+    file: &Path,
+    sections: &Sections,
+    context: &Context,
+    amplitudes: &Amplitudes,
+    screen: &mut Screen,
+) -> Result<bool, Failure> {
+    let plant = load::plant(file)?;
+    let physics = physics::restored(file, &plant, context, screen)?;
     let sampled = DiscretePlant::of(&plant, sections.sample_time_s)
         .map_err(|source| Failure::Plant { file: file.into(), source })?;
     let judged = judge(&ModelLoop::new(&sampled, sections)?)?;
+    if let Some(physics) = physics {
+        physics::say_outside(file, &physics, screen);
+        let described = DescribedPlant::new(&physics, linear_crossover_hz(&judged, sections))
+            .map_err(|source| Failure::Plant { file: file.into(), source })?;
+        let all = described_margins(&described, sections, amplitudes)?;
+        let units = super::slot::units(&plant);
+        let names = physics.names();
+        let text = format!(
+            "Physics: {}. Worst over the amplitude:\n{}\n{}{}",
+            names.join(", "),
+            margins_text(&all.worst)?,
+            amplitude_table(&all, &judged, units)?.text(),
+            limit_cycle_sentences(&all, units),
+        );
+        let outside = physics::outside(&physics);
+        screen.result(&Described { margins: &all, physics: names, outside, linear: &judged }, &text)?;
+        return Ok(all.worst.stable);
+    }
     screen.result(&judged, &margins_text(&judged)?)?;
     Ok(judged.stable)
 }

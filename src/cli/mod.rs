@@ -7,6 +7,8 @@ mod arguments;
 mod classify;
 mod demo;
 mod demo_gate;
+mod diagnose;
+mod diagnose_arguments;
 mod failure;
 mod features;
 mod gate_arguments;
@@ -14,6 +16,7 @@ mod gated;
 mod identify;
 mod load;
 mod margins;
+mod physics;
 mod response;
 mod screen;
 mod simulate;
@@ -53,6 +56,7 @@ pub fn main() -> ExitCode {
     let mut screen = Screen::new(arguments.json);
     let ending = match arguments.command {
         Command::Demo(a) => demo::run(&a, &mut screen),
+        Command::Diagnose(a) => diagnose::run(&a, &mut screen),
         Command::Features(a) => features::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),

@@ -1,11 +1,11 @@
 //! `servotune simulate`: one spiral write, its PES and DFT.
 
 use super::arguments::SimulateArguments;
-use super::{Ending, Failure, Screen, load, margins};
+use super::{Ending, Failure, Screen, load, margins, physics};
 use crate::document::write_text;
-use crate::feedback::ModelLoop;
+use crate::feedback::{DescribedLoop, DescribedPlant, ModelLoop, linear_crossover_hz};
 use crate::lti::DiscretePlant;
-use crate::pes::{PesFigures, figures, simulate};
+use crate::pes::{PesFigures, context, figures, simulate, simulate_physical};
 use crate::report::pes::{harmonics_table, pes_table};
 use serde::Serialize;
 use std::fmt::Write;
@@ -20,12 +20,15 @@ struct Simulated<'a> {
     position_unit: &'a str,
     sample_rate_hz: f64,
     pes: &'a [f64],
+    /// Effects beyond linear that were simulated; absent without any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    physics: Vec<&'static str>,
     #[serde(flatten)]
     figures: Option<&'a PesFigures>,
 }
 
 pub(super) fn run(a: &SimulateArguments, screen: &mut Screen) -> Result<Ending, Failure> {
-    let plant = load::plant(&a.plant, "simulate")?;
+    let plant = load::plant(&a.plant)?;
     let controller = load::controller(&a.controller)?;
     let profile = load::profile(&a.profile)?;
     let sections =
@@ -33,10 +36,20 @@ pub(super) fn run(a: &SimulateArguments, screen: &mut Screen) -> Result<Ending, 
     let sampled = DiscretePlant::of(&plant, controller.sample_time_s)
         .map_err(|source| Failure::Plant { file: a.plant.clone(), source })?;
     let judged = margins::judge(&ModelLoop::new(&sampled, &sections)?)?;
-    let run = simulate(&plant, &controller, &profile)?;
+    let physics = physics::restored(&a.plant, &plant, &context(&profile, &controller), screen)?;
+    let (run, loop_stable) = match &physics {
+        None => (simulate(&plant, &controller, &profile)?, judged.stable),
+        Some(physics) => {
+            // A small limit cycle is no unstable loop: the describing functions are asked at the size of the move.
+            let described = DescribedPlant::new(physics, linear_crossover_hz(&judged, &sections))?;
+            let at_move = described.at_amplitude(profile.spiral.distance);
+            let at_move = crate::feedback::margins(&DescribedLoop::new(at_move, &sections)?);
+            (simulate_physical(physics, &controller, &profile)?, at_move.stable)
+        }
+    };
     // The figures of a record that runs away say nothing; without an output limit it does not even stay finite.
     let finite = run.pes.iter().all(|p| p.is_finite());
-    let found = (judged.stable && finite).then(|| figures(&run.pes, &profile));
+    let found = (loop_stable && finite).then(|| figures(&run.pes, &profile));
     let unit = &plant.position_unit;
     let mut text = String::new();
     match &found {
@@ -46,6 +59,9 @@ pub(super) fn run(a: &SimulateArguments, screen: &mut Screen) -> Result<Ending, 
             text += &harmonics_table(f, SHOWN, unit)?.text();
         }
         None => text += "The closed loop is UNSTABLE: a PES has no figures. See `servotune margins`.\n",
+    }
+    if let Some(physics) = &physics {
+        text += &format!("\nSimulated with: {}.\n", physics.names().join(", "));
     }
     if run.limited {
         screen.say("note: the command reached output_limit; the loop was not linear during the write");
@@ -60,11 +76,12 @@ pub(super) fn run(a: &SimulateArguments, screen: &mut Screen) -> Result<Ending, 
         screen.say(&format!("wrote {}", file.display()));
     }
     let document = Simulated {
-        stable: judged.stable,
+        stable: loop_stable,
         limited: run.limited,
         position_unit: unit,
         sample_rate_hz: profile.pes.sample_rate_hz,
         pes: if finite { &run.pes } else { &[] },
+        physics: physics.as_ref().map(|p| p.names()).unwrap_or_default(),
         figures: found.as_ref(),
     };
     screen.result(&document, &text)?;

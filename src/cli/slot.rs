@@ -6,16 +6,18 @@ use crate::feedback::{ModelLoop, OpenLoop};
 use crate::frf::Sweep;
 use crate::identify::Identified;
 use crate::lti::{DiscretePlant, Plant};
-use crate::pes::{figures, simulate};
+use crate::pes::{figures, simulate, simulate_physical};
+use crate::physics::Restored;
 use crate::report::identified::{identified_figure, identified_sentences, ladder_table, order_table, parameter_table};
 use crate::report::margins::interval_table;
 use crate::report::page::{Block, Page, Section};
+use crate::report::physical::{PriceView, amplitude_table, limit_cycle_sentences, price_table};
 use crate::report::routes::{RouteView, routes_table};
 use crate::report::sampled::sampled_table;
 use crate::report::slot::{LoopView, SlotView, slot_page};
 use crate::report::table::Verdict;
 use crate::report::tuned::{Units, conflicts_table, gains_table, sections_table};
-use crate::tune::{GainTable, Hold, Judged, Machine, Outcome, Spec, judge, margin_intervals};
+use crate::tune::{GainTable, Hold, Judged, Machine, Outcome, PhysicalTuning, Spec, judge, margin_intervals};
 use std::f64::consts::TAU;
 
 /// A slot with everything that is known of it.
@@ -34,6 +36,8 @@ pub(super) struct Slot<'a> {
     pub over_model: Option<&'a Outcome>,
     pub table: &'a GainTable,
     pub provenance: Vec<(String, String)>,
+    /// The physics and the tuning with it, where the plant has any.
+    pub physics: Option<(&'a Restored, &'a PhysicalTuning)>,
 }
 
 /// The units of a plant file.
@@ -56,7 +60,10 @@ fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Res
     w.extend(l.grid().into_iter().filter(|w| *w > from));
     w.sort_by(f64::total_cmp);
     w.dedup();
-    let write = simulate(slot.plant, c, &slot.spec.profile)?;
+    let write = match slot.physics {
+        Some((physics, _)) => simulate_physical(physics, c, &slot.spec.profile)?,
+        None => simulate(slot.plant, c, &slot.spec.profile)?,
+    };
     let stable = judged_margins.stable && write.pes.iter().all(|p| p.is_finite());
     let found = stable.then(|| figures(&write.pes, &slot.spec.profile));
     Ok(LoopView {
@@ -73,6 +80,10 @@ fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Res
 const JUDGED_ON_RESPONSE: &str = "The limits in this table are judged on the measured response, noise as expected power. The cards above and the curves \
                                   below are those of the identified model, noise as the profile's draw; the last section sets both side by side.";
 
+/// Said under the verdict where the plant has physics.
+const JUDGED_WITH_PHYSICS: &str = "The limits in this table are judged with the physics of the plant file: margins at the worst amplitude, the write simulated \
+                                   with every effect. The cards and curves of L are those of the linear plant, the write is the one with physics.";
+
 /// Draws of the identified plant for the intervals of the margins, and their seed.
 const DRAWS: usize = 200;
 const DRAW_SEED: u64 = 1;
@@ -80,20 +91,25 @@ const DRAW_SEED: u64 = 1;
 /// The page of the slot.
 pub(super) fn page(slot: &Slot<'_>) -> Result<Page, Failure> {
     let after_controller = slot.outcome.controller();
-    let after = loop_view("after", slot, after_controller, slot.outcome.after()[0].judged.clone())?;
+    let judged_after = slot.physics.map_or(&slot.outcome.after()[0].judged, |(_, t)| &t.after.judged);
+    let after = loop_view("after", slot, after_controller, judged_after.clone())?;
     let was = match slot.outcome {
         Outcome::Tuned(t) => &t.before,
         Outcome::Infeasible(i) => &i.before,
     };
-    let before = match (slot.start, was.as_ref().and_then(|b| b.first())) {
-        (Some(c), Some(proof)) => Some(loop_view("before", slot, c, proof.judged.clone())?),
+    let judged_before = match slot.physics {
+        Some((_, t)) => t.before.as_ref().map(|p| &p.judged),
+        None => was.as_ref().and_then(|b| b.first()).map(|p| &p.judged),
+    };
+    let before = match (slot.start, judged_before) {
+        (Some(c), Some(judged)) => Some(loop_view("before", slot, c, judged.clone())?),
         _ => None,
     };
     let view = SlotView {
         name: slot.name,
-        verdict: verdict(slot.outcome),
-        judged_on: slot.sweep.map(|_| JUDGED_ON_RESPONSE),
-        plant: plant_sections(slot)?,
+        verdict: slot.physics.map_or_else(|| verdict(slot.outcome), |(_, t)| physical_verdict(t)),
+        judged_on: slot.physics.map(|_| JUDGED_WITH_PHYSICS).or(slot.sweep.map(|_| JUDGED_ON_RESPONSE)),
+        plant: [plant_sections(slot)?, physical_sections(slot, before.as_ref(), &after)?].concat(),
         before: before.as_ref(),
         after: &after,
         spec: slot.spec,
@@ -132,6 +148,59 @@ pub(super) fn verdict(outcome: &Outcome) -> (Verdict, String) {
             )
         }
     }
+}
+
+/// The verdict of a tuning with physics.
+pub(super) fn physical_verdict(t: &PhysicalTuning) -> (Verdict, String) {
+    match &t.outcome {
+        Outcome::Tuned(_) if !t.after.judged.passes() => {
+            let missed = t.after.judged.limits.iter().filter(|l| l.violation > 0.0);
+            let names: Vec<String> = missed.map(|l| l.wanted.what.to_string()).collect();
+            let what = if names.is_empty() { "a stable loop at every amplitude".to_owned() } else { names.join(", ") };
+            (Verdict::Fail, format!("With the physics the limits are not all met; missed: {what}."))
+        }
+        outcome => verdict(outcome),
+    }
+}
+
+/// What the physics does to margins, write and gains.
+fn physical_sections(slot: &Slot<'_>, before: Option<&LoopView>, after: &LoopView) -> Result<Vec<Section>, Failure> {
+    let Some((physics, tuning)) = slot.physics else { return Ok(vec![]) };
+    let mut writes = Vec::new();
+    for (view, c, proof) in [
+        (before, slot.start, tuning.before.as_ref()),
+        (Some(after), Some(slot.outcome.controller()), Some(&tuning.after)),
+    ] {
+        if let (Some(view), Some(c), Some(proof)) = (view, c, proof) {
+            let write = simulate(slot.plant, c, &slot.spec.profile)?;
+            let stable = proof.linear.stable && write.pes.iter().all(|p| p.is_finite());
+            writes.push((view, proof, stable.then(|| figures(&write.pes, &slot.spec.profile))));
+        }
+    }
+    let views: Vec<PriceView<'_>> = writes
+        .iter()
+        .map(|(view, proof, linear)| PriceView {
+            name: &view.name,
+            linear: (&proof.linear, linear.as_ref()),
+            physical: (&proof.margins.worst, view.write.as_ref().map(|(_, f)| f)),
+        })
+        .collect();
+    let units = units(slot.plant);
+    let words = format!(
+        "The plant file carries: {}. Each effect was simulated as it stands; the gains were tuned on the plant's equivalent response at {} amplitudes at once.",
+        physics.names().join(", "),
+        tuning.amplitudes.len()
+    );
+    let mut blocks = vec![
+        Block::Prose(words),
+        Block::Table(price_table(&views, units)?),
+        Block::Table(amplitude_table(&tuning.after.margins, &tuning.after.linear, units)?),
+    ];
+    let cycles = limit_cycle_sentences(&tuning.after.margins, units);
+    if !cycles.is_empty() {
+        blocks.push(Block::Prose(cycles));
+    }
+    Ok(vec![Section { heading: "Physics".into(), blocks }])
 }
 
 fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {

@@ -2,13 +2,19 @@
 
 use super::arguments::{ModelArguments, TuneArguments};
 use super::slot::{self, Slot};
-use super::{Ending, Failure, Screen, load, tune_machines};
+use super::{Ending, Failure, Screen, load, physics, tune_machines};
 use crate::document::{read_text, sha256_hex, write_text};
+use crate::feedback::Amplitudes;
 use crate::frf::Sweep;
 use crate::identify::{self, Identified, IdentifySettings, identify};
 use crate::lti::Plant;
+use crate::pes::context;
+use crate::physics::Restored;
+use crate::report::physical::{amplitude_table, limit_cycle_sentences};
 use crate::report::tuned::{Units, conflicts_table, gains_table, limits_table};
-use crate::tune::{GainTable, Hold, InputDigest, Machine, Outcome, Spec, TuneSettings, tune};
+use crate::tune::{
+    GainTable, Hold, InputDigest, Machine, Outcome, PhysicalTuning, Spec, TuneSettings, tune, tune_physical,
+};
 use serde::Serialize;
 use std::path::Path;
 
@@ -18,11 +24,30 @@ struct Document<'a> {
     outcome: &'a Outcome,
     gain_table: Option<&'a Path>,
     report: Option<&'a Path>,
+    /// Names and judgement of the physics; absent without any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    physics: Option<Physics<'a>>,
+}
+
+#[derive(Serialize)]
+struct Physics<'a> {
+    effects: Vec<&'static str>,
+    amplitudes: &'a [f64],
+    rounds: usize,
+    before: Option<&'a crate::tune::PhysicalProof>,
+    after: &'a crate::tune::PhysicalProof,
+}
+
+/// What a tuning came to, for its page.
+struct Reached<'a> {
+    outcome: &'a Outcome,
+    table: &'a GainTable,
+    physics: Option<(&'a Restored, &'a PhysicalTuning)>,
 }
 
 /// What is tuned, as files gave it.
 enum Given {
-    Model(Box<Plant>),
+    Model(Box<Plant>, Option<Box<Restored>>),
     /// With the model that continues it outside the sweep.
     Response {
         sweep: Box<Sweep>,
@@ -35,14 +60,14 @@ impl Given {
     /// Units from the plant file, or as given for the sweep.
     fn units<'a>(&'a self, words: &'a ModelArguments) -> Units<'a> {
         match self {
-            Given::Model(plant) => slot::units(plant),
+            Given::Model(plant, _) => slot::units(plant),
             Given::Response { .. } => Units { position: &words.position_unit, command: &words.command_unit },
         }
     }
 
     fn machine(&self) -> Machine<'_> {
         match self {
-            Given::Model(plant) => Machine::Model(plant),
+            Given::Model(plant, _) => Machine::Model(plant),
             Given::Response { sweep, hold, identified } => {
                 Machine::Response { frf: &sweep.frf, hold: *hold, continuation: Some(&identified.plant) }
             }
@@ -56,13 +81,17 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     }
     let spec = Spec::read(&a.spec).map_err(crate::tune::TuneError::from)?;
     let spec_sha256 = sha256_hex(read_text(&a.spec)?.as_bytes());
+    let start = a.controller.as_ref().map(|file| load::controller(file)).transpose()?;
     let mut inputs = Vec::new();
     let mut input = |role: &str, sha256: String| inputs.push(InputDigest { role: role.into(), sha256 });
     let given = match (&a.plant, &a.frf) {
         (Some(file), _) => {
-            let plant = load::plant(file, "tune")?;
+            let mut plant = load::plant(file)?;
+            let clock = start.clone().unwrap_or_else(|| at_clock(a.sample_time_s));
+            let physics = physics::restored(file, &plant, &context(&spec.profile, &clock), screen)?;
+            plant.physics.clear();
             input("plant", sha256_hex(read_text(file)?.as_bytes()));
-            Given::Model(Box::new(plant))
+            Given::Model(Box::new(plant), physics.map(Box::new))
         }
         (None, Some(file)) => {
             let sweep = load::sweep(file, &a.reading, screen)?;
@@ -74,18 +103,30 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         }
         (None, None) => return Err(Failure::NoMachine),
     };
-    let start = match &a.controller {
-        Some(file) => {
-            let controller = load::controller(file)?;
-            input("controller", sha256_hex(read_text(file)?.as_bytes()));
-            Some(controller)
-        }
-        None => None,
-    };
+    if let Some(file) = &a.controller {
+        input("controller", sha256_hex(read_text(file)?.as_bytes()));
+    }
     let settings = TuneSettings { sample_time_s: a.sample_time_s, starts: a.starts, ..TuneSettings::default() };
-    let outcome = tune(&given.machine(), &spec, start.as_ref(), &settings)?;
-    let table = GainTable::of(&outcome, spec.search.seed, spec_sha256, inputs)?;
-    let tuned = matches!(outcome, Outcome::Tuned(_));
+    let with = match &given {
+        Given::Model(_, Some(physics)) => {
+            let high = spec.profile.spiral.distance;
+            let amplitudes = Amplitudes { low: 0.01 * high, high, ..Amplitudes::default() };
+            Some((physics, tune_physical(physics, &spec, start.as_ref(), &settings, &amplitudes)?))
+        }
+        _ => None,
+    };
+    let (outcome, table, tuned) = match &with {
+        Some((physics, t)) => {
+            let table = GainTable::of_physics(t, &physics.names(), spec.search.seed, spec_sha256, inputs)?;
+            (t.outcome.clone(), table, t.passes())
+        }
+        None => {
+            let outcome = tune(&given.machine(), &spec, start.as_ref(), &settings)?;
+            let table = GainTable::of(&outcome, spec.search.seed, spec_sha256, inputs)?;
+            let tuned = matches!(outcome, Outcome::Tuned(_));
+            (outcome, table, tuned)
+        }
+    };
     let mut written = None;
     if tuned || a.keep_infeasible {
         table.write(&a.out)?;
@@ -95,13 +136,59 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         screen.say("no gain table was written: the limits are not met (--keep-infeasible writes the compromise)");
     }
     if let Some(file) = &a.report {
-        let page = report(a, &given, &spec, start.as_ref(), &settings, &outcome, &table)?;
+        let physics = with.as_ref().map(|(p, t)| (p.as_ref(), t));
+        let reached = Reached { outcome: &outcome, table: &table, physics };
+        let page = report(a, &given, &spec, start.as_ref(), &settings, &reached)?;
         write_text(file, &page)?;
         screen.say(&format!("wrote {}", file.display()));
     }
-    let document = Document { outcome: &outcome, gain_table: written, report: a.report.as_deref() };
-    screen.result(&document, &text(&outcome, start.as_ref(), given.units(&a.model))?)?;
+    let physics = with.as_ref().map(|(physics, t)| Physics {
+        effects: physics.names(),
+        amplitudes: &t.amplitudes,
+        rounds: t.rounds,
+        before: t.before.as_ref(),
+        after: &t.after,
+    });
+    let units = given.units(&a.model);
+    let text = match &with {
+        Some((physics, t)) => physical_text(physics, t, start.as_ref(), units)?,
+        None => text(&outcome, start.as_ref(), units)?,
+    };
+    let document = Document { outcome: &outcome, gain_table: written, report: a.report.as_deref(), physics };
+    screen.result(&document, &text)?;
     Ok(if tuned { Ending::Accepted } else { Ending::Rejected })
+}
+
+/// A controller of nothing but a clock.
+fn at_clock(sample_time_s: f64) -> crate::controller::Controller {
+    let pid = crate::controller::Pid { kp: 1.0, ki_per_s: 0.0, kd_s: 0.0, derivative_filter_s: 0.0 };
+    let (lowpass, notch) = (Vec::new(), Vec::new());
+    crate::controller::Controller { sample_time_s, output_limit: None, pid, lowpass, notch, feedforward: None }
+}
+
+/// The outcome of a tuning with physics for a terminal.
+fn physical_text(
+    physics: &Restored,
+    t: &PhysicalTuning,
+    start: Option<&crate::controller::Controller>,
+    units: Units<'_>,
+) -> Result<String, Failure> {
+    let bounds = match &t.outcome {
+        Outcome::Tuned(o) => &o.at_bounds,
+        Outcome::Infeasible(i) => &i.at_bounds,
+    };
+    let mut text = format!("{}\nPhysics: {}.\n\n", slot::physical_verdict(t).1, physics.names().join(", "));
+    text += &limits_table(t.before.as_ref().map(|b| &b.judged), Some(&t.after.judged), units)?.text();
+    text.push('\n');
+    text += &amplitude_table(&t.after.margins, &t.after.linear, units)?.text();
+    text += &limit_cycle_sentences(&t.after.margins, units);
+    if let Outcome::Infeasible(i) = &t.outcome {
+        text.push('\n');
+        text += &conflicts_table(i, units)?.text();
+    }
+    text.push('\n');
+    text += &gains_table(start, t.outcome.controller(), bounds)?.text();
+    Ok(text)
 }
 
 /// Settings of the model that continues the sweep: a sweep with the hold in it has it divided out first.
@@ -120,11 +207,11 @@ fn report(
     spec: &Spec,
     start: Option<&crate::controller::Controller>,
     settings: &TuneSettings,
-    outcome: &Outcome,
-    table: &GainTable,
+    reached: &Reached<'_>,
 ) -> Result<String, Failure> {
+    let Reached { outcome, table, physics } = *reached;
     let (plant, sweep, identified, over_model) = match given {
-        Given::Model(plant) => (plant.as_ref(), None, None, None),
+        Given::Model(plant, _) => (plant.as_ref(), None, None, None),
         Given::Response { sweep, hold, identified } => {
             let over_model = tune(&Machine::Model(&identified.plant), spec, start, settings)?;
             (&identified.plant, Some((sweep.as_ref(), *hold)), Some(identified.as_ref()), Some(over_model))
@@ -142,6 +229,7 @@ fn report(
         over_model: over_model.as_ref(),
         table,
         provenance: provenance(table),
+        physics,
     };
     Ok(slot::page(&slot)?.html())
 }
@@ -155,6 +243,9 @@ pub(super) fn provenance(table: &GainTable) -> Vec<(String, String)> {
         ("candidates scored".to_owned(), p.evaluations.to_string()),
         ("spec (SHA-256)".to_owned(), p.spec_sha256.clone()),
     ];
+    if !p.physics.is_empty() {
+        all.push(("physics".to_owned(), p.physics.join(", ")));
+    }
     all.extend(p.inputs.iter().map(|i| (format!("{} (SHA-256)", i.role), i.sha256.clone())));
     all
 }

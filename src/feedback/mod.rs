@@ -9,9 +9,11 @@
 //!              └────────────────────┴── (loop is cut at u) ◄──┘
 //! ```
 
+mod amplitudes;
 mod crossing;
 mod cubic;
 mod curve;
+mod described;
 mod events;
 mod gang;
 mod grid;
@@ -23,8 +25,10 @@ mod poles;
 mod sampled;
 mod trace;
 
+pub use amplitudes::{AmplitudeRow, Amplitudes, DescribedMargins, LimitCycle, described_margins, linear_crossover_hz};
 pub use crossing::Crossing;
 pub use curve::ResponseCurve;
+pub use described::{Described, DescribedLoop, DescribedPlant};
 pub use events::{Event, GRAZE, Graze, QuickMargins};
 pub use gang::{GangOfFour, gang_of_four};
 pub use grid::frequency_grid;

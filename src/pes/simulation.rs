@@ -43,6 +43,8 @@ pub(super) struct ServoSample {
     pub(super) controller_sample: usize,
     pub(super) reading: Intersample,
     pub(super) target: f64,
+    /// Time since the controller sample (s).
+    pub(super) offset_s: f64,
 }
 
 /// Buffers of one running simulation.
@@ -112,6 +114,7 @@ impl Scene {
             servo.push(ServoSample {
                 controller_sample: k as usize,
                 reading: plant.intersample(offset.max(0.0)),
+                offset_s: offset.max(0.0),
                 target: r.at(at) + noise::runout(&profile.noise, at),
             });
         }

@@ -25,4 +25,13 @@ pub enum RecordingError {
     /// The clock does not tick evenly.
     #[error("{}:{line}: the clock steps by {found_s} s; expected {expected_s} s as in the rows before", file.display())]
     Clock { file: PathBuf, line: usize, found_s: f64, expected_s: f64 },
+    /// A TOML document cannot be read.
+    #[error(transparent)]
+    Document(#[from] crate::document::DocumentError),
+    /// A sample time makes no sense.
+    #[error("sample time {found_s} s: expected a finite time above 0 s")]
+    SampleTime { found_s: f64 },
+    /// The case file's content makes no case.
+    #[error("{}: {key}: found {found}; expected {expected}", file.display())]
+    Case { file: PathBuf, key: &'static str, found: String, expected: &'static str },
 }

@@ -3,8 +3,12 @@
 //! In: CSV files, gzip allowed. Out: [`Columns`], every number finite and every place of a refusal named.
 //! Convention: one row a sample; a clock column must tick evenly. Spec: `specs/files.md`.
 
+mod case;
 mod columns;
 mod error;
+mod record;
 
+pub use case::{Case, RecordEntry, Role};
 pub use columns::{Columns, read_columns};
 pub use error::RecordingError;
+pub use record::{ClockGap, ColumnNames, Record, RecordSettings};

@@ -25,6 +25,7 @@ pub mod number;
 pub mod nyquist;
 pub mod page;
 pub mod pes;
+pub mod physical;
 pub mod routes;
 pub mod sampled;
 pub mod sensitivity;

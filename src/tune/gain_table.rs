@@ -4,7 +4,7 @@
 //! refuses a table whose sections are not those of its gains.
 
 use super::judge::Proof;
-use super::{Outcome, Route};
+use super::{Outcome, PhysicalTuning, Route};
 use crate::controller::{Controller, ControllerError, Feedforward, Lowpass, Notch, Pid};
 use crate::document::{DocumentError, parse_toml, read_text, write_text};
 use crate::feedback::Crossing;
@@ -104,6 +104,9 @@ pub struct Provenance {
     /// Why the machine was tuned whatever the gate said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gate_override: Option<String>,
+    /// Effects beyond linear that the table was tuned and judged with.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub physics: Vec<String>,
     /// Every other input by its role, in the order given.
     pub inputs: Vec<InputDigest>,
 }
@@ -205,9 +208,27 @@ impl GainTable {
                 gate_action: None,
                 gate_probability: None,
                 gate_override: None,
+                physics: Vec::new(),
                 inputs,
             },
         })
+    }
+
+    /// The table of a tuning with physics: before and after as judged with every effect, which the provenance names.
+    pub fn of_physics(
+        tuning: &PhysicalTuning,
+        effects: &[&str],
+        seed: u64,
+        spec_sha256: String,
+        inputs: Vec<InputDigest>,
+    ) -> Result<GainTable, GainTableError> {
+        let mut table = GainTable::of(&tuning.outcome, seed, spec_sha256, inputs)?;
+        table.before = tuning.before.as_ref().map(|p| Summary::of(&p.proof()));
+        table.after = Summary::of(&tuning.after.proof());
+        table.provenance.route = Route::Physics;
+        table.provenance.feasible = tuning.passes();
+        table.provenance.physics = effects.iter().map(|e| (*e).to_owned()).collect();
+        Ok(table)
     }
 
     /// The controller of the table.

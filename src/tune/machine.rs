@@ -45,6 +45,8 @@ pub enum Route {
     Model,
     /// Straight on the measured response.
     Response,
+    /// On equivalent responses of a model with physics, one an amplitude.
+    Physics,
 }
 
 impl Machine<'_> {

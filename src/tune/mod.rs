@@ -12,6 +12,7 @@ mod linear;
 mod machine;
 mod outcome;
 mod parameters;
+mod physical;
 mod polish;
 mod quadratic;
 mod requirements;
@@ -27,6 +28,9 @@ pub use judge::{Proof, judge};
 pub use machine::{Hold, Machine, Route};
 pub use outcome::{AtBound, Infeasible, Outcome, RelaxedLimit, Tuned, Work};
 pub use parameters::{Parameter, Parameters};
+pub use physical::{
+    PhysicalProof, PhysicalTuning, TUNED_AMPLITUDES, equivalent_responses, judge_physical, tune_physical,
+};
 pub use requirements::{Found, Judged, JudgedLimit, Requirement, Side, What};
 pub use spec::{Bounds, HarmonicLimit, Limits, MarginLimits, Search, Spec, SpecError};
 pub use tuning::{TuneError, TuneSettings, tune, tune_jointly};

@@ -8,6 +8,7 @@ use super::search::{Effort, refine, search};
 use super::{Bench, Machine, Parameters, Side, Spec, SpecError, judge};
 use crate::controller::{Controller, ControllerError};
 use crate::feedback::FeedbackError;
+use crate::frf::FrfShapeError;
 use crate::lti::LtiError;
 use crate::pes::{PesError, ProfileError};
 use thiserror::Error;
@@ -59,6 +60,9 @@ pub enum TuneError {
     /// The plant carries physics that a linear tuning would ignore.
     #[error("the plant has the effect \"{effect}\", which tuning cannot take into account; expected a linear plant")]
     Physics { effect: String },
+    /// The physics leaves no response.
+    #[error("equivalent response of the plant with physics: {0}")]
+    Response(#[from] FrfShapeError),
     /// The sweep is too short for a search.
     #[error(
         "the response has {points} points below half the sample rate, {half_rate_hz} Hz: expected at least {needed}"

@@ -1,0 +1,71 @@
+//! What an effect adds to the recorded position: its law along the measured motion, sent through the plant.
+//!
+//! The law is driven by the motion as recorded, so the answer is exact whatever the effect's size: with
+//! x'' + c x' + k x = b (u + w), the error of the model without w is the plant's answer to w alone.
+
+use super::linear::{Sampled, add_response};
+use super::trajectory::Trajectory;
+use super::whiten::Whitener;
+use crate::physics::{COLUMNS, Effect, Entry, Sample, Scene};
+
+/// The columns of an effect along one trajectory, at their place of entry.
+pub fn raw_columns(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectory: &Trajectory) -> Vec<Vec<f64>> {
+    let facts = effect.facts();
+    let n = trajectory.samples.len();
+    let mut law = effect.law(inner, scene);
+    let mut out = vec![vec![0.0; n]; facts.columns];
+    let mut value = [0.0; COLUMNS];
+    let samples = &trajectory.samples;
+    let ahead = usize::from(facts.entry == Entry::Torque);
+    for k in 0..n {
+        // A torque's column belongs to the interval that starts at the sample, the others' to the sample itself.
+        let (from, to): (&Sample, &Sample) = if ahead == 1 {
+            (&samples[k], &samples[(k + 1).min(n - 1)])
+        } else {
+            (&samples[k.saturating_sub(1)], &samples[k])
+        };
+        law.columns(from, to, &mut value[..facts.columns]);
+        law.commit(from, to);
+        for (column, v) in out.iter_mut().zip(&value) {
+            column[k] = *v;
+        }
+    }
+    out
+}
+
+/// The same in the recorded position.
+pub fn position_columns(
+    effect: &dyn Effect,
+    inner: &[f64],
+    scene: &Scene,
+    trajectory: &Trajectory,
+    sampled: &Sampled,
+) -> Vec<Vec<f64>> {
+    let raw = raw_columns(effect, inner, scene, trajectory);
+    let through = match effect.facts().entry {
+        Entry::Position => return raw,
+        Entry::Command => &sampled.delayed,
+        Entry::Torque => &sampled.direct,
+    };
+    raw.into_iter()
+        .map(|column| {
+            let mut y = vec![0.0; column.len()];
+            add_response(through, &column, &mut y);
+            y
+        })
+        .collect()
+}
+
+/// The same, whitened.
+pub fn white_columns(
+    effect: &dyn Effect,
+    inner: &[f64],
+    scene: &Scene,
+    trajectory: &Trajectory,
+    sampled: &Sampled,
+    whitener: &Whitener,
+) -> Vec<Vec<f64>> {
+    let mut all = position_columns(effect, inner, scene, trajectory, sampled);
+    all.iter_mut().for_each(|c| whitener.apply(c));
+    all
+}

@@ -1,0 +1,51 @@
+//! The corrected model: the refitted plant with the effects as `[[plant.physics]]`.
+//!
+//! Where a bearing that sticks takes over the spring of the body, little or less than nothing of that spring is left; the body
+//! then is a free inertia and the rest stands as a plain cable spring, of either sign.
+
+use super::linear::{LinearForm, body_numbers};
+use super::refit::Chosen;
+use crate::lti::{Body, PhysicsEntry, Plant};
+use crate::physics::{Effect, Scene, Setting, effect};
+
+/// The plant and the effects that simulate it.
+#[derive(Clone)]
+pub struct Corrected {
+    /// The plant, physics entries included.
+    pub plant: Plant,
+    /// The effects of the entries.
+    pub effects: Vec<(&'static dyn Effect, Setting)>,
+}
+
+/// Share of the given stiffness below which the body counts as free.
+const FREE: f64 = 0.02;
+
+/// Makes the corrected model of a fit; `per_record` effects belong to records, not to the machine, and stay out.
+pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[Chosen], scene: &Scene) -> Corrected {
+    let mut plant = form.plant(p);
+    let mut effects: Vec<(&'static dyn Effect, Setting)> = Vec::new();
+    let mut entries = Vec::new();
+    let named = |name: &str, e: &dyn Effect, s: &Setting| PhysicsEntry {
+        effect: name.into(),
+        parameters: e.parameters(s, scene).into_iter().map(|q| (q.name.to_owned(), q.value)).collect(),
+    };
+    for c in chosen.iter().filter(|c| !c.effect.facts().per_record) {
+        entries.push(named(c.effect.facts().name, c.effect, &c.setting));
+        effects.push((c.effect, c.setting.clone()));
+    }
+    let carrier = form.carrier(p);
+    let (b, k0, c0) = body_numbers(&carrier.plant.body);
+    let stiffness = k0 - carrier.spring * b * form.given.resonance_gain;
+    if k0 > 0.0 && stiffness < FREE * k0 {
+        let viscous = c0 - carrier.damper * b * form.given.resonance_gain;
+        plant.body = Body::FreeInertia { acceleration_gain: b, viscous_rate_per_s: viscous.max(0.0) };
+        if let Some(spring) = effect("cable_spring") {
+            let strength = stiffness / (b * form.given.resonance_gain);
+            let setting = Setting { inner: vec![0.0, 0.0], strengths: vec![strength, 0.0] };
+            entries.push(named("cable_spring", spring, &setting));
+            effects.push((spring, setting));
+        }
+    }
+    plant.physics = entries;
+    Corrected { plant, effects }
+}

@@ -1,0 +1,41 @@
+//! Diagnose: where simulation and recordings differ, what physics was left out, and whether the model now fits.
+//!
+//! In: a case (plant, controller, records). Out: a [`Diagnosis`] and the corrected model. Convention: errors are recorded less
+//! simulated position; effects are driven by the recorded motion, so that their answer is exact whatever their size; whitened
+//! errors have variance 1 under noise alone. Spec: `specs/mismatch.md`.
+
+mod bench;
+mod columns;
+mod corrected;
+mod diagnosis;
+mod experiment;
+mod finding;
+mod hygiene;
+mod judge;
+mod linear;
+mod name;
+mod place;
+mod refit;
+mod run;
+mod scan;
+mod select;
+mod stack;
+mod trajectory;
+mod whiten;
+
+pub use bench::Bench;
+pub use corrected::Corrected;
+pub use diagnosis::{DiagnoseError, DiagnoseSettings, Diagnosed, diagnose};
+pub use finding::{
+    Diagnosis, Estimate, Finding, FitFigures, FitReport, NextExperiment, RecordFigures, Tried, Verdict, Where,
+};
+pub use hygiene::{Replay, SampleFault};
+pub use judge::Simulation;
+pub use linear::LinearForm;
+pub use refit::{Chosen, Fit, Refitted};
+pub use run::Run;
+pub use scan::Candidate;
+pub use select::{Model, SelectSettings, Selection, Step};
+pub use stack::{Segment, Stack};
+pub use trajectory::Trajectory;
+pub use whiten::{NoiseLevels, Whitener};

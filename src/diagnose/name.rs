@@ -1,0 +1,423 @@
+//! From numbers to findings: names, families, sentences, intervals.
+
+use super::bench::Bench;
+use super::columns::position_columns;
+use super::finding::{Diagnosis, Estimate, Finding, Verdict, Where};
+use super::hygiene::{Replay, SampleFault};
+use super::linear::{Knob, LinearForm, Sampled, body_numbers};
+use super::place::place;
+use super::run::Run;
+use super::scan::log_tail;
+use super::select::{Selection, Step};
+use crate::physics::{Parameter, Setting, facts, library};
+use std::collections::BTreeMap;
+
+/// Difference of the fit (twice the log-likelihood) below which two names are one family.
+const FAMILY: f64 = 20.0;
+/// The same as a share of what the effect explains: laws differ from any machine by more than noise.
+const FAMILY_SHARE: f64 = 0.01;
+
+fn text_of(name: &str) -> (&'static str, crate::physics::Port) {
+    facts(name).map_or(("something that the model does not hold", crate::physics::Port::Torque), |f| (f.says, f.port))
+}
+
+fn plain(value: f64, unit: &str) -> Estimate {
+    Estimate { value, low: value, high: value, unit: unit.into() }
+}
+
+fn everywhere(runs: &[&Run]) -> Where {
+    Where { records: runs.iter().map(|r| r.name.clone()).collect(), velocity_sign: "both", ..Where::default() }
+}
+
+/// The finding of one accepted step.
+pub(super) fn finding(bench: &Bench, selection: &Selection, step: &Step, index: usize) -> Finding {
+    let taken = step.taken.unwrap_or(0);
+    let (candidate, model) = &step.tried[taken];
+    let c = &step.candidates[*candidate];
+    let at = model.chosen.len() - 1;
+    let last = &selection.model;
+    let chosen = &last.chosen[at.min(last.chosen.len() - 1)];
+    let before = if index == 0 { selection.baseline.cost } else { cost_before(selection, index) };
+    let gain = before - model.cost;
+    let spindle =
+        |hz: f64| bench.scene.spindle_hz.is_some_and(|s| ((hz / s).round() - hz / s).abs() < 0.004 && hz > 0.9 * s);
+    let own = c.effect.facts().name;
+    // A line at a multiple of the spindle is run-out, whichever law carried it.
+    let name = if own == "line_disturbance" && spindle(chosen.setting.inner[0]) { "repeatable_runout" } else { own };
+    let mut family = vec![name.to_owned()];
+    for (j, other) in &step.tried {
+        let rival = step.candidates[*j].effect.facts().name;
+        if other.cost - model.cost < FAMILY.max(FAMILY_SHARE * gain * 0.1)
+            && !family.iter().any(|f| f == rival)
+            && rival != own
+        {
+            family.push(rival.to_owned());
+        }
+    }
+    let log_p = log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library().len() as f64).ln();
+    let (says, port) = text_of(name);
+    let signal = effect_signal(bench, selection, at);
+    let mut parameters = estimates(bench, selection, at);
+    if name == "repeatable_runout" && own == "line_disturbance" {
+        parameters.insert("base_hz".into(), plain(bench.scene.spindle_hz.unwrap_or(0.0), "Hz"));
+    }
+    let place = place(bench, &bench.stack, &signal);
+    let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
+    Finding {
+        effect: name.into(),
+        family,
+        port,
+        p_value: log_p.min(0.0).exp().max(1e-300),
+        says: format!("Between {:.3} and {:.3} Hz {says}.", band[0], band[1]),
+        parameters,
+        place,
+    }
+}
+
+fn cost_before(selection: &Selection, index: usize) -> f64 {
+    let step = &selection.steps[index - 1];
+    step.taken.map_or(selection.baseline.cost, |t| step.tried[t].1.cost)
+}
+
+/// What the effect adds, whitened and stacked.
+fn effect_signal(bench: &Bench, selection: &Selection, at: usize) -> Vec<f64> {
+    let model = &selection.model;
+    let chosen = &model.chosen[at];
+    let plant = bench.form.carrier(&model.refitted.p).plant;
+    let Ok(sampled) = Sampled::of(&plant, bench.scene.sample_time_s) else { return vec![0.0; bench.stack.total] };
+    let facts = chosen.effect.facts();
+    let mut signal = bench.stack.series(|i| {
+        let columns =
+            position_columns(chosen.effect, &chosen.setting.inner, &bench.scene, &bench.trajectories[i], &sampled);
+        let own = if facts.per_record {
+            &chosen.setting.strengths[i * facts.columns..]
+        } else {
+            &chosen.setting.strengths[..]
+        };
+        let mut y = vec![0.0; bench.means[i].len()];
+        for (c, s) in columns.iter().zip(own) {
+            y.iter_mut().zip(c).for_each(|(y, c)| *y += s * c);
+        }
+        bench.whitener.apply(&mut y);
+        y
+    });
+    // What a record's own start and a constant torque imitate is no evidence of place.
+    bench.fit(vec![]).local_basis().project(&mut signal);
+    signal
+}
+
+/// Parameters of the chosen effect `at` with 95 % intervals: each free number moved by its standard error, the changes of
+/// each parameter added as squares; widened where the model leaves more than noise.
+fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String, Estimate> {
+    let model = &selection.model;
+    let scene = &bench.scene;
+    let chosen = &model.chosen[at];
+    let effect = chosen.effect;
+    let base = effect.parameters(&chosen.setting, scene);
+    let widen = (model.cost / model.freedom).max(1.0).sqrt() * 1.96;
+    let mut place = bench.form.knobs.len();
+    let strengths_of =
+        |i: usize| if model.chosen[i].effect.facts().fixed { 0 } else { model.chosen[i].setting.strengths.len() };
+    place += (0..at).map(strengths_of).sum::<usize>();
+    let mut moved: Vec<Vec<Parameter>> = Vec::new();
+    let spread = &model.refitted.spread;
+    for i in 0..strengths_of(at) {
+        let mut s: Setting = chosen.setting.clone();
+        s.strengths[i] += spread.get(place + i).copied().unwrap_or(0.0) * widen;
+        moved.push(effect.parameters(&s, scene));
+    }
+    let mut inner = bench.form.knobs.len() + (0..model.chosen.len()).map(strengths_of).sum::<usize>();
+    let free = |i: usize| model.chosen[i].continuous.iter().filter(|c| **c).count();
+    inner += (0..at).map(free).sum::<usize>();
+    for (i, _) in chosen.continuous.iter().enumerate().filter(|(_, c)| **c) {
+        let mut s = chosen.setting.clone();
+        s.inner[i] *= (spread.get(inner).copied().unwrap_or(0.0) * widen).min(2.0).exp();
+        inner += 1;
+        moved.push(effect.parameters(&s, scene));
+    }
+    let (position, command) = (&bench.form.given.position_unit, &bench.form.given.command_unit);
+    let mut out: BTreeMap<String, Estimate> = base
+        .iter()
+        .enumerate()
+        .map(|(k, p)| {
+            let off = moved.iter().map(|m| m.get(k).map_or(0.0, |q| (q.value - p.value).powi(2))).sum::<f64>().sqrt();
+            let e = Estimate {
+                value: p.value,
+                low: p.value - off,
+                high: p.value + off,
+                unit: p.unit.text(position, command),
+            };
+            (p.name.to_owned(), e)
+        })
+        .collect();
+    if effect.facts().name == "pivot_friction" {
+        effective_length(bench, selection, chosen.setting.inner[1], &mut out);
+    }
+    out
+}
+
+/// The sliding length as a person means it: sliding level over the stiffness of small motions. Where the fit leaves the body a
+/// spring below zero, that spring belongs to the bearing's curve.
+fn effective_length(bench: &Bench, selection: &Selection, shape: f64, out: &mut BTreeMap<String, Estimate>) {
+    let carrier = bench.form.carrier(&selection.model.refitted.p);
+    let (b, k, _) = body_numbers(&carrier.plant.body);
+    let gain = b * bench.form.given.resonance_gain;
+    let rest = k / gain - carrier.spring;
+    let (Some(level), Some(length)) = (out.get("level_command").cloned(), out.get("sliding_length").cloned()) else {
+        return;
+    };
+    // First slope of each shape's loading curve, in levels per sliding length.
+    let slope = if (0.5..1.5).contains(&shape) { 2.0 } else { 1.0 };
+    let stiffness = slope * level.value / length.value + rest.min(0.0);
+    if stiffness > 0.0 && level.value > 0.0 {
+        let value = level.value / stiffness;
+        let share = (length.high - length.value).abs() / length.value + 0.02;
+        out.insert("law_length".into(), length.clone());
+        let e = Estimate { value, low: value * (1.0 - share), high: value * (1.0 + share), unit: length.unit };
+        out.insert("sliding_length".into(), e);
+    }
+}
+
+/// The position log is shifted.
+pub(super) fn misalignment(r: &Replay, sample_time_s: f64, runs: &[&Run]) -> Finding {
+    let (says, port) = text_of("misalignment");
+    let parameters = BTreeMap::from([
+        (
+            "samples".to_owned(),
+            Estimate {
+                value: r.shift_samples,
+                low: r.shift_samples - 0.05,
+                high: r.shift_samples + 0.05,
+                unit: "samples".into(),
+            },
+        ),
+        ("shift_s".to_owned(), plain(r.shift_samples * sample_time_s, "s")),
+    ]);
+    Finding {
+        effect: "misalignment".into(),
+        family: vec!["misalignment".into()],
+        port,
+        p_value: 1e-300,
+        says: format!(
+            "In the log {says}: shifted by {:.2} samples, the documented controller gives the recorded command again.",
+            r.shift_samples
+        ),
+        parameters,
+        place: everywhere(runs),
+    }
+}
+
+/// Position or command is logged in other units, or with the other sign.
+pub(super) fn scale(r: &Replay, runs: &[&Run]) -> Finding {
+    let parameters = BTreeMap::from([
+        ("position_factor".to_owned(), plain(r.position_factor, "1")),
+        ("command_factor".to_owned(), plain(r.command_factor, "1")),
+    ]);
+    let sign = if r.position_factor < 0.0 { "with the sign turned round" } else { "in other units" };
+    Finding {
+        effect: "linear_parameters".into(),
+        family: vec!["linear_parameters".into()],
+        port: crate::physics::Port::Time,
+        p_value: 1e-300,
+        says: format!(
+            "The position is logged {sign}: the controller's command follows from the log only with a factor of {:.6}.",
+            r.position_factor
+        ),
+        parameters,
+        place: everywhere(runs),
+    }
+}
+
+/// The command does not follow from the documented law.
+pub(super) fn controller_mismatch(r: &Replay, runs: &[&Run]) -> Finding {
+    let (says, port) = text_of("controller_mismatch");
+    Finding {
+        effect: "controller_mismatch".into(),
+        family: vec!["controller_mismatch".into()],
+        port,
+        p_value: 1e-300,
+        says: format!(
+            "{says}: replayed over the log, the documented law misses the recorded command by {:.2} % rms.",
+            100.0 * r.error
+        ),
+        parameters: BTreeMap::from([("replay_error".to_owned(), plain(r.error, "1"))]),
+        place: everywhere(runs),
+    }
+}
+
+/// Samples are missing, doubled or stuck.
+pub(super) fn samples(faults: &[SampleFault]) -> Finding {
+    let (says, port) = text_of("lost_samples");
+    let first = &faults[0];
+    let records: Vec<String> = faults.iter().map(|f| f.record.clone()).collect();
+    Finding {
+        effect: "lost_samples".into(),
+        family: vec!["lost_samples".into()],
+        port,
+        p_value: 1e-300,
+        says: format!(
+            "{says}: record {} at {:.6} s, {} samples{}.",
+            first.record,
+            first.time_s,
+            first.samples,
+            if first.stuck { " stuck" } else { "" }
+        ),
+        parameters: BTreeMap::from([("samples".to_owned(), plain(first.samples, "samples"))]),
+        place: Where {
+            records,
+            time_s: faults.iter().map(|f| [f.time_s, f.time_s]).collect(),
+            velocity_sign: "both",
+            ..Where::default()
+        },
+    }
+}
+
+/// There, but no effect of the library explains it.
+pub(super) fn unexplained(bench: &Bench, selection: &Selection, explained: f64) -> Finding {
+    let (fit, model) = (bench.fit(vec![]), &selection.baseline);
+    let (error, _) = fit.screen_basis(&model.refitted.p);
+    let place = place(bench, &bench.stack, &error);
+    let best =
+        selection.steps.first().and_then(|s| s.candidates.first()).map_or("no effect", |c| c.effect.facts().name);
+    let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
+    Finding {
+        effect: "unexplained".into(),
+        family: vec!["unexplained".into()],
+        port: crate::physics::Port::Torque,
+        p_value: log_tail(model.excess() + model.freedom, model.freedom as usize).min(0.0).exp().max(1e-300),
+        says: format!(
+            "Between {:.3} and {:.3} Hz something acts that the library does not hold: its nearest law, {best}, leaves {:.1} % of the error.",
+            band[0],
+            band[1],
+            100.0 * (1.0 - explained)
+        ),
+        parameters: BTreeMap::new(),
+        place,
+    }
+}
+
+/// What the noise itself tells: a coarse sensor grid, or noise that grows with the speed. Names it only where the mean of the
+/// records is explained.
+pub(super) fn noise_story(bench: &Bench) -> Option<Finding> {
+    let whole: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
+    let command = &bench.form.given.position_unit;
+    let steps: Vec<f64> = whole.iter().filter_map(|r| super::hygiene::quantum(&r.position)).collect();
+    if steps.len() == whole.len() && !steps.is_empty() {
+        let q = steps.iter().copied().fold(f64::INFINITY, f64::min);
+        // Rounding to a grid makes noise of step/√12; below a quarter of the noise's power it is nobody's concern.
+        if q * q / 12.0 > 0.25 * bench.levels.sensor_rms.powi(2) {
+            return Some(statistic("quantisation", ("step", plain(q, command)), 1e-300, &whole));
+        }
+    }
+    // Squares of the whitened repeats against the square of the speed.
+    let (mut n, mut sx, mut sy, mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (run, series) in &bench.repeats {
+        let Some(segment) = bench.stack.segments.iter().position(|s| s.runs.contains(run)) else { continue };
+        for (e, m) in series.iter().zip(&bench.trajectories[segment].samples) {
+            let (x, y) = ((m.v / bench.scene.speed).powi(2), e * e);
+            n += 1.0;
+            sx += x;
+            sy += y;
+            sxx += x * x;
+            sxy += x * y;
+            syy += y * y;
+        }
+    }
+    if n < 100.0 {
+        return None;
+    }
+    let spread = sxx - sx * sx / n;
+    let slope = (sxy - sx * sy / n) / spread;
+    let left = (syy - sy * sy / n - slope * (sxy - sx * sy / n)) / n;
+    let sigma = (left / spread).sqrt();
+    let floor = (sy - slope * sx) / n;
+    // Seven standard errors, and at the highest speed half as much again as at rest.
+    if !(slope > 7.0 * sigma && slope > 0.5 * floor) {
+        return None;
+    }
+    let seconds = (slope * bench.levels.sensor_rms.powi(2)).sqrt() / bench.scene.speed;
+    let z = slope / sigma;
+    let mut f = statistic("jitter", ("rms_s", plain(seconds, "s")), log_tail(z * z, 1).exp().max(1e-300), &whole);
+    f.family.push("encoder_noise".into());
+    Some(f)
+}
+
+fn statistic(name: &str, parameter: (&str, Estimate), p_value: f64, runs: &[&Run]) -> Finding {
+    let (says, port) = text_of(name);
+    Finding {
+        effect: name.into(),
+        family: vec![name.into()],
+        port,
+        p_value,
+        says: format!("{says}."),
+        parameters: BTreeMap::from([(parameter.0.to_owned(), parameter.1)]),
+        place: everywhere(runs),
+    }
+}
+
+/// Sum of squares with only some of the linear parameters free.
+fn restricted(bench: &Bench, keep: impl Fn(Knob) -> bool, selection: &Selection) -> (f64, Vec<f64>, usize) {
+    let knobs: Vec<Knob> = bench.form.knobs.iter().copied().filter(|k| keep(*k)).collect();
+    let form = LinearForm { knobs: knobs.clone(), ..bench.form.clone() };
+    let start = vec![0.0; knobs.len()];
+    let mut fit = super::refit::Fit { form: &form, ..bench.fit(selection.model.chosen.clone()) };
+    if knobs.is_empty() && fit.chosen.is_empty() {
+        return (fit.cost(&start), start, 0);
+    }
+    let r = fit.refit(&start, 8);
+    (r.cost, r.p, knobs.len())
+}
+
+/// What happened to the linear parameters: nothing, the delay alone, one mode alone, or a refit.
+pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
+    if d.verdict == Verdict::LocatedUnexplained || d.verdict == Verdict::DataFault {
+        return;
+    }
+    let full = selection.model.cost;
+    let all = bench.form.knobs.len() as f64;
+    // Chi-square of as many parameters as were freed, and four of its standard deviations.
+    let allowed = |free: usize| {
+        let n = all - free as f64;
+        n + 5.0 * (2.0 * n).sqrt() + 10.0
+    };
+    let (fixed, _, _) = restricted(bench, |_| false, selection);
+    if fixed - full < allowed(0) {
+        d.remarks.push("the linear parameters agree with the given plant".into());
+        return;
+    }
+    let (delay, p, free) = restricted(bench, |k| k == Knob::Delay, selection);
+    if delay - full < allowed(free) {
+        let t = bench.scene.sample_time_s;
+        let value = p[0] * t;
+        let sigma =
+            bench.form.knobs.iter().position(|k| *k == Knob::Delay).map_or(0.0, |i| selection.model.refitted.spread[i])
+                * t;
+        let (says, port) = text_of("extra_delay");
+        let f = Finding {
+            effect: "extra_delay".into(),
+            family: vec!["extra_delay".into()],
+            port,
+            p_value: log_tail(fixed - delay, 1).min(0.0).exp().max(1e-300),
+            says: format!("{says}: {:.2} microseconds.", value * 1e6),
+            parameters: BTreeMap::from([(
+                "delay_s".to_owned(),
+                Estimate { value, low: value - 1.96 * sigma, high: value + 1.96 * sigma, unit: "s".into() },
+            )]),
+            place: everywhere(&bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect::<Vec<_>>()),
+        };
+        if d.verdict == Verdict::NoMismatch {
+            d.verdict = Verdict::Named;
+        }
+        d.findings.push(f);
+        return;
+    }
+    if d.verdict == Verdict::NoMismatch {
+        d.verdict = Verdict::Refit;
+    }
+    let (b0, k0, c0) = body_numbers(&bench.form.given.body);
+    let (b1, k1, c1) = body_numbers(&selection.model.refitted.plant.body);
+    d.remarks.push(format!(
+        "linear refit: acceleration gain {b0:.6e} -> {b1:.6e}, stiffness {k0:.6e} -> {k1:.6e} 1/s^2, viscous rate {c0:.4} -> {c1:.4} 1/s, delay {:.3e} -> {:.3e} s",
+        bench.form.given.delay_s, selection.model.refitted.plant.delay_s
+    ));
+}

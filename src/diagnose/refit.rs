@@ -1,0 +1,286 @@
+//! All linear parameters fitted to all fit records at once, with the strengths and inner parameters of the effects that
+//! were chosen so far; by the whitened simulation error.
+
+use super::columns::raw_columns;
+use super::linear::{Carrier, LinearForm, Sampled, add_response, free_motions};
+use super::run::Run;
+use super::stack::{Basis, Stack};
+use super::trajectory::Trajectory;
+use super::whiten::Whitener;
+use crate::lti::Plant;
+use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
+use crate::physics::{Effect, Entry, Sample, Scene, Setting};
+use rayon::prelude::*;
+
+/// An effect that is part of the model, with its numbers.
+#[derive(Clone)]
+pub struct Chosen {
+    /// The effect.
+    pub effect: &'static dyn Effect,
+    /// Its numbers.
+    pub setting: Setting,
+    /// Which inner parameters may be refined.
+    pub continuous: Vec<bool>,
+}
+
+/// What a refit works on.
+pub struct Fit<'a> {
+    /// The form of the linear plant.
+    pub form: &'a LinearForm,
+    /// The mean run of every segment of the stack.
+    pub means: &'a [Run],
+    /// The motion behind each.
+    pub trajectories: &'a [Trajectory],
+    /// The filter.
+    pub whitener: &'a Whitener,
+    /// How they are stacked.
+    pub stack: &'a Stack,
+    /// Machine and size of its motion.
+    pub scene: &'a Scene,
+    /// Effects in the model.
+    pub chosen: Vec<Chosen>,
+}
+
+/// Where a refit ended.
+#[derive(Clone, Debug)]
+pub struct Refitted {
+    /// Linear parameters.
+    pub p: Vec<f64>,
+    /// The plant they make.
+    pub plant: Plant,
+    /// Sum of squares of the whitened error.
+    pub cost: f64,
+    /// Standard errors of the linear parameters, then of the effects' strengths and inner parameters, in their order.
+    pub spread: Vec<f64>,
+    /// Whether the method met its tolerance.
+    pub converged: bool,
+}
+
+/// Step of a finite difference in a linear parameter: the answer is smooth and known to ten digits.
+const STEP: f64 = 1e-5;
+/// Relative step in an inner parameter: laws have kinks, and smaller steps see only them.
+const INNER_STEP: f64 = 1e-3;
+
+struct Problem<'a, 'f> {
+    fit: &'a Fit<'f>,
+    local: Basis,
+    /// Inner parameters to refine: effect and place.
+    inner: Vec<(usize, usize)>,
+    /// Strengths: effect and place.
+    strengths: Vec<(usize, usize)>,
+}
+
+impl Problem<'_, '_> {
+    fn settings(&self, x: &[f64]) -> Vec<Setting> {
+        let mut all: Vec<Setting> = self.fit.chosen.iter().map(|c| c.setting.clone()).collect();
+        let p = self.fit.form.knobs.len();
+        for (v, &(e, i)) in x[p..].iter().zip(&self.strengths) {
+            all[e].strengths[i] = *v;
+        }
+        for (v, &(e, i)) in x[p + self.strengths.len()..].iter().zip(&self.inner) {
+            all[e].inner[i] = v.exp().copysign(all[e].inner[i]);
+        }
+        all
+    }
+
+    /// Whitened error, one stacked vector, local directions taken out.
+    fn error(&self, x: &[f64]) -> Vec<f64> {
+        let fit = self.fit;
+        let carrier = fit.form.carrier(&x[..fit.form.knobs.len()]);
+        let Ok(sampled) = Sampled::of(&carrier.plant, fit.scene.sample_time_s) else {
+            return vec![f64::INFINITY; fit.stack.total];
+        };
+        let settings = self.settings(x);
+        let effects: Vec<(&dyn Effect, &Setting)> = fit.chosen.iter().map(|c| c.effect).zip(&settings).collect();
+        let mut all = fit.stack.series(|i| {
+            let mut e =
+                simulation_error(&sampled, &carrier, &effects, fit.scene, &fit.means[i], &fit.trajectories[i], i);
+            fit.whitener.apply(&mut e);
+            e
+        });
+        self.local.project(&mut all);
+        all
+    }
+}
+
+/// Recorded position less the carrier's answer to the recorded command, with changes of the body and all effects driven by
+/// the recorded motion; `segment` picks the strengths of effects that differ from record to record.
+pub fn simulation_error(
+    sampled: &Sampled,
+    carrier: &Carrier,
+    effects: &[(&dyn Effect, &Setting)],
+    scene: &Scene,
+    run: &Run,
+    trajectory: &Trajectory,
+    segment: usize,
+) -> Vec<f64> {
+    let mut command = run.input.clone();
+    let mut torque: Option<Vec<f64>> = (carrier.spring != 0.0 || carrier.damper != 0.0).then(|| {
+        // The mean over each interval, by the trapezium.
+        let at = |s: &Sample| carrier.spring * s.x + carrier.damper * s.v;
+        let samples = &trajectory.samples;
+        (0..run.len()).map(|k| 0.5 * (at(&samples[k]) + at(&samples[(k + 1).min(run.len() - 1)]))).collect()
+    });
+    let mut y = vec![0.0; run.len()];
+    for (effect, setting) in effects {
+        let raw = raw_columns(*effect, &setting.inner, scene, trajectory);
+        let facts = effect.facts();
+        // Effects that differ from record to record have their strengths segment by segment.
+        let own = if facts.per_record {
+            setting.strengths.get(segment * facts.columns..).unwrap_or(&[])
+        } else {
+            &setting.strengths
+        };
+        for (column, s) in raw.iter().zip(own) {
+            let into = match facts.entry {
+                Entry::Command => &mut command,
+                Entry::Torque => torque.get_or_insert_with(|| vec![0.0; run.len()]),
+                Entry::Position => &mut y,
+            };
+            into.iter_mut().zip(column).for_each(|(o, v)| *o += s * v);
+        }
+    }
+    add_response(&sampled.delayed, &command, &mut y);
+    if let Some(w) = torque {
+        add_response(&sampled.direct, &w, &mut y);
+    }
+    run.position.iter().zip(&y).map(|(m, y)| m - y).collect()
+}
+
+impl Residuals for Problem<'_, '_> {
+    fn rows(&self) -> usize {
+        self.fit.stack.total
+    }
+
+    fn cols(&self) -> usize {
+        self.fit.form.knobs.len() + self.strengths.len() + self.inner.len()
+    }
+
+    fn evaluate(&mut self, x: &[f64], r: &mut [f64]) {
+        r.copy_from_slice(&self.error(x));
+    }
+
+    fn jacobian(&mut self, x: &[f64], j: &mut [f64]) {
+        let base = self.error(x);
+        let p = self.fit.form.knobs.len();
+        let this = &*self;
+        j.par_chunks_exact_mut(base.len()).enumerate().for_each(|(i, column)| {
+            let mut moved = x.to_vec();
+            // A strength enters linearly: any step is exact, and one of its own size keeps the digits.
+            let step = match i {
+                i if i < p => STEP,
+                i if i < p + this.strengths.len() => x[i].abs().max(1e-9),
+                _ => INNER_STEP,
+            };
+            moved[i] += step;
+            for ((c, a), b) in column.iter_mut().zip(this.error(&moved)).zip(&base) {
+                *c = (a - b) / step;
+            }
+        });
+    }
+
+    fn limit(&self, i: usize) -> Limit {
+        let p = self.fit.form.knobs.len();
+        if i >= p + self.strengths.len() {
+            let (e, k) = self.inner[i - p - self.strengths.len()];
+            let at = self.fit.chosen[e].setting.inner[k].abs().ln();
+            return Limit { low: at - 3.0, high: at + 3.0, step: 0.3 };
+        }
+        if i >= p {
+            return Limit { low: f64::NEG_INFINITY, high: f64::INFINITY, step: f64::INFINITY };
+        }
+        use super::linear::Knob;
+        let (low, high, step) = match self.fit.form.knobs[i] {
+            Knob::Gain => (-6.0, 6.0, 0.5),
+            Knob::Stiffness => (-50.0, 50.0, 5.0),
+            Knob::Viscous => (-50.0, 50.0, 5.0),
+            Knob::Delay => (-50.0, 50.0, 0.5),
+            Knob::Pole(_) | Knob::Zero(_) => (-0.25, 0.25, 0.02),
+            Knob::PoleDamping(_) => (-2.5, 2.5, 0.4),
+            Knob::ZeroDamping(_) => (-20.0, 20.0, 0.5),
+        };
+        Limit { low, high, step }
+    }
+}
+
+impl Fit<'_> {
+    /// Directions of each record's own start and constant torque.
+    pub fn local_basis(&self) -> Basis {
+        let mut basis = Basis::default();
+        for s in &self.stack.segments {
+            for mut column in free_motions(&self.form.given.body, self.scene.sample_time_s, s.len) {
+                self.whitener.apply(&mut column);
+                basis.add_local(s.start, column);
+            }
+        }
+        basis
+    }
+
+    fn problem(&self) -> Problem<'_, '_> {
+        let mut strengths = Vec::new();
+        let mut inner = Vec::new();
+        for (e, c) in self.chosen.iter().enumerate() {
+            if !c.effect.facts().fixed {
+                strengths.extend((0..c.setting.strengths.len()).map(|i| (e, i)));
+            }
+            inner.extend((0..c.setting.inner.len()).filter(|&i| c.continuous[i]).map(|i| (e, i)));
+        }
+        Problem { fit: self, local: self.local_basis(), inner, strengths }
+    }
+
+    fn start(&self, p: &[f64], problem: &Problem) -> Vec<f64> {
+        let mut x = p.to_vec();
+        x.extend(problem.strengths.iter().map(|&(e, i)| self.chosen[e].setting.strengths[i]));
+        x.extend(problem.inner.iter().map(|&(e, i)| self.chosen[e].setting.inner[i].abs().ln()));
+        x
+    }
+
+    /// Sum of squares of the whitened error at `p`, each record's own start taken out.
+    pub fn cost(&self, p: &[f64]) -> f64 {
+        let problem = self.problem();
+        let error = problem.error(&self.start(p, &problem));
+        error.iter().map(|e| e * e).sum()
+    }
+
+    /// Fits from `p` on; the chosen effects' numbers move with it.
+    pub fn refit(&mut self, p: &[f64], iterations: usize) -> Refitted {
+        let mut problem = self.problem();
+        let mut x = self.start(p, &problem);
+        let mut work = Workspace::default();
+        let settings = LevenbergSettings { iterations, tolerance: 1e-6 };
+        let outcome = minimise(&mut problem, &mut x, &settings, &mut work);
+        let moved = problem.settings(&x);
+        // The covariance of the last factorised Jacobian, one step before the end: the same to first order.
+        let root = work.qr.inverse_root();
+        let n = work.qr.cols();
+        let spread = (0..n).map(|i| (0..n).map(|j| root[j * n + i].powi(2)).sum::<f64>().sqrt()).collect();
+        let knobs = self.form.knobs.len();
+        for (c, s) in self.chosen.iter_mut().zip(moved) {
+            c.setting = s;
+        }
+        Refitted {
+            plant: self.form.plant(&x[..knobs]),
+            p: x[..knobs].to_vec(),
+            cost: outcome.cost,
+            spread,
+            converged: outcome.converged,
+        }
+    }
+
+    /// The whitened error at `p` with every direction of the fit taken out of it, and those directions: each record's own,
+    /// the linear parameters, and the chosen effects.
+    pub fn screen_basis(&self, p: &[f64]) -> (Vec<f64>, Basis) {
+        let mut problem = self.problem();
+        let x = self.start(p, &problem);
+        let mut error = problem.error(&x);
+        let rows = self.stack.total;
+        let mut jacobian = vec![0.0; rows * problem.cols()];
+        problem.jacobian(&x, &mut jacobian);
+        let mut basis = problem.local.clone();
+        for column in jacobian.chunks_exact(rows) {
+            basis.add(column.to_vec());
+        }
+        basis.project(&mut error);
+        (error, basis)
+    }
+}

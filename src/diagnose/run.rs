@@ -1,0 +1,86 @@
+//! A record made ready: what acted on the plant, what it answered, and whose repeat it is.
+
+use crate::recording::{Case, Role};
+
+/// One record of a case.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Name for reports.
+    pub name: String,
+    /// Fitting or judging.
+    pub role: Role,
+    /// Index of its repeat group; each record without one is a group of its own.
+    pub group: usize,
+    /// Reference (position_unit), where recorded.
+    pub reference: Option<Vec<f64>>,
+    /// Command of the controller (command_unit).
+    pub command: Vec<f64>,
+    /// Excitation behind the controller (command_unit).
+    pub excitation: Vec<f64>,
+    /// Command plus excitation: what goes into the amplifier.
+    pub input: Vec<f64>,
+    /// Position as recorded.
+    pub position: Vec<f64>,
+    /// PES where recorded; NaN between servo samples.
+    pub pes: Option<Vec<f64>>,
+    /// Spindle angle (rad), where recorded.
+    pub spindle_rad: Option<Vec<f64>>,
+    /// Temperature above the record's first (°C), where recorded.
+    pub temperature: Option<Vec<f64>>,
+}
+
+impl Run {
+    /// Samples.
+    pub fn len(&self) -> usize {
+        self.position.len()
+    }
+
+    /// Whether there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty()
+    }
+}
+
+/// The records of a case as runs, groups numbered in the order of their first record.
+pub fn runs(case: &Case) -> Vec<Run> {
+    let mut groups: Vec<String> = Vec::new();
+    case.records
+        .iter()
+        .enumerate()
+        .map(|(i, (entry, record))| {
+            let key = entry.repeat_group.clone().unwrap_or_else(|| format!("\u{0}{i}"));
+            let group = groups.iter().position(|g| *g == key).unwrap_or_else(|| {
+                groups.push(key);
+                groups.len() - 1
+            });
+            let input = record.command.iter().zip(&record.excitation).map(|(c, e)| c + e).collect();
+            Run {
+                name: entry.name(),
+                role: entry.role,
+                group,
+                reference: record.reference.clone(),
+                command: record.command.clone(),
+                excitation: record.excitation.clone(),
+                input,
+                position: record.position.clone(),
+                pes: record.pes.clone(),
+                spindle_rad: record.spindle_rad.clone(),
+                temperature: record.temperature_c.as_ref().map(|t| t.iter().map(|x| x - t[0]).collect()),
+            }
+        })
+        .collect()
+}
+
+/// The mean of repeats of equal length: one run with less noise. The logs beside the motion are the first one's.
+pub fn mean_run(runs: &[Run], repeats: &[usize]) -> Run {
+    let mut mean = runs[repeats[0]].clone();
+    let scale = 1.0 / repeats.len() as f64;
+    type Pick = fn(&Run) -> &Vec<f64>;
+    let average = |pick: Pick| -> Vec<f64> {
+        (0..mean.len()).map(|k| scale * repeats.iter().map(|&r| pick(&runs[r])[k]).sum::<f64>()).collect()
+    };
+    let (command, excitation, input, position) =
+        (average(|r| &r.command), average(|r| &r.excitation), average(|r| &r.input), average(|r| &r.position));
+    (mean.command, mean.excitation, mean.input, mean.position) = (command, excitation, input, position);
+    mean
+}

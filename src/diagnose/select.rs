@@ -1,0 +1,196 @@
+//! Which effects the model lacks: scan, refit with each of the best, keep the best, scan again.
+
+use super::bench::Bench;
+use super::refit::{Chosen, Refitted};
+use super::scan::{Candidate, Ground, log_tail};
+use crate::physics::{Effect, Setting};
+use rayon::prelude::*;
+
+/// How the search decides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SelectSettings {
+    /// Most effects at once.
+    pub most: usize,
+    /// Candidates that are refitted in full after each scan.
+    pub refits: usize,
+    /// Chance of a false name over the whole search.
+    pub false_alarm: f64,
+    /// Share of the error in excess of noise that each further effect must explain.
+    pub share: f64,
+    /// Iterations of each refit.
+    pub iterations: usize,
+}
+
+impl Default for SelectSettings {
+    fn default() -> SelectSettings {
+        SelectSettings { most: 4, refits: 5, false_alarm: 1e-4, share: 0.35, iterations: 8 }
+    }
+}
+
+/// A model that was fitted: effects, linear parameters and what is left.
+#[derive(Clone)]
+pub struct Model {
+    /// Effects.
+    pub chosen: Vec<Chosen>,
+    /// Where the refit ended.
+    pub refitted: Refitted,
+    /// Sum of squares of the whitened error.
+    pub cost: f64,
+    /// Samples less directions used up.
+    pub freedom: f64,
+}
+
+impl Model {
+    /// The error in excess of the noise, in units of the noise's variance.
+    pub fn excess(&self) -> f64 {
+        self.cost - self.freedom
+    }
+
+    /// The excess over its own standard deviation under noise alone.
+    pub fn excess_sigma(&self) -> f64 {
+        self.excess() / (2.0 * self.freedom).sqrt()
+    }
+}
+
+/// One step of the search.
+#[derive(Clone)]
+pub struct Step {
+    /// The scan, best first; refined where it was worth it.
+    pub candidates: Vec<Candidate>,
+    /// The full refits: index into the candidates and the model.
+    pub tried: Vec<(usize, Model)>,
+    /// Which of the tried was taken.
+    pub taken: Option<usize>,
+}
+
+/// The whole search.
+#[derive(Clone)]
+pub struct Selection {
+    /// The given plant, nothing refitted.
+    pub given: f64,
+    /// The linear refit.
+    pub baseline: Model,
+    /// Steps in order.
+    pub steps: Vec<Step>,
+    /// Where the search ended.
+    pub model: Model,
+}
+
+fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64], iterations: usize) -> Model {
+    let mut fit = bench.fit(chosen);
+    let refitted = fit.refit(p, iterations);
+    let chosen = fit.chosen;
+    let used = refitted.spread.len() + 3 * bench.stack.segments.len();
+    Model { cost: refitted.cost, freedom: bench.stack.total as f64 - used as f64, chosen, refitted }
+}
+
+/// The better of a fit from where the search stands and one from the given plant.
+fn fitted_from_both(bench: &Bench, chosen: &[Chosen], p: &[f64], iterations: usize) -> Model {
+    let here = fitted(bench, chosen.to_vec(), p, iterations);
+    if here.excess_sigma() < 5.0 || p.iter().all(|v| *v == 0.0) {
+        return here;
+    }
+    let there = fitted(bench, chosen.to_vec(), &vec![0.0; p.len()], iterations);
+    if there.cost < here.cost { there } else { here }
+}
+
+/// Searches the library for what the linear model lacks.
+pub fn select(
+    bench: &mut Bench,
+    library: &[&'static dyn Effect],
+    settings: &SelectSettings,
+    mut progress: impl FnMut(&str),
+) -> Selection {
+    let zero = vec![0.0; bench.form.knobs.len()];
+    let given = {
+        let fit = bench.fit(vec![]);
+        fit.cost(&zero)
+    };
+    progress("refit of the linear parameters");
+    let mut baseline = fitted(bench, vec![], &zero, settings.iterations);
+    // A refit moves the motion that it was made along; once more, from there.
+    bench.correct(&baseline.refitted.p, &[]);
+    baseline = fitted(bench, vec![], &baseline.refitted.p, settings.iterations);
+    let mut model = baseline.clone();
+    let mut steps = Vec::new();
+    let limit = settings.false_alarm.ln();
+    while model.chosen.len() < settings.most {
+        progress(&format!("scan of {} effects for finding {}", library.len(), model.chosen.len() + 1));
+        let mut step = scan(bench, library, &model);
+        // Two forms of the leading effect, one of each other.
+        let mut worth: Vec<usize> = Vec::new();
+        for (i, c) in step.candidates.iter().enumerate() {
+            let name = c.effect.facts().name;
+            let seen = worth.iter().filter(|&&j| step.candidates[j].effect.facts().name == name).count();
+            let leads = worth.first().is_none_or(|&j| step.candidates[j].effect.facts().name == name);
+            let new = model.chosen.iter().all(|m| m.effect.facts().name != name || again(name, &m.setting, &c.setting));
+            if new
+                && c.log_p_value(library.len()) < limit
+                && c.concealed < 0.9995
+                && seen < 1 + usize::from(leads)
+                && worth.len() < settings.refits
+            {
+                worth.push(i);
+            }
+        }
+        for &i in &worth {
+            progress(&format!("refit with {}", step.candidates[i].effect.facts().name));
+            let c = &step.candidates[i];
+            let mut chosen = model.chosen.clone();
+            chosen.push(Chosen { effect: c.effect, setting: c.setting.clone(), continuous: c.continuous.clone() });
+            let tried = fitted_from_both(bench, &chosen, &model.refitted.p, settings.iterations);
+            step.tried.push((i, tried));
+        }
+        // Each number of a law is paid for (Schwarz 1978): of two that fit alike, the one with fewer.
+        let price = (bench.stack.total as f64).ln();
+        let paid = |t: &(usize, Model)| t.1.cost + price * numbers(&step.candidates[t.0]);
+        step.taken = (0..step.tried.len()).min_by(|&a, &b| paid(&step.tried[a]).total_cmp(&paid(&step.tried[b])));
+        let accepted = step.taken.and_then(|t| {
+            let (i, next) = &step.tried[t];
+            let c = &step.candidates[*i];
+            let gain = model.cost - next.cost;
+            let log_p =
+                log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library.len() as f64).ln();
+            (log_p < limit && gain > settings.share * model.excess().max(0.0)).then(|| next.clone())
+        });
+        if accepted.is_none() {
+            step.taken = None;
+        }
+        steps.push(step);
+        match accepted {
+            Some(next) => {
+                bench.correct(&next.refitted.p, &next.chosen);
+                let again = fitted(bench, next.chosen.clone(), &next.refitted.p, settings.iterations);
+                model = again;
+            }
+            None => break,
+        }
+    }
+    if baseline.cost > given {
+        baseline.cost = given;
+    }
+    Selection { given, baseline, steps, model }
+}
+
+/// Free numbers of a candidate.
+fn numbers(c: &Candidate) -> f64 {
+    let strengths = if c.effect.facts().fixed { 0 } else { c.strengths };
+    (strengths + c.setting.inner.iter().filter(|v| **v != 0.0).count()) as f64
+}
+
+/// Whether a second one of the same effect can be another thing: another line, another mode, another grating.
+fn again(name: &str, a: &Setting, b: &Setting) -> bool {
+    let many = ["repeatable_runout", "line_disturbance", "unmodelled_resonance", "shock"];
+    many.contains(&name) && (a.inner[0] - b.inner[0]).abs() > 0.02 * a.inner[0].abs()
+}
+
+fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
+    let fit = bench.fit(model.chosen.clone());
+    let (error, basis) = fit.screen_basis(&model.refitted.p);
+    let plant = bench.form.carrier(&model.refitted.p).plant;
+    let ground = Ground { fit: &fit, plant: &plant, error: &error, basis: &basis };
+    let mut candidates = ground.scan(library);
+    candidates.par_iter_mut().take(10).for_each(|c| ground.refine(c));
+    candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    Step { candidates, tried: Vec::new(), taken: None }
+}

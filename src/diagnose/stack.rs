@@ -1,0 +1,199 @@
+//! Several records as one long vector, and least squares on it.
+//!
+//! Repeats enter once, as their mean times the root of their number: under white noise nothing is lost, and the work falls
+//! by that number.
+
+use super::run::Run;
+use crate::numeric::least_squares::dot;
+
+/// One stretch of the stacked vector.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segment {
+    /// The repeats whose mean stands here.
+    pub runs: Vec<usize>,
+    /// First sample in the stacked vector.
+    pub start: usize,
+    /// Samples.
+    pub len: usize,
+    /// Root of the number of repeats.
+    pub weight: f64,
+}
+
+/// The layout of a stacked vector.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stack {
+    /// Its stretches.
+    pub segments: Vec<Segment>,
+    /// Samples in all.
+    pub total: usize,
+}
+
+impl Stack {
+    /// Repeats of equal length together, the others each of its own.
+    pub fn grouped(runs: &[Run], wanted: &[usize]) -> Stack {
+        let mut groups: Vec<(Vec<usize>, usize)> = Vec::new();
+        for &i in wanted {
+            let len = runs[i].len();
+            match groups.iter_mut().find(|(g, l)| runs[g[0]].group == runs[i].group && *l == len) {
+                Some((g, _)) => g.push(i),
+                None => groups.push((vec![i], len)),
+            }
+        }
+        let mut start = 0;
+        let segments = groups
+            .into_iter()
+            .map(|(runs, len)| {
+                let weight = (runs.len() as f64).sqrt();
+                let segment = Segment { runs, start, len, weight };
+                start += len;
+                segment
+            })
+            .collect();
+        Stack { segments, total: start }
+    }
+
+    /// Stacks `count` columns of every segment, weighted.
+    pub fn columns(&self, count: usize, of: impl Fn(usize) -> Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let mut out = vec![vec![0.0; self.total]; count];
+        for (i, s) in self.segments.iter().enumerate() {
+            for (o, c) in out.iter_mut().zip(of(i)) {
+                o[s.start..s.start + s.len].iter_mut().zip(&c).for_each(|(o, v)| *o = s.weight * v);
+            }
+        }
+        out
+    }
+
+    /// Stacks one series of every segment, weighted.
+    pub fn series(&self, of: impl Fn(usize) -> Vec<f64>) -> Vec<f64> {
+        self.columns(1, |i| vec![of(i)]).swap_remove(0)
+    }
+}
+
+/// Orthonormal directions that a fit has already used up: some live in one stretch only, the others in the whole vector.
+#[derive(Clone, Debug, Default)]
+pub struct Basis {
+    local: Vec<(usize, Vec<f64>)>,
+    global: Vec<Vec<f64>>,
+}
+
+/// A column that keeps less than this share of its length after projection adds no direction.
+const DEPENDENT: f64 = 1e-5;
+
+fn axpy(out: &mut [f64], a: f64, x: &[f64]) {
+    out.iter_mut().zip(x).for_each(|(o, x)| *o += a * x);
+}
+
+impl Basis {
+    /// Directions in all.
+    pub fn dimension(&self) -> usize {
+        self.local.len() + self.global.len()
+    }
+
+    /// Takes every direction of the basis out of a stacked vector.
+    pub fn project(&self, x: &mut [f64]) {
+        // Local directions are orthonormal among themselves, and global ones to them: one pass of each, in turn.
+        for (start, q) in &self.local {
+            let part = &mut x[*start..*start + q.len()];
+            let a = dot(part, q);
+            axpy(part, -a, q);
+        }
+        for q in &self.global {
+            let a = dot(x, q);
+            axpy(x, -a, q);
+        }
+    }
+
+    /// The coordinates of a vector that is zero outside `span`; `x` holds the span only.
+    pub fn coordinates(&self, x: &[f64], span: [usize; 2]) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.dimension());
+        for (start, q) in &self.local {
+            let (low, high) = (span[0].max(*start), span[1].min(start + q.len()));
+            out.push(if low < high {
+                dot(&x[low - span[0]..high - span[0]], &q[low - start..high - start])
+            } else {
+                0.0
+            });
+        }
+        out.extend(self.global.iter().map(|q| dot(x, &q[span[0]..span[1]])));
+        out
+    }
+
+    /// Adds a direction of one stretch; to be done before any global one.
+    pub fn add_local(&mut self, start: usize, mut column: Vec<f64>) {
+        let before = dot(&column, &column).sqrt();
+        for _ in 0..2 {
+            for (s, q) in &self.local {
+                if *s == start && q.len() == column.len() {
+                    let a = dot(&column, q);
+                    axpy(&mut column, -a, q);
+                }
+            }
+        }
+        let after = dot(&column, &column).sqrt();
+        if after.is_finite() && after > DEPENDENT * before {
+            column.iter_mut().for_each(|v| *v /= after);
+            self.local.push((start, column));
+        }
+    }
+
+    /// Adds a direction of the whole vector; false where it adds nothing.
+    pub fn add(&mut self, mut column: Vec<f64>) -> bool {
+        let before = dot(&column, &column).sqrt();
+        for _ in 0..2 {
+            self.project(&mut column);
+        }
+        let after = dot(&column, &column).sqrt();
+        let new = after.is_finite() && after > DEPENDENT * before;
+        if new {
+            column.iter_mut().for_each(|v| *v /= after);
+            self.global.push(column);
+        }
+        new
+    }
+}
+
+/// A least-squares fit of a residual by a few columns, basis taken out of both.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Explained {
+    /// Fall of the sum of squares: twice the gain in log-likelihood under unit white noise.
+    pub gain: f64,
+    /// Strength of each column.
+    pub strengths: Vec<f64>,
+    /// Share of the columns' energy that the basis took: the effect's concealability.
+    pub concealed: f64,
+}
+
+/// Fits `residual` (basis already taken out) by `columns` (not yet); strengths are 1 where `fixed`. Each column is non-zero
+/// within `spans[i]` only.
+pub fn explain(basis: &Basis, residual: &[f64], columns: &[Vec<f64>], spans: &[[usize; 2]], fixed: bool) -> Explained {
+    let m = columns.len();
+    let part = |i: usize| &columns[i][..];
+    // What the basis takes of each column, as coordinates: the projected column itself is never needed.
+    let taken: Vec<Vec<f64>> = (0..m).map(|i| basis.coordinates(part(i), spans[i])).collect();
+    let inner = |i: usize, j: usize| {
+        let [low, high] = [spans[i][0].max(spans[j][0]), spans[i][1].min(spans[j][1])];
+        let own = if low < high {
+            dot(&part(i)[low - spans[i][0]..high - spans[i][0]], &part(j)[low - spans[j][0]..high - spans[j][0]])
+        } else {
+            0.0
+        };
+        (own, own - dot(&taken[i], &taken[j]))
+    };
+    let right: Vec<f64> = (0..m).map(|i| dot(part(i), &residual[spans[i][0]..spans[i][1]])).collect();
+    let squares: Vec<(f64, f64)> = (0..m).map(|i| inner(i, i)).collect();
+    let (before, after) = squares.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
+    let concealed = if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 1.0 };
+    if fixed {
+        let gain = (0..m).map(|i| 2.0 * right[i] - squares[i].1).sum();
+        return Explained { gain, strengths: vec![1.0; m], concealed };
+    }
+    // Scaled normal equations; directions that the others or the basis hold already are dropped.
+    let unit = |i: usize| {
+        let s = squares[i].1;
+        if s.is_finite() && s > 1e-9 * squares[i].0 && s > 0.0 { 1.0 / s.sqrt() } else { 0.0 }
+    };
+    let gram = nalgebra::DMatrix::from_fn(m, m, |i, j| inner(i, j).1 * unit(i) * unit(j));
+    let scaled = nalgebra::DVector::from_fn(m, |i, _| right[i] * unit(i));
+    let solved = gram.svd(true, true).solve(&scaled, 1e-8).unwrap_or_else(|_| nalgebra::DVector::zeros(m));
+    Explained { gain: solved.dot(&scaled), strengths: (0..m).map(|i| solved[i] * unit(i)).collect(), concealed }
+}

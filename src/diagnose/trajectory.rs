@@ -1,0 +1,161 @@
+//! The motion behind a record: position and velocity without the sensor's noise, and the torque that the model does not
+//! explain.
+//!
+//! A fixed-interval smoother (Rauch, Tung, Striebel 1965) for the body driven by the recorded command and by a random walk
+//! of torque; the walk's intensity is the one under which the record is most likely, so that the motion is not forced onto
+//! the model.
+
+use super::linear::body_numbers;
+use super::run::Run;
+use crate::lti::{DiscretePlant, Plant};
+use crate::physics::Sample;
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+/// A smoothed record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory {
+    /// Motion at every sample.
+    pub samples: Vec<Sample>,
+    /// Torque beyond the model (command_unit).
+    pub unexplained: Vec<f64>,
+}
+
+/// The mean command that acts on the arm from each sample to the next.
+pub fn acting(plant: &DiscretePlant, input: &[f64]) -> Vec<f64> {
+    let (whole, share) = (plant.whole_delay_samples(), plant.fractional_delay_s() / plant.sample_time_s());
+    let at = |k: usize, back: usize| if k >= back { input[k - back] } else { 0.0 };
+    (0..input.len()).map(|k| share * at(k, whole + 1) + (1.0 - share) * at(k, whole)).collect()
+}
+
+/// The acting command and a torque that is known beside it.
+fn pushed(sampled: &DiscretePlant, run: &Run, known: &[f64]) -> Vec<f64> {
+    let mut i = acting(sampled, &run.input);
+    i.iter_mut().zip(known).for_each(|(i, w)| *i += w);
+    i
+}
+
+/// The smoother of one machine.
+#[derive(Clone, Debug)]
+pub struct Smoother {
+    step: Matrix3<f64>,
+    push: Vector3<f64>,
+    steady: Steady,
+}
+
+#[derive(Clone, Debug)]
+struct Steady {
+    gain: Vector3<f64>,
+    back: Matrix3<f64>,
+    spread: f64,
+}
+
+impl Smoother {
+    /// The smoother under which the runs are most likely; `sensor_rms` is the sensor's white noise and `known` a torque beyond
+    /// the plant, run by run.
+    pub fn of(plant: &Plant, sampled: &DiscretePlant, sensor_rms: f64, runs: &[Run], known: &[Vec<f64>]) -> Smoother {
+        let t = sampled.sample_time_s();
+        let (b, k, c) = body_numbers(&plant.body);
+        let b = b * plant.resonance_gain;
+        let f = Matrix3::new(0.0, 1.0, 0.0, -k, -c, b, 0.0, 0.0, 0.0);
+        let step = (f * t).exp();
+        let push = Vector3::new(step[(0, 2)], step[(1, 2)], 0.0);
+        let pushes: Vec<Vec<f64>> = runs.iter().zip(known).map(|(r, w)| pushed(sampled, r, w)).collect();
+        let largest = runs.iter().flat_map(|r| &r.input).fold(0.0f64, |m, u| m.max(u.abs())).max(1e-12);
+        let sensor = sensor_rms.powi(2).max(1e-24);
+        let mut best: Option<(f64, Smoother)> = None;
+        for j in 0..14 {
+            // From a millionth of the largest command per sample to all of it.
+            let walk = largest * 10f64.powf(-6.0 + 6.0 * f64::from(j) / 13.0);
+            let mut q = SMatrix::<f64, 3, 3>::zeros();
+            q[(2, 2)] = walk * walk;
+            // The walk is spread over the interval: its exact covariance for a double integrator is close enough here, where
+            // only the filter's bandwidth matters.
+            let noise = Matrix3::from_fn(|r, s| {
+                let g = [b * t * t / 6.0, b * t / 2.0, 1.0];
+                g[r] * g[s] * walk * walk
+            });
+            let smoother = Smoother { steady: steady(&step, &noise, sensor), step, push };
+            let cost = runs.iter().zip(&pushes).map(|(r, i)| smoother.cost(&r.position, i)).sum();
+            if best.as_ref().is_none_or(|(c, _)| cost < *c) {
+                best = Some((cost, smoother));
+            }
+        }
+        best.map(|b| b.1).unwrap_or_else(|| Smoother {
+            steady: steady(&step, &Matrix3::identity(), sensor),
+            step,
+            push,
+        })
+    }
+
+    /// Twice the negative logarithm of the likelihood of a record, up to a constant.
+    fn cost(&self, y: &[f64], i: &[f64]) -> f64 {
+        let mut z = Vector3::new(y[0], 0.0, 0.0);
+        let s = &self.steady;
+        let mut sum = 0.0;
+        for (y, i) in y.iter().zip(i) {
+            let e = y - z[0];
+            sum += e * e;
+            z = self.step * (z + s.gain * e) + self.push * *i;
+        }
+        sum / s.spread + y.len() as f64 * s.spread.ln()
+    }
+
+    /// Smooths a run; `spindle_hz` stands in for a spindle index that was not recorded.
+    pub fn smooth(&self, run: &Run, known: &[f64], sampled: &DiscretePlant, spindle_hz: f64) -> Trajectory {
+        let (y, n, t) = (&run.position, run.len(), sampled.sample_time_s());
+        let acts = acting(sampled, &run.input);
+        let i = pushed(sampled, run, known);
+        let s = &self.steady;
+        let mut ahead = Vec::with_capacity(n);
+        let mut after = Vec::with_capacity(n);
+        // The start: the first samples' mean, at the speed of their line.
+        let few = n.min(16);
+        let slope = (y[few - 1] - y[0]) / (few - 1) as f64 / t;
+        let mut z = Vector3::new(y[0], slope, 0.0);
+        for k in 0..n {
+            ahead.push(z);
+            let c = z + s.gain * (y[k] - z[0]);
+            after.push(c);
+            z = self.step * c + self.push * i[k];
+        }
+        for k in (0..n.saturating_sub(1)).rev() {
+            after[k] = after[k] + s.back * (after[k + 1] - ahead[k + 1]);
+        }
+        let samples = (0..n)
+            .map(|k| Sample {
+                t: k as f64 * t,
+                x: after[k][0],
+                v: after[k][1],
+                u: run.input[k],
+                i: acts[k],
+                spindle_rad: run
+                    .spindle_rad
+                    .as_ref()
+                    .map_or(std::f64::consts::TAU * spindle_hz * k as f64 * t, |s| s[k]),
+                temperature: run.temperature.as_ref().map_or(0.0, |c| c[k]),
+            })
+            .collect();
+        Trajectory { samples, unexplained: after.iter().map(|z| z[2]).collect() }
+    }
+}
+
+fn steady(step: &Matrix3<f64>, noise: &Matrix3<f64>, sensor: f64) -> Steady {
+    let mut p = Matrix3::from_diagonal_element(1e3 * noise.trace().max(sensor));
+    let mut gain = Vector3::zeros();
+    for round in 0..100_000 {
+        let next = p.column(0) / (p[(0, 0)] + sensor);
+        let after = p - next * p.row(0);
+        p = step * after * step.transpose() + noise;
+        p = (p + p.transpose()) * 0.5;
+        let moved = (next - gain).norm() / next.norm().max(1e-300);
+        gain = next.into_owned();
+        if round > 10 && moved < 1e-11 {
+            break;
+        }
+    }
+    let after = p - (p.column(0) / (p[(0, 0)] + sensor)) * p.row(0);
+    // Scaling by the diagonal keeps the inverse of a matrix that spans many decades.
+    let d = Matrix3::from_diagonal(&p.diagonal().map(|x| x.max(1e-300).sqrt().recip()));
+    let inverse = d * (d * p * d).try_inverse().unwrap_or_else(Matrix3::identity) * d;
+    Steady { gain, back: after * step.transpose() * inverse, spread: p[(0, 0)] + sensor }
+}

@@ -1,0 +1,103 @@
+//! The closed loop in time with physics beyond linear: the same write, on a [`Machine`].
+//!
+//! In: a plant with its physics made ready, a controller, a profile. Out: the same record as [`super::simulate`].
+//! The arm is exact at and between samples for the command and second order in the sample time for torques; what structure,
+//! disk and time add to the position is carried between samples by a cubic through four neighbours (fourth order). The
+//! head sees everything but the sensor's own errors. Spec: `specs/mismatch.md`, "Use".
+
+use super::Profile;
+use super::simulation::{ClosedLoop, PesError, Scene};
+use crate::controller::Controller;
+use crate::lti::{DiscretePlant, Intersample};
+use crate::physics::{Context, Machine, Restored};
+use std::f64::consts::TAU;
+
+/// What a profile and a controller say of the motion.
+pub fn context(profile: &Profile, controller: &Controller) -> Context {
+    let spindle_hz = profile.noise.spindle_hz;
+    let fallback = Context::default();
+    Context {
+        sample_time_s: controller.sample_time_s,
+        spindle_hz: (spindle_hz > 0.0).then_some(spindle_hz),
+        travel: profile.spiral.distance,
+        speed: profile.spiral.velocity.abs(),
+        command: controller.output_limit.unwrap_or(fallback.command),
+        noise: profile.noise.encoder_rms,
+        duration_s: profile.spiral.duration_s,
+    }
+}
+
+/// Simulates one write with a controller on a machine with physics, from rest.
+pub fn simulate_physical(
+    physics: &Restored,
+    controller: &Controller,
+    profile: &Profile,
+) -> Result<ClosedLoop, PesError> {
+    let sections = controller.sections()?;
+    let t = controller.sample_time_s;
+    let mut machine = Machine::new(&physics.scene.plant, &physics.effects(), &physics.scene)?;
+    let sampled = DiscretePlant::of(&physics.scene.plant, t)?;
+    let scene = Scene::new(profile, &sampled)?;
+    let torque_readings: Vec<Intersample> = {
+        let direct = machine.plants()[1];
+        scene.servo.iter().map(|s| direct.intersample(s.offset_s)).collect()
+    };
+    let ticks = scene.reference.len();
+    let mut run = ClosedLoop {
+        pes: vec![0.0; scene.servo.len()],
+        command: vec![0.0; ticks],
+        position: vec![0.0; ticks],
+        reference: scene.reference.clone(),
+        sample_time_s: t,
+        limited: false,
+    };
+    let mut memory = vec![[0.0; 2]; sections.chain.len()];
+    let forward = controller.feedforward.map_or([0.0; 2], |f| [f.factor * f.velocity_s, f.factor * f.acceleration_s2]);
+    let limit = controller.output_limit.unwrap_or(f64::INFINITY);
+    // One sample more than the loop needs: the cubic's right-hand neighbour.
+    let mut offsets = Vec::with_capacity(ticks + 1);
+    let turn = TAU * profile.noise.spindle_hz * t;
+    let mut j = 0;
+    for k in 0..ticks {
+        let y = machine.measure(turn * k as f64, 0.0);
+        offsets.push(machine.head_offset());
+        let mut signal = scene.reference[k] - (y + scene.encoder[k]);
+        for (s, m) in sections.chain.iter().zip(memory.iter_mut()) {
+            let out = s.b0 * signal + m[0];
+            m[0] = s.b1 * signal - s.a1 * out + m[1];
+            m[1] = s.b2 * signal - s.a2 * out;
+            signal = out;
+        }
+        let sum = signal + forward[0] * scene.velocity[k] + forward[1] * scene.acceleration[k];
+        let u = sum.clamp(-limit, limit);
+        run.limited |= u != sum;
+        run.command[k] = u;
+        run.position[k] = y;
+        machine.command(u + scene.windage[k]);
+        while let Some(s) = scene.servo.get(j).filter(|s| s.controller_sample == k) {
+            run.pes[j] = s.target - machine.between([&s.reading, &torque_readings[j]]);
+            j += 1;
+        }
+    }
+    machine.measure(turn * ticks as f64, 0.0);
+    offsets.push(machine.head_offset());
+    if offsets.iter().any(|o| *o != 0.0) {
+        for (pes, s) in run.pes.iter_mut().zip(&scene.servo) {
+            *pes -= cubic(&offsets, s.controller_sample, s.offset_s / t);
+        }
+    }
+    Ok(run)
+}
+
+/// The value `share` of a step after sample `k`: Lagrange's cubic through samples k - 1 to k + 2, fewer at the ends.
+fn cubic(y: &[f64], k: usize, share: f64) -> f64 {
+    let first = k.saturating_sub(1).min(y.len().saturating_sub(4));
+    let last = (first + 4).min(y.len());
+    let x = k as f64 + share;
+    (first..last)
+        .map(|i| {
+            let others = (first..last).filter(|j| *j != i);
+            y[i] * others.map(|j| (x - j as f64) / (i as f64 - j as f64)).product::<f64>()
+        })
+        .sum()
+}

@@ -1,0 +1,68 @@
+//! Play between the arm and what it pushes: a loose pushpin.
+//!
+//! The pushed part rests until the arm has crossed the gap: p = clip(p, x - g/2, x + g/2), the play operator (Krasnoselskii,
+//! Pokrovskii 1989); what is recorded is p. Contact is taken as rigid and the part as held by its own friction.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::{Sample, Scene, logarithmic};
+
+/// Inner: the gap.
+pub struct Backlash;
+
+static FACTS: Facts = Facts {
+    name: "backlash",
+    port: Port::Structure,
+    entry: Entry::Position,
+    columns: 1,
+    fixed: true,
+    per_record: false,
+    equation: "m = p, p = clip(p, x - g/2, x + g/2)",
+    says: "there is play between the arm and the part it pushes: after each reversal the part waits until the gap is crossed",
+    confused_with: &["coulomb_friction", "pivot_friction", "quantisation"],
+    experiment: "slow triangles of three sizes with the PES and the encoder recorded: the PES stops at reversals",
+    band_hz: [1.0, 5000.0],
+};
+
+struct Play {
+    half: f64,
+    part: Option<f64>,
+}
+
+impl Play {
+    fn next(&self, from: &Sample, to: &Sample) -> f64 {
+        self.part.unwrap_or(from.x).clamp(to.x - self.half, to.x + self.half)
+    }
+}
+
+impl Law for Play {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        out[0] = self.next(from, to) - to.x;
+    }
+
+    fn commit(&mut self, from: &Sample, to: &Sample) {
+        self.part = Some(self.next(from, to));
+    }
+}
+
+impl Effect for Backlash {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        let low = (2.0 * scene.noise).max(1e-4 * scene.travel);
+        logarithmic(low, scene.travel, 16).into_iter().map(|g| vec![g]).collect()
+    }
+
+    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Play { half: 0.5 * inner[0].abs(), part: None })
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        vec![Parameter::new("gap", setting.inner[0], Unit::Position)]
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        Ok(Setting { inner: vec![given.positive("gap")?], strengths: vec![1.0] })
+    }
+}

@@ -1,0 +1,58 @@
+//! The base rocks under the reaction of the motor, and the encoder reads the arm against the base.
+//!
+//! Base: x_b'' + 2 z w x_b' + w² x_b = -R i; m = x - x_b, so m = x + g w²/(s² + 2 z w s + w²) i with g = R/w².
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::Scene;
+use super::share::Share;
+use super::unmodelled_resonance::{Ringing, scan, term};
+
+/// Inner: frequency (Hz), damping ratio. Strength: the base's displacement per constant command.
+pub struct BaseMode;
+
+static FACTS: Facts = Facts {
+    name: "base_mode",
+    port: Port::Structure,
+    entry: Entry::Position,
+    columns: 1,
+    fixed: false,
+    per_record: false,
+    equation: "m = x + g w^2/(s^2 + 2 z w s + w^2) i, w within 3 to 80 Hz",
+    says: "the whole machine rocks on its feet when the arm is pushed, and rings on after the move",
+    confused_with: &["unmodelled_resonance", "pivot_friction", "linear_parameters", "line_disturbance"],
+    experiment: "a hard move, then half a second of rest: the base rings on; the same from a neighbouring slot",
+    band_hz: [3.0, 80.0],
+};
+
+impl Effect for BaseMode {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        let high = 80f64.min(0.2 / scene.sample_time_s);
+        [0.01, 0.05, 0.15].iter().flat_map(|&z| scan(3.0, high, z, scene)).collect()
+    }
+
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        Box::new(Ringing::at_rest(inner[0], inner[1], scene.sample_time_s, 1))
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        vec![
+            Parameter::new("frequency_hz", setting.inner[0], Unit::Hertz),
+            Parameter::new("damping_ratio", setting.inner[1], Unit::Ratio),
+            Parameter::new("static_gain", setting.strengths[0], Unit::PositionPerCommand),
+        ]
+    }
+
+    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Terms(vec![term(setting.inner[0], setting.inner[1], setting.strengths[0], 0.0)])
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        let damping = given.between("damping_ratio", 0.0, 1.0, "above 0 and below 1")?;
+        let strengths = vec![given.need("static_gain")?];
+        Ok(Setting { inner: vec![given.positive("frequency_hz")?, damping], strengths })
+    }
+}

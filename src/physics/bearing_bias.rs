@@ -1,0 +1,111 @@
+//! The bearing remembers the last moves: its lubricant is pushed aside and pulls back, more after longer moves.
+//!
+//! b' = -(b - B sat(L/L_c) sgn)/tau_b, L the length of the last move and sgn its direction (after Helmick, Messner, Higgs 2008,
+//! who saw the torque after a seek grow with the seek's length up to a critical one); tau = -b.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::{Sample, Scene, logarithmic};
+
+/// Inner: critical length, relaxation time. Strength: the largest bias B.
+pub struct BearingBias;
+
+static FACTS: Facts = Facts {
+    name: "bearing_bias",
+    port: Port::Torque,
+    entry: Entry::Torque,
+    columns: 1,
+    fixed: false,
+    per_record: false,
+    equation: "tau = -b, b' = -(b - B sat(L/L_c) sgn(last move))/tau_b",
+    says: "after a long move the bearing pulls the arm back for a while; after a short one it does so less",
+    confused_with: &["cable_spring", "pivot_friction", "offset_drift"],
+    experiment: "the same target reached by moves of five lengths from both sides, then half a second of rest",
+    band_hz: [0.1, 30.0],
+};
+
+#[derive(Clone, Copy)]
+struct Move {
+    /// Where the move began and the farthest point it has reached.
+    start: f64,
+    reached: f64,
+    /// Its direction; 0 before the first move.
+    direction: f64,
+    bias: f64,
+}
+
+struct Memory {
+    critical: f64,
+    /// A way back shorter than this is no new move (position_unit).
+    smallest: f64,
+    keep: f64,
+    mean: f64,
+    now: Option<Move>,
+}
+
+impl Memory {
+    /// The move after the step, its bias not yet updated.
+    fn moved(&self, from: &Sample, to: &Sample) -> Move {
+        let mut m = self.now.unwrap_or(Move { start: from.x, reached: from.x, direction: 0.0, bias: 0.0 });
+        let way = to.x - m.reached;
+        if m.direction == 0.0 {
+            if way.abs() > self.smallest {
+                (m.direction, m.reached) = (way.signum(), to.x);
+            }
+        } else if way * m.direction > 0.0 {
+            m.reached = to.x;
+        } else if way.abs() > self.smallest {
+            m = Move { start: m.reached, reached: to.x, direction: -m.direction, bias: m.bias };
+        }
+        m
+    }
+
+    fn target(&self, m: &Move) -> f64 {
+        m.direction * ((m.reached - m.start).abs() / self.critical).min(1.0)
+    }
+}
+
+impl Law for Memory {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        let m = self.moved(from, to);
+        let target = self.target(&m);
+        out[0] = -(target + (m.bias - target) * self.mean);
+    }
+
+    fn commit(&mut self, from: &Sample, to: &Sample) {
+        let mut m = self.moved(from, to);
+        let target = self.target(&m);
+        m.bias = target + (m.bias - target) * self.keep;
+        self.now = Some(m);
+    }
+}
+
+impl Effect for BearingBias {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        let times = logarithmic(0.01 * scene.duration_s, 3.0 * scene.duration_s, 6);
+        times.iter().flat_map(|&tau| [0.15, 0.5, 1.5].map(|share| vec![share * scene.travel, tau])).collect()
+    }
+
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        let ratio = scene.sample_time_s / inner[1];
+        let smallest = (6.0 * scene.noise).max(1e-4 * scene.travel);
+        let mean = -(-ratio).exp_m1() / ratio;
+        Box::new(Memory { critical: inner[0], smallest, keep: (-ratio).exp(), mean, now: None })
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        vec![
+            Parameter::new("bias_command", setting.strengths[0], Unit::Command),
+            Parameter::new("critical_length", setting.inner[0], Unit::Position),
+            Parameter::new("relaxation_time_s", setting.inner[1], Unit::Second),
+        ]
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        let inner = vec![given.positive("critical_length")?, given.positive("relaxation_time_s")?];
+        Ok(Setting { inner, strengths: vec![given.need("bias_command")?] })
+    }
+}

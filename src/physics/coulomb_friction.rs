@@ -1,0 +1,102 @@
+//! Dry friction: a constant drag against the motion, optionally higher at low speed.
+//!
+//! Coulomb with Stribeck's rise: level (1 + rise exp(-(v/v_s)²)) (Armstrong-Helouvry, Dupont, Canudas de Wit 1994). At rest the
+//! torque is what holds the arm: Dahl's law with a pre-sliding length near what the sensor resolves, never sgn(v). The
+//! viscous part belongs to the linear plant; a mean offset belongs to the torque offset.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::pivot_friction::dahl;
+use super::sample::{Sample, Scene, logarithmic};
+
+/// Inner: pre-sliding length, Stribeck speed (0 for none), Stribeck rise. Strength: the level at speed.
+pub struct CoulombFriction;
+
+static FACTS: Facts = Facts {
+    name: "coulomb_friction",
+    port: Port::Torque,
+    entry: Entry::Torque,
+    columns: 1,
+    fixed: false,
+    per_record: false,
+    equation: "tau = -F (1 + rise exp(-(v/v_s)^2)) z, dz/dx = (1 - sgn(dx) z)/length (sgn(v) once sliding)",
+    says: "the arm drags with the same force at every speed, and the force turns round with the motion",
+    confused_with: &["pivot_friction", "backlash", "dead_band", "torque_ripple"],
+    experiment: "constant-velocity moves in both directions at six speeds over two decades",
+    band_hz: [1.0, 300.0],
+};
+
+struct Slider {
+    length: f64,
+    speed: f64,
+    rise: f64,
+    z: f64,
+}
+
+impl Slider {
+    fn moved(&self, from: &Sample, to: &Sample) -> f64 {
+        dahl(self.z, to.x - from.x, self.length)
+    }
+
+    fn level(&self, v: f64) -> f64 {
+        if self.speed > 0.0 { 1.0 + self.rise * (-(v / self.speed).powi(2)).exp() } else { 1.0 }
+    }
+}
+
+impl Law for Slider {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        let z = self.moved(from, to);
+        // The mean over a straight path: s - (s - z0) (1 - exp(-r))/r with r the path in lengths.
+        let (path, s) = ((to.x - from.x).abs() / self.length, (to.x - from.x).signum());
+        let mean = if path < 1e-6 { 0.5 * (self.z + z) } else { s + (s - self.z) * (-path).exp_m1() / path };
+        out[0] = -mean * self.level(0.5 * (from.v + to.v));
+    }
+
+    fn commit(&mut self, from: &Sample, to: &Sample) {
+        self.z = self.moved(from, to);
+    }
+}
+
+impl Effect for CoulombFriction {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        // At most some twelve times the sensor's noise: shorter than what pre-sliding friction could be seen at.
+        let floor = 1e-5 * scene.travel;
+        let (short, long) = ((1.5 * scene.noise).max(0.3 * floor), (12.0 * scene.noise).max(2.0 * floor));
+        let mut all: Vec<Vec<f64>> = logarithmic(short, long, 5).into_iter().map(|l| vec![l, 0.0, 0.0]).collect();
+        all.extend([0.02, 0.06, 0.2].map(|share| vec![0.5 * long, share * scene.speed, 0.5]));
+        all
+    }
+
+    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Slider { length: inner[0], speed: inner[1], rise: inner[2], z: 0.0 })
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        let mut all = vec![
+            Parameter::new("level_command", setting.strengths[0], Unit::Command),
+            Parameter::new("sliding_length", setting.inner[0], Unit::Position),
+        ];
+        if setting.inner[1] > 0.0 {
+            all.push(Parameter::new("stribeck_speed", setting.inner[1], Unit::PositionPerSecond));
+            all.push(Parameter::new("stribeck_rise", setting.inner[2], Unit::Ratio));
+        }
+        all
+    }
+
+    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+        let length = if given.has("sliding_length") {
+            given.positive("sliding_length")?
+        } else {
+            (6.0 * scene.noise).max(1e-5 * scene.travel)
+        };
+        let (speed, rise) = if given.has("stribeck_speed") {
+            (given.positive("stribeck_speed")?, given.need("stribeck_rise")?)
+        } else {
+            (0.0, 0.0)
+        };
+        Ok(Setting { inner: vec![length, speed, rise], strengths: vec![given.need("level_command")?] })
+    }
+}

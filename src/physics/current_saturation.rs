@@ -1,0 +1,53 @@
+//! The amplifier's current is limited: i = sat(u, limit).
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::{Sample, Scene};
+
+/// Inner: the limit.
+pub struct CurrentSaturation;
+
+static FACTS: Facts = Facts {
+    name: "current_saturation",
+    port: Port::Amplifier,
+    entry: Entry::Command,
+    columns: 1,
+    fixed: true,
+    per_record: false,
+    equation: "i = clip(u, -limit, limit)",
+    says: "the amplifier runs out of current: commands above a limit give no more torque",
+    confused_with: &["slew_limit", "torque_factor_rolloff"],
+    experiment: "moves of growing length, so that the largest command grows step by step",
+    band_hz: [1.0, 3000.0],
+};
+
+struct Clip {
+    limit: f64,
+}
+
+impl Law for Clip {
+    fn columns(&self, _from: &Sample, to: &Sample, out: &mut [f64]) {
+        out[0] = to.u.clamp(-self.limit, self.limit) - to.u;
+    }
+}
+
+impl Effect for CurrentSaturation {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        (1..24).map(|i| vec![scene.command * (1.0 - f64::from(i) / 26.0)]).collect()
+    }
+
+    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Clip { limit: inner[0] })
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        vec![Parameter::new("limit", setting.inner[0], Unit::Command)]
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        Ok(Setting { inner: vec![given.positive("limit")?], strengths: vec![1.0] })
+    }
+}

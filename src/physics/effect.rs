@@ -1,0 +1,287 @@
+//! What every effect beyond the linear plant says of itself, and how it acts.
+//!
+//! An effect is a law with a few strengths (linear) and a few inner parameters (a sliding length, a period, a limit). Its
+//! law turns the motion into columns; strengths times columns, summed, enter the loop at one place ([`Entry`]).
+
+use super::sample::{Sample, Scene};
+use super::share::Share;
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// The part of the machine that an effect belongs to, as the report names it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Port {
+    /// Between controller and coil current.
+    Amplifier,
+    /// Torque on the arm.
+    Torque,
+    /// Arm, coil, base: between torque and head.
+    Structure,
+    /// Encoder and its electronics.
+    Sensor,
+    /// Disk and spindle.
+    Disk,
+    /// Clocks and logs.
+    Time,
+    /// The control law as it runs.
+    Controller,
+}
+
+/// Where an effect's columns enter the loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// Added to the command before the plant's delay (command_unit), a value per sample.
+    Command,
+    /// Added to the command that acts on the body, after the delay (command_unit), the mean over a sample interval.
+    Torque,
+    /// Added to the position as recorded (position_unit), a value per sample.
+    Position,
+}
+
+/// Unit of a parameter, in the machine's own units.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// position_unit.
+    Position,
+    /// command_unit.
+    Command,
+    /// Seconds.
+    Second,
+    /// Hertz.
+    Hertz,
+    /// A plain number.
+    Ratio,
+    /// Degrees.
+    Degree,
+    /// command_unit per position_unit.
+    CommandPerPosition,
+    /// command_unit per position_unit³.
+    CommandPerPositionCubed,
+    /// command_unit s per position_unit.
+    CommandSecondPerPosition,
+    /// command_unit per second.
+    CommandPerSecond,
+    /// position_unit per second.
+    PositionPerSecond,
+    /// 1/position_unit.
+    PerPosition,
+    /// 1/position_unit².
+    PerPositionSquared,
+    /// 1/s.
+    PerSecond,
+    /// position_unit per command_unit.
+    PositionPerCommand,
+    /// command_unit per position_unit².
+    CommandPerPositionSquared,
+    /// command_unit s² per position_unit².
+    CommandSecondSquaredPerPositionSquared,
+    /// command_unit per s².
+    CommandPerSecondSquared,
+    /// 1/°C.
+    PerDegreeCelsius,
+    /// Samples.
+    Sample,
+    /// Anything else that the name of the parameter says.
+    Named(&'static str),
+}
+
+impl Unit {
+    /// The unit as text for a machine with these units.
+    pub fn text(self, position: &str, command: &str) -> String {
+        match self {
+            Unit::Position => position.into(),
+            Unit::Command => command.into(),
+            Unit::Second => "s".into(),
+            Unit::Hertz => "Hz".into(),
+            Unit::Ratio => "1".into(),
+            Unit::Degree => "deg".into(),
+            Unit::CommandPerPosition => format!("{command}/{position}"),
+            Unit::CommandPerPositionCubed => format!("{command}/{position}^3"),
+            Unit::CommandSecondPerPosition => format!("{command} s/{position}"),
+            Unit::CommandPerSecond => format!("{command}/s"),
+            Unit::PositionPerSecond => format!("{position}/s"),
+            Unit::PerPosition => format!("1/{position}"),
+            Unit::PerPositionSquared => format!("1/{position}^2"),
+            Unit::PerSecond => "1/s".into(),
+            Unit::PositionPerCommand => format!("{position}/{command}"),
+            Unit::CommandPerPositionSquared => format!("{command}/{position}^2"),
+            Unit::CommandSecondSquaredPerPositionSquared => format!("{command} s^2/{position}^2"),
+            Unit::CommandPerSecondSquared => format!("{command}/s^2"),
+            Unit::PerDegreeCelsius => "1/K".into(),
+            Unit::Sample => "samples".into(),
+            Unit::Named(text) => text.into(),
+        }
+    }
+}
+
+/// What is known of an effect before any record is seen.
+#[derive(Debug)]
+pub struct Facts {
+    /// Name from the contract's list.
+    pub name: &'static str,
+    /// The part of the machine.
+    pub port: Port,
+    /// Where the columns enter.
+    pub entry: Entry,
+    /// Number of columns, each with one strength; at most [`COLUMNS`].
+    pub columns: usize,
+    /// Whether the strengths are 1 by definition (a saturation is there or not; its limit is an inner parameter).
+    pub fixed: bool,
+    /// Whether the strengths differ from record to record (a mains line starts at another phase each time).
+    pub per_record: bool,
+    /// The law, written out, with its source.
+    pub equation: &'static str,
+    /// One plain sentence for the factory floor.
+    pub says: &'static str,
+    /// Effects that the same records may not tell from this one.
+    pub confused_with: &'static [&'static str],
+    /// The experiment that tells them apart.
+    pub experiment: &'static str,
+    /// The frequencies where it mostly acts (Hz), as a start for the report's `where`.
+    pub band_hz: [f64; 2],
+}
+
+/// Most columns of one effect.
+pub const COLUMNS: usize = 6;
+
+/// A parameter under the name that reports and plant files use.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Name.
+    pub name: &'static str,
+    /// Value.
+    pub value: f64,
+    /// Unit.
+    pub unit: Unit,
+}
+
+impl Parameter {
+    /// A named value.
+    pub fn new(name: &'static str, value: f64, unit: Unit) -> Parameter {
+        Parameter { name, value, unit }
+    }
+}
+
+/// Numbers that fix an effect: inner parameters and strengths, in the effect's own order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Inner parameters.
+    pub inner: Vec<f64>,
+    /// Strengths, one a column.
+    pub strengths: Vec<f64>,
+}
+
+/// Why a physics entry of a plant file cannot be used.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[allow(missing_docs, reason = "each field is named in the message")]
+pub enum PhysicsError {
+    /// The library has no such effect.
+    #[error("effect `{effect}`: not in the library; known: {known}")]
+    Unknown { effect: String, known: String },
+    /// A parameter is missing.
+    #[error("effect `{effect}`: parameter `{parameter}` is missing")]
+    Missing { effect: &'static str, parameter: &'static str },
+    /// A parameter has no meaning here.
+    #[error("effect `{effect}`: parameter `{parameter}` is unknown; expected {expected}")]
+    Parameter { effect: String, parameter: String, expected: String },
+    /// A parameter is no number.
+    #[error("effect `{effect}`: {parameter} = {found}; expected a finite number")]
+    Finite { effect: &'static str, parameter: String, found: f64 },
+    /// A parameter is out of its range.
+    #[error("effect `{effect}`: {parameter} = {found}; expected {expected}")]
+    Range { effect: &'static str, parameter: &'static str, found: f64, expected: &'static str },
+    /// The effect is one of data or statistics and cannot be simulated.
+    #[error(
+        "effect `{effect}`: found in records, but not one that a simulation can carry; take its entry out of the plant file"
+    )]
+    NotSimulated { effect: &'static str },
+}
+
+/// Named parameters of one physics entry, taken out one by one.
+pub struct Given<'a> {
+    effect: &'static str,
+    parameters: &'a BTreeMap<String, f64>,
+}
+
+impl<'a> Given<'a> {
+    /// The parameters of `effect`.
+    pub fn new(effect: &'static str, parameters: &'a BTreeMap<String, f64>) -> Given<'a> {
+        Given { effect, parameters }
+    }
+
+    /// A parameter that must be there.
+    pub fn need(&self, parameter: &'static str) -> Result<f64, PhysicsError> {
+        self.parameters.get(parameter).copied().ok_or(PhysicsError::Missing { effect: self.effect, parameter })
+    }
+
+    /// A parameter with a default.
+    pub fn or(&self, parameter: &str, default: f64) -> f64 {
+        self.parameters.get(parameter).copied().unwrap_or(default)
+    }
+
+    /// A parameter that must be above 0.
+    pub fn positive(&self, parameter: &'static str) -> Result<f64, PhysicsError> {
+        let found = self.need(parameter)?;
+        if found.is_finite() && found > 0.0 {
+            Ok(found)
+        } else {
+            Err(PhysicsError::Range { effect: self.effect, parameter, found, expected: "a finite number above 0" })
+        }
+    }
+
+    /// A parameter that must lie strictly between two numbers, which `expected` says in words.
+    pub fn between(
+        &self,
+        parameter: &'static str,
+        low: f64,
+        high: f64,
+        expected: &'static str,
+    ) -> Result<f64, PhysicsError> {
+        let found = self.need(parameter)?;
+        if found > low && found < high {
+            Ok(found)
+        } else {
+            Err(PhysicsError::Range { effect: self.effect, parameter, found, expected })
+        }
+    }
+
+    /// Whether a parameter was given.
+    pub fn has(&self, parameter: &str) -> bool {
+        self.parameters.contains_key(parameter)
+    }
+}
+
+/// One effect of the library.
+pub trait Effect: Sync {
+    /// What is known beforehand.
+    fn facts(&self) -> &'static Facts;
+
+    /// Points of the inner parameters to scan; one empty point where there are none, no point where these records leave
+    /// the effect without meaning (no spindle, for instance).
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>>;
+
+    /// The law for these inner parameters, at rest.
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law>;
+
+    /// The parameters as reports name them.
+    fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter>;
+
+    /// Its part in the loop's response at `w_rad_s`, sampled as the law samples it.
+    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Cycle
+    }
+
+    /// The setting from named parameters; the inverse of [`Effect::parameters`].
+    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError>;
+}
+
+/// A law in motion. Columns are per unit of strength.
+pub trait Law: Send {
+    /// The columns from one sample to the next, without a change of state: the mean over the interval for
+    /// [`Entry::Torque`], the value at `to` for the others.
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]);
+
+    /// Takes the step for good.
+    fn commit(&mut self, _from: &Sample, _to: &Sample) {}
+}

@@ -1,0 +1,65 @@
+//! The encoder's scale is not even over the stroke: an error that changes smoothly with the position.
+//!
+//! m = x + e2 (x - x0)² + e3 (x - x0)³: the first terms of an eccentric scale's e cos(x + phi) over a part of a turn. The
+//! constant and the slope are offset and gain of the plant.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::{Sample, Scene};
+
+/// Inner: centre. Strengths: e2, e3.
+pub struct EncoderScaleError;
+
+static FACTS: Facts = Facts {
+    name: "encoder_scale_error",
+    port: Port::Sensor,
+    entry: Entry::Position,
+    columns: 2,
+    fixed: false,
+    per_record: false,
+    equation: "m = x + e2 (x - x0)^2 + e3 (x - x0)^3",
+    says: "the encoder's scale stretches over the stroke: distances read differently at the ends",
+    confused_with: &["torque_factor_rolloff", "cable_spring", "nonlinear_spring"],
+    experiment: "the same small multisine in five zones, read by encoder and PES: the scale differs, the torque does not",
+    band_hz: [0.1, 300.0],
+};
+
+struct Scale {
+    centre: f64,
+}
+
+impl Law for Scale {
+    fn columns(&self, _from: &Sample, to: &Sample, out: &mut [f64]) {
+        let d = to.x - self.centre;
+        (out[0], out[1]) = (d * d, d * d * d);
+    }
+}
+
+impl Effect for EncoderScaleError {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        vec![vec![scene.centre]]
+    }
+
+    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Scale { centre: inner[0] })
+    }
+
+    fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {
+        let [e2, e3] = [setting.strengths[0], setting.strengths[1]];
+        let travel = scene.travel;
+        vec![
+            Parameter::new("quadratic", e2, Unit::PerPosition),
+            Parameter::new("cubic", e3, Unit::PerPositionSquared),
+            Parameter::new("centre", setting.inner[0], Unit::Position),
+            Parameter::new("error_at_travel", travel * travel * (e2 + e3 * travel), Unit::Position),
+        ]
+    }
+
+    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+        let inner = vec![given.or("centre", scene.centre)];
+        Ok(Setting { inner, strengths: vec![given.need("quadratic")?, given.or("cubic", 0.0)] })
+    }
+}

@@ -1,0 +1,84 @@
+//! The gain between command and torque changes while the machine warms up.
+//!
+//! tau = i (1 + a (1 - exp(-t/tau_th))): first-order warming from the start of the record; or, where a temperature was
+//! recorded, tau = i (1 + c (T - T0)): copper's resistance rises by 0.39 %/K, a magnet's field falls by about 0.1 %/K.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::{Sample, Scene, logarithmic};
+use super::share::Share;
+use nalgebra::Complex;
+
+/// Inner: thermal time constant (0: by the recorded temperature). Strength: final change, or change per degree.
+pub struct GainDrift;
+
+static FACTS: Facts = Facts {
+    name: "gain_drift",
+    port: Port::Amplifier,
+    entry: Entry::Torque,
+    columns: 1,
+    fixed: false,
+    per_record: false,
+    equation: "tau = i (1 + a (1 - exp(-t/tau_th))) or i (1 + c (T - T0))",
+    says: "the motor gets weaker or stronger while it runs, as when it warms up",
+    confused_with: &["torque_factor_rolloff", "offset_drift", "linear_parameters"],
+    experiment: "the same multisine at the start and at the end of a long session, temperature recorded",
+    band_hz: [1.0, 3000.0],
+};
+
+struct Warming {
+    tau: f64,
+    /// Mean of exp(-t/tau) over an interval that starts at 0.
+    mean: f64,
+}
+
+impl Law for Warming {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        out[0] = if self.tau > 0.0 {
+            from.i * (1.0 - (-from.t / self.tau).exp() * self.mean)
+        } else {
+            from.i * 0.5 * (from.temperature + to.temperature)
+        };
+    }
+}
+
+impl Effect for GainDrift {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        let mut all: Vec<Vec<f64>> = if scene.warm { vec![vec![0.0]] } else { Vec::new() };
+        // A time constant much above the record is a straight line in time already.
+        all.extend(logarithmic(0.03 * scene.duration_s, 3.0 * scene.duration_s, 7).into_iter().map(|tau| vec![tau]));
+        all
+    }
+
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        let ratio = if inner[0] > 0.0 { scene.sample_time_s / inner[0] } else { 1.0 };
+        Box::new(Warming { tau: inner[0], mean: -(-ratio).exp_m1() / ratio })
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        if setting.inner[0] > 0.0 {
+            vec![
+                Parameter::new("gain_change", setting.strengths[0], Unit::Ratio),
+                Parameter::new("time_constant_s", setting.inner[0], Unit::Second),
+            ]
+        } else {
+            vec![Parameter::new("gain_per_degree", setting.strengths[0], Unit::PerDegreeCelsius)]
+        }
+    }
+
+    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        // Fully warm: the machine after a long session. With a recorded temperature the cold machine.
+        Share::Ratio(Complex::new(if setting.inner[0] > 0.0 { setting.strengths[0] } else { 0.0 }, 0.0))
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        if given.has("gain_per_degree") {
+            return Ok(Setting { inner: vec![0.0], strengths: vec![given.need("gain_per_degree")?] });
+        }
+        let strengths = vec![given.need("gain_change")?];
+        Ok(Setting { inner: vec![given.positive("time_constant_s")?], strengths })
+    }
+}

@@ -1,0 +1,86 @@
+//! A torque at a fixed frequency that is there whatever the arm does: mains, a fan, a switching supply.
+//!
+//! tau = a cos(2 pi f t) + b sin(2 pi f t); the mean over an interval is the value at its middle times sin(y)/y, y = pi f T.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::{Sample, Scene};
+use super::share::Share;
+use std::f64::consts::{PI, TAU};
+
+/// Inner: frequency (Hz). Strengths: cosine and sine, per record.
+pub struct LineDisturbance;
+
+static FACTS: Facts = Facts {
+    name: "line_disturbance",
+    port: Port::Torque,
+    entry: Entry::Torque,
+    columns: 2,
+    fixed: false,
+    per_record: true,
+    equation: "tau = a cos(2 pi f t + phi), phi new in every record",
+    says: "something outside hums on the arm at a fixed frequency, such as mains or a fan",
+    confused_with: &["repeatable_runout", "unmodelled_resonance", "broadband_disturbance"],
+    experiment: "ten seconds of rest with the loop closed, once with the spindle at another speed",
+    band_hz: [10.0, 1000.0],
+};
+
+/// Most points of the scan; a record longer than some 1.5 s is scanned up to a lower frequency.
+const POINTS: usize = 3000;
+
+struct Line {
+    w: f64,
+    /// sin(y)/y of half the interval's angle.
+    mean: f64,
+}
+
+impl Law for Line {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        let (sin, cos) = (self.w * 0.5 * (from.t + to.t)).sin_cos();
+        (out[0], out[1]) = (self.mean * cos, self.mean * sin);
+    }
+}
+
+impl Effect for LineDisturbance {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        let high = 1000f64.min(0.45 / scene.sample_time_s);
+        // Mains of 50 and 60 Hz with harmonics, and rectified, first; then everything that the longest record resolves.
+        let mut all: Vec<Vec<f64>> = Vec::new();
+        for base in [50.0, 60.0] {
+            all.extend((1..=6).map(|h| base * f64::from(h)).filter(|&f| f < high).map(|f| vec![f]));
+        }
+        if scene.duration_s > 0.0 {
+            let step = 0.8 / scene.duration_s;
+            let first = 1.0 / scene.duration_s;
+            all.extend((0..POINTS).map(|i| first + step * i as f64).take_while(|&f| f < high).map(|f| vec![f]));
+        }
+        all
+    }
+
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        let y = PI * inner[0] * scene.sample_time_s;
+        Box::new(Line { w: TAU * inner[0], mean: if y == 0.0 { 1.0 } else { y.sin() / y } })
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        let [a, b] = [setting.strengths[0], setting.strengths[1]];
+        vec![
+            Parameter::new("frequency_hz", setting.inner[0], Unit::Hertz),
+            Parameter::new("amplitude_command", a.hypot(b), Unit::Command),
+            Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
+        ]
+    }
+
+    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Outside
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        let (amplitude, phase) = (given.need("amplitude_command")?, given.or("phase_deg", 0.0).to_radians());
+        let strengths = vec![amplitude * phase.cos(), -amplitude * phase.sin()];
+        Ok(Setting { inner: vec![given.positive("frequency_hz")?], strengths })
+    }
+}

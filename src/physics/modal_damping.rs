@@ -1,0 +1,106 @@
+//! The damping of a resonance grows with its amplitude, as in bolted joints.
+//!
+//! zeta_j(A) = zeta_j (1 + g A), A the amplitude of the mode's share of the position: q' = (Re p (1 + g |2 q|) + j Im p) q + r i (a
+//! complex modal coordinate carries its amplitude; micro-slip of joints, Segalman 2005). The column is the share with the
+//! growing damping minus that without.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::mode_shift::mode;
+use super::pair::Pair;
+use super::sample::{Sample, Scene, logarithmic};
+use nalgebra::Complex;
+
+/// Inner: number of the mode, growth of its damping per amplitude.
+pub struct ModalDamping;
+
+static FACTS: Facts = Facts {
+    name: "modal_damping",
+    port: Port::Structure,
+    entry: Entry::Position,
+    columns: 1,
+    fixed: true,
+    per_record: false,
+    equation: "zeta_j(A) = zeta_j (1 + g A), A = |2 q_j|, in the modal form q' = (Re p (1 + g A) + j Im p) q + r i",
+    says: "a vibration of the arm is damped differently when it is large, as where a joint slips",
+    confused_with: &["unmodelled_resonance", "mode_shift", "current_saturation"],
+    experiment: "the same multisine around the vibration at three amplitudes over a decade",
+    band_hz: [200.0, 12000.0],
+};
+
+/// Range of the factor on the damping: it never falls to nothing and never stiffens the step.
+const FACTOR: [f64; 2] = [0.02, 50.0];
+
+struct Joint {
+    pair: Option<Pair>,
+    growth: f64,
+    step: f64,
+    q: [Complex<f64>; 2],
+}
+
+impl Joint {
+    fn next(&self, from: &Sample) -> [Complex<f64>; 2] {
+        let Some(pair) = self.pair else { return self.q };
+        let damped = |amplitude: f64| {
+            let by = (1.0 + self.growth * amplitude).clamp(FACTOR[0], FACTOR[1]);
+            Complex::new(pair.pole.re * by, pair.pole.im)
+        };
+        // Amplitude at the start, then at the middle of both ends: second order in the step.
+        let amplitude = 2.0 * self.q[0].norm();
+        let guess = Pair::step(damped(amplitude), pair.residue, self.q[0], from.i, self.step);
+        let middle = 0.5 * (amplitude + 2.0 * guess.norm());
+        [
+            Pair::step(damped(middle), pair.residue, self.q[0], from.i, self.step),
+            Pair::step(pair.pole, pair.residue, self.q[1], from.i, self.step),
+        ]
+    }
+}
+
+impl Law for Joint {
+    fn columns(&self, from: &Sample, _to: &Sample, out: &mut [f64]) {
+        let q = self.next(from);
+        out[0] = 2.0 * (q[0].re - q[1].re);
+    }
+
+    fn commit(&mut self, from: &Sample, _to: &Sample) {
+        self.q = self.next(from);
+    }
+}
+
+impl Effect for ModalDamping {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        let mut all = Vec::new();
+        for (j, pair) in Pair::all(scene) {
+            // The amplitude that the largest command as a tone at the mode would reach; real excitation stays below it.
+            let reach = scene.command * pair.residue.norm() / pair.pole.re.abs();
+            if reach > 0.0 && reach.is_finite() {
+                all.extend(logarithmic(0.3, 1000.0, 10).into_iter().map(|g| vec![j, g / reach]));
+                all.extend(logarithmic(0.3, 100.0, 6).into_iter().map(|g| vec![j, -g / reach]));
+            }
+        }
+        all
+    }
+
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        let q = [Complex::new(0.0, 0.0); 2];
+        Box::new(Joint { pair: Pair::of(scene, inner[0]), growth: inner[1], step: scene.sample_time_s, q })
+    }
+
+    fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {
+        let mut all = vec![
+            Parameter::new("mode", setting.inner[0], Unit::Ratio),
+            Parameter::new("growth", setting.inner[1], Unit::PerPosition),
+        ];
+        if let Some(pair) = Pair::of(scene, setting.inner[0]) {
+            all.push(Parameter::new("mode_hz", pair.pole.norm() / std::f64::consts::TAU, Unit::Hertz));
+        }
+        all
+    }
+
+    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+        Ok(Setting { inner: vec![mode(FACTS.name, given, scene)?, given.need("growth")?], strengths: vec![1.0] })
+    }
+}

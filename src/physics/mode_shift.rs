@@ -1,0 +1,112 @@
+//! A resonance of the plant moves with the position of the arm.
+//!
+//! w_j(x) = w_j (1 + c (x - x0)), damping ratio and modal mass constant: q' = p (1 + d) q + r/(1 + d) i with d = c (x - x0); the
+//! column is the mode's share of the position with the shift minus that without. To first order this is (x - x0) c times
+//! the plant's derivative by ln w_j.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::pair::Pair;
+use super::sample::{Sample, Scene, logarithmic};
+use nalgebra::Complex;
+
+/// Inner: number of the mode, shift per position, centre.
+pub struct ModeShift;
+
+static FACTS: Facts = Facts {
+    name: "mode_shift",
+    port: Port::Structure,
+    entry: Entry::Position,
+    columns: 1,
+    fixed: true,
+    per_record: false,
+    equation: "w_j(x) = w_j (1 + c (x - x0)), in the modal form q' = p (1 + d) q + r/(1 + d) i, d = c (x - x0)",
+    says: "a vibration of the arm changes its frequency over the stroke",
+    confused_with: &["unmodelled_resonance", "modal_damping", "time_base_drift", "torque_factor_rolloff"],
+    experiment: "the same multisine around the vibration in three or more zones of the stroke",
+    band_hz: [200.0, 12000.0],
+};
+
+/// Largest share by which a frequency is let move.
+const LARGEST: f64 = 0.5;
+
+struct Shifted {
+    pair: Option<Pair>,
+    slope: f64,
+    centre: f64,
+    step: f64,
+    /// The modal coordinate with the shift and without.
+    q: [Complex<f64>; 2],
+}
+
+impl Shifted {
+    fn next(&self, from: &Sample, to: &Sample) -> [Complex<f64>; 2] {
+        let Some(pair) = self.pair else { return self.q };
+        let by = 1.0 + (self.slope * (0.5 * (from.x + to.x) - self.centre)).clamp(-LARGEST, LARGEST);
+        [
+            Pair::step(pair.pole * by, pair.residue / by, self.q[0], from.i, self.step),
+            Pair::step(pair.pole, pair.residue, self.q[1], from.i, self.step),
+        ]
+    }
+}
+
+impl Law for Shifted {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        let q = self.next(from, to);
+        out[0] = 2.0 * (q[0].re - q[1].re);
+    }
+
+    fn commit(&mut self, from: &Sample, to: &Sample) {
+        self.q = self.next(from, to);
+    }
+}
+
+impl Effect for ModeShift {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        if scene.travel <= 0.0 {
+            return Vec::new();
+        }
+        let shifts = logarithmic(1e-3, 0.1, 6);
+        let each =
+            |j: f64| shifts.iter().flat_map(move |&s| [s, -s]).map(move |s| vec![j, s / scene.travel, scene.centre]);
+        Pair::all(scene).into_iter().flat_map(|(j, _)| each(j)).collect()
+    }
+
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        let zero = Complex::new(0.0, 0.0);
+        let pair = Pair::of(scene, inner[0]);
+        Box::new(Shifted { pair, slope: inner[1], centre: inner[2], step: scene.sample_time_s, q: [zero; 2] })
+    }
+
+    fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {
+        let mut all = vec![
+            Parameter::new("mode", setting.inner[0], Unit::Ratio),
+            Parameter::new("shift_per_position", setting.inner[1], Unit::PerPosition),
+            Parameter::new("centre", setting.inner[2], Unit::Position),
+            Parameter::new("shift_at_travel", setting.inner[1] * scene.travel, Unit::Ratio),
+        ];
+        if let Some(pair) = Pair::of(scene, setting.inner[0]) {
+            all.push(Parameter::new("mode_hz", pair.pole.norm() / std::f64::consts::TAU, Unit::Hertz));
+        }
+        all
+    }
+
+    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+        let mode = mode(FACTS.name, given, scene)?;
+        let inner = vec![mode, given.need("shift_per_position")?, given.or("centre", scene.centre)];
+        Ok(Setting { inner, strengths: vec![1.0] })
+    }
+}
+
+/// The number of a mode that the plant has, counted from 0 as in `plant.modes`.
+pub(super) fn mode(effect: &'static str, given: &Given, scene: &Scene) -> Result<f64, PhysicsError> {
+    let found = given.need("mode")?;
+    if found.fract() == 0.0 && found >= 0.0 && Pair::of(scene, found).is_some() {
+        return Ok(found);
+    }
+    let expected = "the number of one of plant.modes, counted from 0, with a damping ratio below 1";
+    Err(PhysicsError::Range { effect, parameter: "mode", found, expected })
+}

@@ -1,0 +1,62 @@
+//! The torque that holds the arm drifts along a record.
+//!
+//! tau = a t + b t², t from the start of the record: the first terms of any slow change. The constant is the torque offset.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::{Sample, Scene};
+use super::share::Share;
+
+/// Strengths: slope and curvature, per record.
+pub struct OffsetDrift;
+
+static FACTS: Facts = Facts {
+    name: "offset_drift",
+    port: Port::Torque,
+    entry: Entry::Torque,
+    columns: 2,
+    fixed: false,
+    per_record: true,
+    equation: "tau = a t + b t^2",
+    says: "a constant push on the arm slowly changes while recording",
+    confused_with: &["cable_spring", "bearing_bias", "gain_drift"],
+    experiment: "rest at one place for as long as a record takes, before and after",
+    band_hz: [0.0, 5.0],
+};
+
+struct Drift;
+
+impl Law for Drift {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        out[0] = 0.5 * (from.t + to.t);
+        out[1] = (from.t * from.t + from.t * to.t + to.t * to.t) / 3.0;
+    }
+}
+
+impl Effect for OffsetDrift {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, _scene: &Scene) -> Vec<Vec<f64>> {
+        vec![vec![]]
+    }
+
+    fn law(&self, _inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Drift)
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        vec![
+            Parameter::new("slope", setting.strengths[0], Unit::CommandPerSecond),
+            Parameter::new("curvature", setting.strengths[1], Unit::CommandPerSecondSquared),
+        ]
+    }
+
+    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Outside
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        Ok(Setting { inner: vec![], strengths: vec![given.need("slope")?, given.or("curvature", 0.0)] })
+    }
+}

@@ -1,0 +1,148 @@
+//! Pre-sliding friction of the pivot bearing: hysteresis over the distance since the last reversal.
+//!
+//! Dahl's law (P. Dahl, Aerospace Corp. TOR-0158, 1968): dz/dx = (1 - sgn(dx) z)/x_s with z = friction torque over its sliding
+//! level; exact over a step: z1 = s - (s - z0) exp(-|dx|/x_s), s = sgn(dx). Maxwell-slip form (Al-Bender, Lampaert, Swevers
+//! 2005): a row of spring-slider elements with evenly spread yield lengths up to x_s, whose first loading is the parabola
+//! z = 2 d/x_s - (d/x_s)². The inner parameter `shape` chooses: 0 Dahl, 1 Maxwell slip with that parabola, 2 Maxwell slip with
+//! Dahl's first loading 1 - exp(-d/x_s).
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::{Sample, Scene, logarithmic};
+
+/// Inner: sliding length, shape. Strength: the sliding level.
+pub struct PivotFriction;
+
+static FACTS: Facts = Facts {
+    name: "pivot_friction",
+    port: Port::Torque,
+    entry: Entry::Torque,
+    columns: 1,
+    fixed: false,
+    per_record: false,
+    equation: "tau = -F z, dz/dx = (1 - sgn(dx) z)/x_s (Dahl) or a row of Maxwell-slip elements up to x_s",
+    says: "the arm behaves like a bearing that sticks: after each reversal it first acts as a spring, then slides at a constant drag",
+    confused_with: &["coulomb_friction", "cable_spring", "nonlinear_spring", "linear_parameters"],
+    experiment: "the same multisine at three amplitudes over a decade, and a slow triangle with small nested reversals",
+    band_hz: [1.0, 150.0],
+};
+
+/// Elements of the Maxwell-slip row: the curve's kinks stay below half a per cent of the level.
+const ELEMENTS: usize = 16;
+
+struct Dahl {
+    length: f64,
+    z: f64,
+}
+
+/// Dahl's law over a step `dx`, exact.
+pub(super) fn dahl(z: f64, dx: f64, length: f64) -> f64 {
+    let s = dx.signum();
+    s - (s - z) * (-dx.abs() / length).exp()
+}
+
+impl Law for Dahl {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        out[0] = -0.5 * (self.z + dahl(self.z, to.x - from.x, self.length));
+    }
+
+    fn commit(&mut self, from: &Sample, to: &Sample) {
+        self.z = dahl(self.z, to.x - from.x, self.length);
+    }
+}
+
+/// A row of spring-slider elements whose first loading is a given curve, linear between nodes (Iwan 1966): element i yields
+/// at node i and has the stiffness by which the curve's slope falls there. Unloading and nested loops follow Masing's rule.
+struct MaxwellSlip {
+    /// Yield lengths (position_unit).
+    yields: [f64; ELEMENTS],
+    /// Stiffness, so that all elements sliding make 1 (1/position_unit).
+    stiffness: [f64; ELEMENTS],
+    /// Stretch of each spring (position_unit).
+    stretch: [f64; ELEMENTS],
+}
+
+impl MaxwellSlip {
+    /// `curve` from 0 to 1 over distances in sliding lengths, up to `end` of them.
+    fn of(curve: fn(f64) -> f64, end: f64, length: f64) -> MaxwellSlip {
+        // Nodes closer at the start, where the curve bends most.
+        let node = |i: usize| end * (i as f64 / ELEMENTS as f64).powf(1.5);
+        let level = |i: usize| curve(node(i)) / curve(end);
+        let slope =
+            |i: usize| if i > ELEMENTS { 0.0 } else { (level(i) - level(i - 1)) / ((node(i) - node(i - 1)) * length) };
+        MaxwellSlip {
+            yields: std::array::from_fn(|i| node(i + 1) * length),
+            stiffness: std::array::from_fn(|i| slope(i + 1) - slope(i + 2)),
+            stretch: [0.0; ELEMENTS],
+        }
+    }
+
+    fn level(&self, stretch: &[f64; ELEMENTS]) -> f64 {
+        stretch.iter().zip(&self.stiffness).map(|(s, k)| s * k).sum()
+    }
+
+    fn moved(&self, dx: f64) -> [f64; ELEMENTS] {
+        let mut next = self.stretch;
+        for (s, y) in next.iter_mut().zip(&self.yields) {
+            *s = (*s + dx).clamp(-y, *y);
+        }
+        next
+    }
+}
+
+impl Law for MaxwellSlip {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        out[0] = -0.5 * (self.level(&self.stretch) + self.level(&self.moved(to.x - from.x)));
+    }
+
+    fn commit(&mut self, from: &Sample, to: &Sample) {
+        self.stretch = self.moved(to.x - from.x);
+    }
+}
+
+/// First loading of evenly spread yield lengths.
+fn parabola(d: f64) -> f64 {
+    if d < 1.0 { d * (2.0 - d) } else { 1.0 }
+}
+
+/// First loading of Dahl's law.
+fn exponential(d: f64) -> f64 {
+    1.0 - (-d).exp()
+}
+
+impl Effect for PivotFriction {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        // Below some twelve times the sensor's noise the hysteresis cannot be told from dry friction.
+        let low = (12.0 * scene.noise).max(2e-3 * scene.travel);
+        let lengths = logarithmic(low, 4.0 * scene.travel, 14);
+        lengths.iter().flat_map(|&l| [0.0, 1.0, 2.0].map(|shape| vec![l, shape])).collect()
+    }
+
+    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
+        if inner[1] < 0.5 {
+            Box::new(Dahl { length: inner[0], z: 0.0 })
+        } else {
+            let (curve, end): (fn(f64) -> f64, f64) = if inner[1] < 1.5 { (parabola, 1.0) } else { (exponential, 6.0) };
+            Box::new(MaxwellSlip::of(curve, end, inner[0]))
+        }
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        vec![
+            Parameter::new("sliding_length", setting.inner[0], Unit::Position),
+            Parameter::new("level_command", setting.strengths[0], Unit::Command),
+            Parameter::new("shape", setting.inner[1], Unit::Ratio),
+        ]
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        // Reports give the length that a person means beside the one of the law, where a spring below zero parts them.
+        let length =
+            if given.has("law_length") { given.positive("law_length")? } else { given.positive("sliding_length")? };
+        let inner = vec![length, given.or("shape", 0.0)];
+        Ok(Setting { inner, strengths: vec![given.need("level_command")?] })
+    }
+}

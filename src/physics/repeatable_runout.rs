@@ -1,0 +1,86 @@
+//! What repeats with every revolution of the spindle: runout of disk and spindle, seen in the position.
+//!
+//! m = x + sum over h = 1, 2, 3 of a_h cos(h n psi + phi_h), psi the spindle's angle, n the base order. Harmonics of orders,
+//! not of hertz: where the spindle's speed moves, the lines move with it.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::{Sample, Scene};
+use super::share::Share;
+use std::f64::consts::TAU;
+
+/// Inner: the base frequency (Hz). Strengths: cosine and sine of three harmonics.
+pub struct RepeatableRunout;
+
+static FACTS: Facts = Facts {
+    name: "repeatable_runout",
+    port: Port::Disk,
+    entry: Entry::Position,
+    columns: 6,
+    fixed: false,
+    per_record: false,
+    equation: "m = x + sum_h a_h cos(h n psi + phi_h), h = 1, 2, 3, psi the spindle's angle",
+    says: "the error repeats with every turn of the spindle: something on it runs out of round",
+    confused_with: &["line_disturbance", "parametric_gain"],
+    experiment: "the same move with the spindle one percent faster: runout follows the spindle, mains does not",
+    band_hz: [10.0, 2000.0],
+};
+
+const AMPLITUDES: [&str; 3] = ["amplitude", "amplitude_2", "amplitude_3"];
+const PHASES: [&str; 3] = ["phase_deg", "phase_2_deg", "phase_3_deg"];
+
+struct Runout {
+    /// Whole order of the spindle, or none and then hertz.
+    order: Option<f64>,
+    hz: f64,
+}
+
+impl Law for Runout {
+    fn columns(&self, _from: &Sample, to: &Sample, out: &mut [f64]) {
+        let angle = self.order.map_or_else(|| TAU * self.hz * to.t, |n| n * to.spindle_rad);
+        for h in 0..3 {
+            let (sin, cos) = ((h + 1) as f64 * angle).sin_cos();
+            (out[2 * h], out[2 * h + 1]) = (cos, sin);
+        }
+    }
+}
+
+impl Effect for RepeatableRunout {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        let Some(spindle) = scene.spindle_hz else { return Vec::new() };
+        (1..=8).map(|n| f64::from(n) * spindle).filter(|f| 3.0 * f < scene.nyquist_hz()).map(|f| vec![f]).collect()
+    }
+
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        // A recorded angle may wrap at one turn: only whole orders may be taken from it.
+        let ratio = scene.spindle_hz.map(|s| inner[0] / s);
+        let order = ratio.map(f64::round).filter(|n| *n >= 1.0 && ratio.is_some_and(|r| (r - n).abs() < 1e-2));
+        Box::new(Runout { order, hz: inner[0] })
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        let mut all = vec![Parameter::new("base_hz", setting.inner[0], Unit::Hertz)];
+        for (h, pair) in setting.strengths.chunks_exact(2).take(3).enumerate() {
+            all.push(Parameter::new(AMPLITUDES[h], pair[0].hypot(pair[1]), Unit::Position));
+            all.push(Parameter::new(PHASES[h], (-pair[1]).atan2(pair[0]).to_degrees(), Unit::Degree));
+        }
+        all
+    }
+
+    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Outside
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        given.need(AMPLITUDES[0])?;
+        let mut strengths = Vec::with_capacity(6);
+        for h in 0..3 {
+            let (amplitude, phase) = (given.or(AMPLITUDES[h], 0.0), given.or(PHASES[h], 0.0).to_radians());
+            strengths.extend([amplitude * phase.cos(), -amplitude * phase.sin()]);
+        }
+        Ok(Setting { inner: vec![given.positive("base_hz")?], strengths })
+    }
+}

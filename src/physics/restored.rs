@@ -1,0 +1,110 @@
+//! The physics of a plant file made ready: entries by name into effects with their numbers.
+//!
+//! In: a plant with `[[plant.physics]]` tables and what is known of the motion. Out: effects, settings, the scene they act
+//! in, and the entries that no simulation can carry, by name. Spec: `specs/mismatch.md`, "Use".
+
+use super::effect::{Effect, Given, PhysicsError, Setting};
+use super::library::{data_facts, effect, library};
+use super::sample::Scene;
+use crate::lti::{PhysicsEntry, Plant};
+
+/// What a plant file does not say of the machine and its motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Context {
+    /// Sample time (s).
+    pub sample_time_s: f64,
+    /// Spindle frequency (Hz), where there is a spindle.
+    pub spindle_hz: Option<f64>,
+    /// Largest distance from the middle of the stroke (position_unit).
+    pub travel: f64,
+    /// Largest speed (position_unit/s).
+    pub speed: f64,
+    /// Largest command (command_unit).
+    pub command: f64,
+    /// White noise of the position sensor, rms (position_unit).
+    pub noise: f64,
+    /// Length of the record (s).
+    pub duration_s: f64,
+}
+
+/// Half a stroke of a servo writer (position_unit), where no move says more.
+const TRAVEL: f64 = 15.0;
+
+impl Default for Context {
+    fn default() -> Self {
+        let (sample_time_s, travel) = (39.6e-6, TRAVEL);
+        Context { sample_time_s, spindle_hz: None, travel, speed: 350.0, command: 10.0, noise: 0.0, duration_s: 1.0 }
+    }
+}
+
+/// A plant's physics, ready to be simulated.
+#[derive(Clone)]
+pub struct Restored {
+    /// Effects with their numbers, in the order of the file.
+    pub parts: Vec<(&'static dyn Effect, Setting)>,
+    /// The machine they act in: the linear plant, without physics entries.
+    pub scene: Scene,
+    /// Entries that belong to the records (statistics, clocks, logs): no law, left out.
+    pub left_out: Vec<&'static str>,
+}
+
+impl Restored {
+    /// The physics of `plant`; unknown effects and unknown or missing parameters are refused by name.
+    pub fn of(plant: &Plant, context: &Context) -> Result<Restored, PhysicsError> {
+        let scene = Scene {
+            plant: Plant { physics: Vec::new(), ..plant.clone() },
+            sample_time_s: context.sample_time_s,
+            spindle_hz: context.spindle_hz,
+            travel: context.travel,
+            centre: 0.0,
+            speed: context.speed,
+            command: context.command,
+            command_step: context.command,
+            noise: context.noise,
+            duration_s: context.duration_s,
+            indexed: false,
+            warm: false,
+        };
+        let mut restored = Restored { parts: Vec::new(), scene, left_out: Vec::new() };
+        for entry in &plant.physics {
+            match effect(&entry.effect) {
+                Some(e) => restored.parts.push((e, setting(e, entry, &restored.scene)?)),
+                None => match data_facts().iter().find(|f| f.name == entry.effect) {
+                    Some(facts) => restored.left_out.push(facts.name),
+                    None => {
+                        let known: Vec<&str> = library().iter().map(|e| e.facts().name).collect();
+                        return Err(PhysicsError::Unknown { effect: entry.effect.clone(), known: known.join(", ") });
+                    }
+                },
+            }
+        }
+        Ok(restored)
+    }
+
+    /// Names of the effects that act, in the order of the file.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.parts.iter().map(|(e, _)| e.facts().name).collect()
+    }
+
+    /// Effects and settings as [`super::Machine::new`] takes them.
+    pub fn effects(&self) -> Vec<(&dyn Effect, &Setting)> {
+        self.parts.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect()
+    }
+}
+
+fn setting(e: &'static dyn Effect, entry: &PhysicsEntry, scene: &Scene) -> Result<Setting, PhysicsError> {
+    let name = e.facts().name;
+    if let Some((parameter, found)) = entry.parameters.iter().find(|(_, v)| !v.is_finite()) {
+        return Err(PhysicsError::Finite { effect: name, parameter: parameter.clone(), found: *found });
+    }
+    let setting = e.restore(&Given::new(name, &entry.parameters), scene)?;
+    // What an effect reports of a setting is what it understands.
+    let known: Vec<&str> = e.parameters(&setting, scene).iter().map(|p| p.name).collect();
+    match entry.parameters.keys().find(|k| !known.contains(&k.as_str())) {
+        Some(parameter) => {
+            let (effect, parameter) = (name.to_owned(), parameter.clone());
+            Err(PhysicsError::Parameter { effect, parameter, expected: known.join(", ") })
+        }
+        None => Ok(setting),
+    }
+}

@@ -1,0 +1,74 @@
+//! What a law may look at: the motion at one sample, and the machine it happens on.
+
+use crate::lti::Plant;
+
+/// The motion at one controller sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Time since the start of the record (s).
+    pub t: f64,
+    /// Position of the arm, without the sensor's errors (position_unit).
+    pub x: f64,
+    /// Velocity (position_unit/s).
+    pub v: f64,
+    /// Command of this sample, before the delay (command_unit).
+    pub u: f64,
+    /// Mean of the delayed command that acts on the arm from this sample to the next (command_unit).
+    pub i: f64,
+    /// Spindle angle (rad); spindle frequency times time where no index was recorded.
+    pub spindle_rad: f64,
+    /// Temperature above the record's first (°C); 0 where not recorded.
+    pub temperature: f64,
+}
+
+/// The machine and the size of its motion: what grids and units are made from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// The linear plant.
+    pub plant: Plant,
+    /// Sample time (s).
+    pub sample_time_s: f64,
+    /// Spindle frequency (Hz), where there is a spindle.
+    pub spindle_hz: Option<f64>,
+    /// Largest distance from the records' middle position (position_unit).
+    pub travel: f64,
+    /// Middle of the positions (position_unit).
+    pub centre: f64,
+    /// Largest speed (position_unit/s).
+    pub speed: f64,
+    /// Largest command (command_unit).
+    pub command: f64,
+    /// Largest change of the command from sample to sample (command_unit).
+    pub command_step: f64,
+    /// White noise of the position sensor, rms (position_unit).
+    pub noise: f64,
+    /// Longest record (s).
+    pub duration_s: f64,
+    /// Whether any record carries a spindle index.
+    pub indexed: bool,
+    /// Whether any record carries a temperature.
+    pub warm: bool,
+}
+
+impl Scene {
+    /// Half the sample rate (Hz).
+    pub fn nyquist_hz(&self) -> f64 {
+        0.5 / self.sample_time_s
+    }
+
+    /// Acceleration per command of the body, resonance gain included (position_unit/s² per command_unit).
+    pub fn acceleration_gain(&self) -> f64 {
+        self.plant.body.acceleration_gain() * self.plant.resonance_gain
+    }
+}
+
+/// `count` points from `low` to `high`, evenly spread in the logarithm; empty where the range is empty.
+pub fn logarithmic(low: f64, high: f64, count: usize) -> Vec<f64> {
+    if !(low > 0.0 && high >= low && high.is_finite()) || count == 0 {
+        return Vec::new();
+    }
+    if count == 1 {
+        return vec![(low * high).sqrt()];
+    }
+    (0..count).map(|i| low * (high / low).powf(i as f64 / (count - 1) as f64)).collect()
+}

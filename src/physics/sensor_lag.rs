@@ -1,0 +1,92 @@
+//! The encoder's reading follows the position with a first-order lag: an anti-alias filter or an interpolator.
+//!
+//! tau y' = x - y; over an interval where x runs straight with slope s: y = x - s tau + (y0 - x0 + s tau) exp(-t/tau).
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::{Sample, Scene, logarithmic};
+use super::share::Share;
+use nalgebra::Complex;
+use std::f64::consts::TAU;
+
+/// Inner: the time constant.
+pub struct SensorLag;
+
+static FACTS: Facts = Facts {
+    name: "sensor_lag",
+    port: Port::Sensor,
+    entry: Entry::Position,
+    columns: 1,
+    fixed: true,
+    per_record: false,
+    equation: "tau y' = x - y, y is recorded",
+    says: "the encoder's reading lags behind the position: something in the sensor filters it",
+    confused_with: &["amplifier_lag", "extra_delay", "linear_parameters"],
+    experiment: "a multisine up to half the sample rate, read by the encoder and by the PES: only the encoder shows the lag",
+    band_hz: [300.0, 12000.0],
+};
+
+struct Lag {
+    tau: f64,
+    step: f64,
+    keep: f64,
+    /// Reading minus position.
+    behind: Option<f64>,
+}
+
+impl Lag {
+    fn next(&self, from: &Sample, to: &Sample) -> f64 {
+        let drag = self.tau * (to.x - from.x) / self.step;
+        // Before the record the arm is taken to move on as it starts.
+        let behind = self.behind.unwrap_or(-self.tau * from.v);
+        -drag + (behind + drag) * self.keep
+    }
+}
+
+impl Law for Lag {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        out[0] = self.next(from, to);
+    }
+
+    fn commit(&mut self, from: &Sample, to: &Sample) {
+        self.behind = Some(self.next(from, to));
+    }
+}
+
+impl Effect for SensorLag {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        let t = scene.sample_time_s;
+        logarithmic(0.1 * t, 20.0 * t, 14).into_iter().map(|tau| vec![tau]).collect()
+    }
+
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        let step = scene.sample_time_s;
+        Box::new(Lag { tau: inner[0], step, keep: (-step / inner[0]).exp(), behind: None })
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        vec![
+            Parameter::new("time_constant_s", setting.inner[0], Unit::Second),
+            Parameter::new("bandwidth_hz", 1.0 / (TAU * setting.inner[0]), Unit::Hertz),
+        ]
+    }
+
+    fn share(&self, setting: &Setting, scene: &Scene, w_rad_s: f64) -> Share {
+        let (step, tau) = (scene.sample_time_s, setting.inner[0]);
+        let keep = (-step / tau).exp();
+        let z = Complex::from_polar(1.0, w_rad_s * step);
+        Share::Ratio((z - 1.0) / (z - keep) * (keep - 1.0) * tau / step)
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        let tau = if given.has("time_constant_s") {
+            given.positive("time_constant_s")?
+        } else {
+            1.0 / (TAU * given.positive("bandwidth_hz")?)
+        };
+        Ok(Setting { inner: vec![tau], strengths: vec![1.0] })
+    }
+}

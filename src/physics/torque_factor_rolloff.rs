@@ -1,0 +1,86 @@
+//! The torque factor falls towards the ends of the stroke: an even polynomial of the position, and a slope.
+//!
+//! The field of a magnet gap, expanded about its middle; the slope stands for a middle that is not the origin.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::sample::{Sample, Scene};
+
+/// Strengths: of -z i, -z² i, -z⁴ i, -z⁶ i with z = position over the travel; the linear one moves the centre.
+pub struct TorqueFactorRolloff;
+
+static FACTS: Facts = Facts {
+    name: "torque_factor_rolloff",
+    port: Port::Torque,
+    entry: Entry::Torque,
+    columns: 4,
+    fixed: false,
+    per_record: false,
+    equation: "tau = Kt0 (1 - s x - a x^2 - b x^4 - c x^6) i",
+    says: "the motor pushes less towards the ends of the stroke: the same current gives less torque there",
+    confused_with: &["gain_drift", "cable_spring", "mode_shift"],
+    experiment: "the same multisine in three or more zones of the stroke",
+    band_hz: [1.0, 2000.0],
+};
+
+struct Rolloff {
+    travel: f64,
+}
+
+impl Law for Rolloff {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        // The command is constant over the interval; the powers of the position are averaged by Simpson's rule.
+        let (a, c) = (from.x / self.travel, to.x / self.travel);
+        let b = 0.5 * (a + c);
+        let mean = |f: fn(f64) -> f64| -from.i * (f(a) + 4.0 * f(b) + f(c)) / 6.0;
+        (out[0], out[1]) = (mean(|z| z), mean(|z| z * z));
+        (out[2], out[3]) = (mean(|z| z.powi(4)), mean(|z| z.powi(6)));
+    }
+}
+
+/// Fall of the torque factor at a position, over its value at 0.
+fn drop(strengths: &[f64], z: f64) -> f64 {
+    strengths[0] * z + strengths[1] * z * z + strengths[2] * z.powi(4) + strengths[3] * z.powi(6)
+}
+
+impl Effect for TorqueFactorRolloff {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, _scene: &Scene) -> Vec<Vec<f64>> {
+        vec![vec![]]
+    }
+
+    fn law(&self, _inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        Box::new(Rolloff { travel: scene.travel })
+    }
+
+    fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {
+        let (s, l) = (&setting.strengths, scene.travel);
+        let at = |x: f64| 0.5 * (drop(s, x / l) + drop(s, -x / l));
+        // What a reader can picture first; the polynomial after it, from which the law is made again.
+        vec![
+            Parameter::new("drop_at_15", at(15.0), Unit::Ratio),
+            Parameter::new("drop_at_travel", at(l), Unit::Ratio),
+            Parameter::new("slope", s[0] / l, Unit::PerPosition),
+            Parameter::new("curvature", s[1] / l.powi(2), Unit::PerPositionSquared),
+            Parameter::new("quartic", s[2] / l.powi(4), Unit::Named("1/position^4")),
+            Parameter::new("sextic", s[3] / l.powi(6), Unit::Named("1/position^6")),
+        ]
+    }
+
+    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+        let l = scene.travel;
+        let curvature = match given.need("curvature") {
+            Ok(a) => a,
+            Err(missing) => given.need("drop_at_15").map_err(|_| missing)? / 225.0,
+        };
+        let strengths = vec![
+            given.or("slope", 0.0) * l,
+            curvature * l.powi(2),
+            given.or("quartic", 0.0) * l.powi(4),
+            given.or("sextic", 0.0) * l.powi(6),
+        ];
+        Ok(Setting { inner: vec![], strengths })
+    }
+}

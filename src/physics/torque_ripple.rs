@@ -1,0 +1,68 @@
+//! A torque that repeats with the position: cogging of magnets, or the balls of the bearing.
+//!
+//! tau = a cos(2 pi x/P) + b sin(2 pi x/P); the mean over an interval by Simpson's rule along the straight path.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::encoder_cyclic_error::EncoderCyclicError;
+use super::sample::{Sample, Scene};
+use std::f64::consts::TAU;
+
+/// Inner: the period. Strengths: cosine and sine.
+pub struct TorqueRipple;
+
+static FACTS: Facts = Facts {
+    name: "torque_ripple",
+    port: Port::Torque,
+    entry: Entry::Torque,
+    columns: 2,
+    fixed: false,
+    per_record: false,
+    equation: "tau = a cos(2 pi x/P + phi)",
+    says: "the torque has a wave that repeats with the position: the arm is pulled towards certain places",
+    confused_with: &["encoder_cyclic_error", "nonlinear_spring", "cable_spring"],
+    experiment: "constant-velocity moves at three speeds: the line moves with the speed and weakens with its square",
+    band_hz: [1.0, 500.0],
+};
+
+struct Ripple {
+    wave: f64,
+}
+
+impl Law for Ripple {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        let (s0, c0) = (self.wave * from.x).sin_cos();
+        let (s1, c1) = (self.wave * 0.5 * (from.x + to.x)).sin_cos();
+        let (s2, c2) = (self.wave * to.x).sin_cos();
+        (out[0], out[1]) = ((c0 + 4.0 * c1 + c2) / 6.0, (s0 + 4.0 * s1 + s2) / 6.0);
+    }
+}
+
+impl Effect for TorqueRipple {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        // The same question as for the encoder's wave: no period over the travel may fall between two points.
+        EncoderCyclicError.grid(scene)
+    }
+
+    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Ripple { wave: TAU / inner[0] })
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        let [a, b] = [setting.strengths[0], setting.strengths[1]];
+        vec![
+            Parameter::new("amplitude_command", a.hypot(b), Unit::Command),
+            Parameter::new("period", setting.inner[0], Unit::Position),
+            Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
+        ]
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        let (amplitude, phase) = (given.need("amplitude_command")?, given.or("phase_deg", 0.0).to_radians());
+        let strengths = vec![amplitude * phase.cos(), -amplitude * phase.sin()];
+        Ok(Setting { inner: vec![given.positive("period")?], strengths })
+    }
+}

@@ -1,0 +1,107 @@
+//! A vibration of the structure that the linear plant leaves out.
+//!
+//! m = x + (a w² + b w s)/(s² + 2 z w s + w²) i: one modal term of the partial fractions, with any sign and phase (eq. (2) in
+//! modal form). Exact for a command held between samples.
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::oscillator::Oscillator;
+use super::sample::{Sample, Scene};
+use super::share::Share;
+use crate::lti::ModalTerm;
+use nalgebra::Complex;
+use std::f64::consts::TAU;
+
+/// Inner: frequency (Hz), damping ratio. Strengths: gains at rest and of the rate.
+pub struct UnmodelledResonance;
+
+static FACTS: Facts = Facts {
+    name: "unmodelled_resonance",
+    port: Port::Structure,
+    entry: Entry::Position,
+    columns: 2,
+    fixed: false,
+    per_record: false,
+    equation: "m = x + (a w^2 + b w s)/(s^2 + 2 z w s + w^2) i",
+    says: "the structure vibrates at a frequency that the model does not have",
+    confused_with: &["aliased_mode", "mode_shift", "line_disturbance", "base_mode", "linear_parameters"],
+    experiment: "a multisine through the band at two amplitudes: a vibration follows the command, a disturbance does not",
+    band_hz: [30.0, 12000.0],
+};
+
+/// The law of one oscillator, its first `responses` as columns.
+pub(super) struct Ringing {
+    oscillator: Oscillator,
+    responses: usize,
+}
+
+impl Ringing {
+    pub(super) fn at_rest(hz: f64, damping: f64, step: f64, responses: usize) -> Ringing {
+        Ringing { oscillator: Oscillator::at_rest(TAU * hz, damping, step), responses }
+    }
+}
+
+impl Law for Ringing {
+    fn columns(&self, from: &Sample, _to: &Sample, out: &mut [f64]) {
+        out[..self.responses].copy_from_slice(&self.oscillator.next(from.i)[..self.responses]);
+    }
+
+    fn commit(&mut self, from: &Sample, _to: &Sample) {
+        self.oscillator.advance(from.i);
+    }
+}
+
+/// Frequencies from `low` to `high`, one half-power width apart, never closer than the longest record resolves.
+pub(super) fn scan(low: f64, high: f64, damping: f64, scene: &Scene) -> Vec<Vec<f64>> {
+    let finest = if scene.duration_s > 0.0 { 0.4 / scene.duration_s } else { low };
+    let mut all = Vec::new();
+    let mut hz = low;
+    while hz <= high && all.len() < 2000 {
+        all.push(vec![hz, damping]);
+        hz += (3.0 * damping * hz).max(finest);
+    }
+    all
+}
+
+/// (a w² + b w s)/(s² + 2 z w s + w²) by its pole and residue.
+pub(super) fn term(hz: f64, damping: f64, a: f64, b: f64) -> ModalTerm {
+    let w = TAU * hz;
+    let turning = w * ((1.0 - damping) * (1.0 + damping)).sqrt();
+    let pole = Complex::new(-damping * w, turning);
+    ModalTerm { pole, residue: (pole * b * w + a * w * w) / Complex::new(0.0, 2.0 * turning) }
+}
+
+impl Effect for UnmodelledResonance {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        let high = 0.45 / scene.sample_time_s;
+        [0.005, 0.02, 0.06].iter().flat_map(|&z| scan(30f64.min(0.01 * high), high, z, scene)).collect()
+    }
+
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        Box::new(Ringing::at_rest(inner[0], inner[1], scene.sample_time_s, 2))
+    }
+
+    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        let [a, b] = [setting.strengths[0], setting.strengths[1]];
+        vec![
+            Parameter::new("frequency_hz", setting.inner[0], Unit::Hertz),
+            Parameter::new("damping_ratio", setting.inner[1], Unit::Ratio),
+            Parameter::new("static_gain", a, Unit::PositionPerCommand),
+            Parameter::new("rate_gain", b, Unit::PositionPerCommand),
+            Parameter::new("peak_gain", a.hypot(b) / (2.0 * setting.inner[1]), Unit::PositionPerCommand),
+        ]
+    }
+
+    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Terms(vec![term(setting.inner[0], setting.inner[1], setting.strengths[0], setting.strengths[1])])
+    }
+
+    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        let damping = given.between("damping_ratio", 0.0, 1.0, "above 0 and below 1")?;
+        let strengths = vec![given.need("static_gain")?, given.or("rate_gain", 0.0)];
+        Ok(Setting { inner: vec![given.positive("frequency_hz")?, damping], strengths })
+    }
+}

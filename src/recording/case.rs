@@ -1,0 +1,120 @@
+//! A case: a plant model, a controller, and records with their roles; `case.toml` of the contract.
+
+use super::{Record, RecordSettings, RecordingError};
+use crate::document::read_toml;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What a record is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Fitting, selection, thresholds.
+    Fit,
+    /// Judging only: never used for fitting, selection or thresholds.
+    Holdout,
+}
+
+/// One line of the list of records.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordEntry {
+    /// Path, relative to the case folder.
+    pub file: PathBuf,
+    /// Its use.
+    pub role: Role,
+    /// Records of one group share reference and excitation and differ only in noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repeat_group: Option<String>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CaseFile {
+    id: String,
+    plant: PathBuf,
+    controller: Option<PathBuf>,
+    spindle_hz: Option<f64>,
+    records: Vec<RecordEntry>,
+}
+
+/// A case with its records read. Plant and controller are paths: their rooms read them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// The case's name.
+    pub id: String,
+    /// plant.toml.
+    pub plant: PathBuf,
+    /// controller.toml; the command is taken as given where absent.
+    pub controller: Option<PathBuf>,
+    /// Spindle frequency (Hz).
+    pub spindle_hz: Option<f64>,
+    /// Entries and records, in the order of the file.
+    pub records: Vec<(RecordEntry, Record)>,
+}
+
+impl RecordEntry {
+    /// The name that reports use: the file's name without its endings.
+    pub fn name(&self) -> String {
+        let name = self.file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        name.trim_end_matches(".gz").trim_end_matches(".csv").to_owned()
+    }
+}
+
+impl Case {
+    /// Reads `case.toml` of a folder and every record it lists.
+    pub fn read(folder: &Path, settings: &RecordSettings) -> Result<Case, RecordingError> {
+        let file = folder.join("case.toml");
+        let read: CaseFile = read_toml(&file)?;
+        let refuse = |key: &'static str, found: String, expected: &'static str| RecordingError::Case {
+            file: file.clone(),
+            key,
+            found,
+            expected,
+        };
+        if read.id.is_empty() {
+            return Err(refuse("id", "an empty text".into(), "a name"));
+        }
+        if let Some(hz) = read.spindle_hz
+            && !(hz.is_finite() && hz > 0.0)
+        {
+            return Err(refuse("spindle_hz", hz.to_string(), "a finite number above 0"));
+        }
+        let records = read
+            .records
+            .into_iter()
+            .map(|entry| Record::read(&folder.join(&entry.file), settings).map(|record| (entry, record)))
+            .collect::<Result<Vec<_>, _>>()?;
+        Case {
+            id: read.id,
+            plant: folder.join(read.plant),
+            controller: read.controller.map(|c| folder.join(c)),
+            spindle_hz: read.spindle_hz,
+            records,
+        }
+        .checked(&file)
+    }
+
+    /// Refuses a case that cannot be diagnosed: nothing to fit, unequal sample times, a record listed twice.
+    pub fn checked(self, file: &Path) -> Result<Case, RecordingError> {
+        let refuse = |found: String, expected: &'static str| {
+            Err(RecordingError::Case { file: file.into(), key: "records", found, expected })
+        };
+        let Some((_, first)) = self.records.iter().find(|(e, _)| e.role == Role::Fit) else {
+            return refuse("no record with role = \"fit\"".into(), "at least one record to fit");
+        };
+        for (i, (entry, record)) in self.records.iter().enumerate() {
+            if (record.sample_time_s - first.sample_time_s).abs() > 1e-3 * first.sample_time_s {
+                let (name, t) = (entry.file.display(), record.sample_time_s);
+                return refuse(
+                    format!("{name} at {t} s beside {} s", first.sample_time_s),
+                    "one sample time in a case",
+                );
+            }
+            if self.records[..i].iter().any(|(e, _)| e.file == entry.file) {
+                return refuse(format!("{} twice", entry.file.display()), "each file once");
+            }
+        }
+        Ok(self)
+    }
+}

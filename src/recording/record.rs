@@ -1,0 +1,214 @@
+//! One time record of a machine: reference, excitation, command, position, and what else was logged.
+
+use super::RecordingError;
+use flate2::read::MultiGzDecoder;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+/// Names of the columns in the file; the contract's names by default.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ColumnNames {
+    /// Time (s); may be absent where `sample_time_s` is given.
+    pub time: String,
+    /// Reference (position_unit).
+    pub reference: String,
+    /// Excitation added behind the controller (command_unit).
+    pub excitation: String,
+    /// Command (command_unit).
+    pub command: String,
+    /// Position (position_unit).
+    pub position: String,
+}
+
+impl Default for ColumnNames {
+    fn default() -> ColumnNames {
+        ColumnNames {
+            time: "time_s".into(),
+            reference: "reference".into(),
+            excitation: "excitation".into(),
+            command: "command".into(),
+            position: "position".into(),
+        }
+    }
+}
+
+/// How to read a record.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RecordSettings {
+    /// Names of the columns.
+    pub names: ColumnNames,
+    /// Sample time (s) where the file has no clock.
+    pub sample_time_s: Option<f64>,
+    /// First row (included) and last row (excluded), counted from 0 behind the header; the whole file where absent.
+    pub rows: Option<[usize; 2]>,
+}
+
+/// A step of the clock that is not one sample.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct ClockGap {
+    /// Row behind the step, counted from 0.
+    pub row: usize,
+    /// The step in samples.
+    pub samples: f64,
+}
+
+/// One record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    /// The file it came from.
+    pub file: PathBuf,
+    /// Sample time (s).
+    pub sample_time_s: f64,
+    /// Steps of the clock that miss one sample by more than a tenth.
+    pub gaps: Vec<ClockGap>,
+    /// Reference; absent where the file has none.
+    pub reference: Option<Vec<f64>>,
+    /// Excitation; zeros where the file has none.
+    pub excitation: Vec<f64>,
+    /// Whether the file has an excitation.
+    pub excited: bool,
+    /// Command.
+    pub command: Vec<f64>,
+    /// Position.
+    pub position: Vec<f64>,
+    /// PES where the file has it, NaN between servo samples.
+    pub pes: Option<Vec<f64>>,
+    /// Spindle angle (rad).
+    pub spindle_rad: Option<Vec<f64>>,
+    /// Temperature (°C).
+    pub temperature_c: Option<Vec<f64>>,
+}
+
+/// Shortest record that can be judged.
+const LEAST_ROWS: usize = 64;
+
+impl Record {
+    /// Samples in the record.
+    pub fn len(&self) -> usize {
+        self.position.len()
+    }
+
+    /// Whether the record is empty; a record that was read never is.
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty()
+    }
+
+    /// Reads a record.
+    pub fn read(file: &Path, settings: &RecordSettings) -> Result<Record, RecordingError> {
+        let io = |source| RecordingError::Io { file: file.into(), source };
+        let mut bytes = BufReader::new(std::fs::File::open(file).map_err(io)?);
+        let packed = bytes.fill_buf().map_err(io)?.starts_with(&[0x1f, 0x8b]);
+        let text: Box<dyn Read> = if packed { Box::new(MultiGzDecoder::new(bytes)) } else { Box::new(bytes) };
+        let mut rows = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
+        let table = |source| RecordingError::Table { file: file.into(), source };
+        let header = rows.headers().map_err(table)?.clone();
+        let names = &settings.names;
+        let place = |name: &str| header.iter().position(|h| h == name);
+        let need = |name: &str| {
+            place(name).ok_or_else(|| RecordingError::Column {
+                file: file.into(),
+                wanted: name.to_owned(),
+                found: header.iter().map(str::to_owned).collect(),
+            })
+        };
+        let clock = match settings.sample_time_s {
+            Some(_) => place(&names.time),
+            None => Some(need(&names.time)?),
+        };
+        // Order of the columns below; the last three may be absent, and PES may be blank.
+        let wanted: [(&str, Option<usize>); 8] = [
+            (&names.time, clock),
+            (&names.command, Some(need(&names.command)?)),
+            (&names.position, Some(need(&names.position)?)),
+            (&names.reference, place(&names.reference)),
+            (&names.excitation, place(&names.excitation)),
+            ("pes", place("pes")),
+            ("spindle_rad", place("spindle_rad")),
+            ("temperature_c", place("temperature_c")),
+        ];
+        let mut values: [Vec<f64>; 8] = std::array::from_fn(|_| Vec::new());
+        let mut row = csv::StringRecord::new();
+        let [first, last] = settings.rows.unwrap_or([0, usize::MAX]);
+        let mut index = 0;
+        while rows.read_record(&mut row).map_err(table)? {
+            index += 1;
+            if index <= first || index > last {
+                continue;
+            }
+            for (k, (name, at)) in wanted.iter().enumerate() {
+                let Some(at) = at else { continue };
+                let field = row.get(*at).unwrap_or_default();
+                let value = match field.parse::<f64>() {
+                    Ok(x) if x.is_finite() => x,
+                    _ if k == 5 && field.is_empty() => f64::NAN,
+                    _ => {
+                        return Err(RecordingError::Number {
+                            file: file.into(),
+                            line: row.position().map_or(0, csv::Position::line),
+                            column: (*name).to_owned(),
+                            found: field.to_owned(),
+                        });
+                    }
+                };
+                values[k].push(value);
+            }
+        }
+        let [time, command, position, reference, excitation, pes, spindle, temperature] = values;
+        if position.len() < LEAST_ROWS {
+            return Err(RecordingError::Short { file: file.into(), rows: position.len(), needed: LEAST_ROWS });
+        }
+        let (sample_time_s, gaps) = match settings.sample_time_s {
+            Some(t) if t.is_finite() && t > 0.0 => (t, Vec::new()),
+            Some(found_s) => return Err(RecordingError::SampleTime { found_s }),
+            None => clock_of(&time, file, first)?,
+        };
+        Ok(Record {
+            file: file.into(),
+            sample_time_s,
+            gaps,
+            excited: wanted[4].1.is_some(),
+            excitation: if excitation.is_empty() { vec![0.0; position.len()] } else { excitation },
+            reference: (!reference.is_empty()).then_some(reference),
+            pes: (!pes.is_empty()).then_some(pes),
+            spindle_rad: (!spindle.is_empty()).then_some(spindle),
+            temperature_c: (!temperature.is_empty()).then_some(temperature),
+            command,
+            position,
+        })
+    }
+}
+
+/// Sample time and gaps of a clock column: the sample time is the mean over the steps near the median one.
+fn clock_of(time: &[f64], file: &Path, first: usize) -> Result<(f64, Vec<ClockGap>), RecordingError> {
+    let mut steps: Vec<f64> = time.windows(2).map(|p| p[1] - p[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let median = steps[steps.len() / 2];
+    // Line 1 is the header.
+    let refuse = |i: usize, found_s: f64| RecordingError::Clock {
+        file: file.into(),
+        line: first + i + 3,
+        found_s,
+        expected_s: median,
+    };
+    if median <= 0.0 {
+        return Err(refuse(0, median));
+    }
+    let near: Vec<f64> = steps.iter().copied().filter(|s| (s - median).abs() <= 0.1 * median).collect();
+    // A clock of which a tenth of the steps are off is no clock at all.
+    if near.len() * 10 < steps.len() * 9 {
+        let worst = time.windows(2).position(|p| (p[1] - p[0] - median).abs() > 0.1 * median).unwrap_or(0);
+        return Err(refuse(worst, time[worst + 1] - time[worst]));
+    }
+    let mean = near.iter().sum::<f64>() / near.len() as f64;
+    let mut gaps = Vec::new();
+    for (i, p) in time.windows(2).enumerate() {
+        let step = p[1] - p[0];
+        if step <= 0.0 {
+            return Err(refuse(i, step));
+        }
+        if (step - mean).abs() > 0.1 * mean {
+            gaps.push(ClockGap { row: i + 1, samples: step / mean });
+        }
+    }
+    Ok((mean, gaps))
+}
