@@ -31,7 +31,11 @@ fn plant() -> Plant {
     Plant {
         position_unit: "um".into(),
         command_unit: "A".into(),
-        body: Body::SecondOrder { dc_gain: GIVEN.b / GIVEN.k, natural_frequency_rad_s: w, damping_ratio: GIVEN.c / (2.0 * w) },
+        body: Body::SecondOrder {
+            dc_gain: GIVEN.b / GIVEN.k,
+            natural_frequency_rad_s: w,
+            damping_ratio: GIVEN.c / (2.0 * w),
+        },
         delay_s: GIVEN.delay,
         resonance_gain: 1.0,
         modes: vec![],
@@ -43,7 +47,11 @@ fn plant() -> Plant {
 fn excitation(size: f64, seed: u64) -> Vec<f64> {
     let mut r = Random::new(seed);
     let lines: Vec<(f64, f64)> = (1..60).map(|h| (f64::from(h) * 5.0, r.between(0.0, std::f64::consts::TAU))).collect();
-    (0..N).map(|k| size * lines.iter().map(|(hz, p)| (std::f64::consts::TAU * hz * k as f64 * T + p).cos()).sum::<f64>() / 7.7).collect()
+    (0..N)
+        .map(|k| {
+            size * lines.iter().map(|(hz, p)| (std::f64::consts::TAU * hz * k as f64 * T + p).cos()).sum::<f64>() / 7.7
+        })
+        .collect()
 }
 
 fn respond(truth: &Truth, u: &[f64], seed: u64) -> Vec<f64> {
@@ -96,7 +104,13 @@ fn diagnosed(truth: &Truth) -> Diagnosis {
     for (g, size) in [("a", 0.02), ("b", 0.06)] {
         let u = excitation(size, 5 + records.len() as u64);
         for i in 0..3 {
-            records.push(record(&format!("{g}{i}.csv"), Role::Fit, g, &u, respond(truth, &u, 100 + records.len() as u64)));
+            records.push(record(
+                &format!("{g}{i}.csv"),
+                Role::Fit,
+                g,
+                &u,
+                respond(truth, &u, 100 + records.len() as u64),
+            ));
         }
     }
     let u = excitation(0.04, 77);

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stderr)]
 
 use servotune::gate::features::{
-    FeatureError, PesRecord, RawMachine, Reason, features, machine_folders, read_machine, read_machines,
+    FeatureError, LogEntry, PesRecord, RawMachine, Reason, features, machine_folders, read_machine, read_machines,
 };
 use servotune::pes::WindowDft;
 use servotune::twin::line::{LineSettings, UnknownKind, line, machine_files, unknown_line};
@@ -189,4 +189,23 @@ fn every_unknown_kind_is_measured_and_has_no_label() {
             assert!(pes.iter().all(|p| p.is_finite() && p.abs() < 15.0), "{kind:?}");
         }
     }
+}
+
+#[test]
+fn a_logged_factor_and_an_estimate_never_share_a_column() {
+    // The PES is 0.3 (1 - e^(-t / 2 ms)): 0.3 is what a velocity feed-forward would take away.
+    let pes = |i: usize| 0.3 * (1.0 - (-(i as f64) / RATE / 2e-3).exp());
+    let mut logged = machine("b", pes);
+    logged.log = vec![LogEntry { key: "ff_factor".into(), value: 0.87 }];
+    let table = features(&[machine("a", pes), logged]);
+    let factor = table.column("FF_Factor").unwrap();
+    assert!(factor[0].is_nan() && factor[1] == 0.87);
+    for estimate in table.column("FF_Factor_estimated").unwrap() {
+        // The search for the time constant stops within 1e-3 of it; the error of the factor is of its size.
+        assert!((estimate - 0.3).abs() < 1e-3 * 0.3, "{estimate}");
+    }
+    // Columns of no log of these machines can be added, empty.
+    let mut table = features(&[machine("a", pes)]);
+    assert_eq!(table.complete(["torque", "PES_STD"]), ["torque"]);
+    assert!(table.column("torque").unwrap()[0].is_nan());
 }

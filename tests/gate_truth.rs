@@ -97,13 +97,13 @@ fn a_missing_value_and_a_disagreeing_plant_are_said() {
     // The first machine is healthy; its resonance is put where a loose pushpin has it.
     let mut lines: Vec<Vec<String>> = text.lines().map(|l| l.split(',').map(str::to_owned).collect()).collect();
     let at = |name: &str| lines[0].iter().position(|h| h == name).unwrap();
-    let (resonance, first) = (at("plant_first_resonance_hz"), at(&trained.gate.scale.features[0]));
+    let (resonance, first) = (at("plant_first_resonance_hz"), at(&trained.gate.main.scale.features[0]));
     lines[1][resonance] = "665".to_owned();
     lines[2][first] = String::new();
     let changed: String = lines.iter().map(|l| l.join(",") + "\n").collect();
     let v = trained.gate.classify(&table(&changed)).unwrap();
     assert_eq!((v[0].plant.says, v[0].action), ("disagrees", Action::Inspect));
-    assert_eq!(v[1].imputed, [trained.gate.scale.features[0].clone()]);
+    assert_eq!(v[1].imputed, [trained.gate.main.scale.features[0].clone()]);
     assert!(v[1].why.contains("training median"));
 }
 

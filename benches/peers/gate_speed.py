@@ -36,9 +36,9 @@ def rows() -> tuple[np.ndarray, np.ndarray]:
     return (draw.normal(size=(291, 10)) + 3.0 * (np.arange(10) % 4 == y[:, None])).astype(np.float32), y
 
 
-def torch_once(threads: int) -> float:
+def torch_once(threads: int, flush: bool) -> float:
     torch.set_num_threads(threads)
-    torch.set_flush_denormal(True)
+    torch.set_flush_denormal(flush)
     x, y = (torch.from_numpy(v) for v in rows())
     layers = [torch.nn.Linear(10, 200), torch.nn.Linear(200, 500), torch.nn.Linear(500, 200), torch.nn.Linear(200, 4)]
     relu = torch.nn.ReLU
@@ -72,8 +72,10 @@ def main() -> None:
     ran = subprocess.run(words, check=True, capture_output=True, text=True)
     found = {"servotune, 1 thread": json.loads(ran.stdout.strip().splitlines()[-1])}
     for threads in (1, 2):
-        name = f"PyTorch {torch.__version__}, {threads} thread{'s' if threads > 1 else ''}, denormals flushed"
-        found[name] = [torch_once(threads) for _ in range(REPEATS)]
+        for flush in (False, True):
+            name = f"PyTorch {torch.__version__}, {threads} thread{'s' if threads > 1 else ''}"
+            name += ", denormals flushed" if flush else ""
+            found[name] = [torch_once(threads, flush) for _ in range(REPEATS)]
     if keras is not None:
         found[f"Keras {keras.__version__}, {keras.backend.backend()}"] = [keras_once() for _ in range(REPEATS)]
     lines = [

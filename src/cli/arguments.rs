@@ -187,6 +187,8 @@ pub(super) struct SimulateArguments {
 #[command(after_help = "Examples:
   servotune tune --plant specs/machines/tunable.toml --spec specs/limits/paper.toml --controller specs/controllers/nominal.toml --out gains.toml
   servotune tune --frf slot07.bod --spec specs/limits/paper.toml --out gains.toml --report slot07.html
+  servotune tune --machines line --gate gate.json --spec specs/limits/paper.toml --out tuned
+  servotune tune --machines line --gate gate.json --spec specs/limits/paper.toml --out tuned --override L0007=\"pushpin replaced today\"
 
 With --frf the search runs straight on the measured response; the report then also tunes over an identified model and compares.")]
 pub(super) struct TuneArguments {
@@ -196,8 +198,17 @@ pub(super) struct TuneArguments {
     /// Swept-sine file, tuned on directly
     #[arg(long, value_name = "FRF", group = "machine")]
     pub frf: Option<PathBuf>,
+    /// Folder of machine folders: those that the gate calls tunable are tuned on their response.bod
+    #[arg(long, value_name = "DIR", group = "machine", requires = "gate")]
+    pub machines: Option<PathBuf>,
+    /// Gate that judges the machines (gate.json)
+    #[arg(long, value_name = "GATE", requires = "machines")]
+    pub gate: Option<PathBuf>,
+    /// Tune this machine whatever the gate says; the reason is kept in its gain table. May be given several times
+    #[arg(long = "override", value_name = "ID=REASON", value_parser = by_order, requires = "machines")]
+    pub overrides: Vec<(String, String)>,
     /// The sweep was taken through the controller's own hold, which is then not applied again
-    #[arg(long, requires = "frf")]
+    #[arg(long, conflicts_with = "plant")]
     pub hold_included: bool,
     /// Limits, bounds and write (spec.toml)
     #[arg(long, value_name = "SPEC")]
@@ -205,11 +216,11 @@ pub(super) struct TuneArguments {
     /// Controller to start from and to compare with (controller.toml or gains.toml)
     #[arg(long, value_name = "START")]
     pub controller: Option<PathBuf>,
-    /// Gain table to write
+    /// Gain table to write; with --machines a folder: machines.csv, and ID/gains.toml for each tuned machine
     #[arg(long, value_name = "GAINS")]
     pub out: PathBuf,
     /// Report to write, one HTML file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "machines")]
     pub report: Option<PathBuf>,
     /// Write the best compromise even where the limits are not met
     #[arg(long)]
@@ -224,6 +235,13 @@ pub(super) struct TuneArguments {
     pub reading: ReadingArguments,
     #[command(flatten)]
     pub model: ModelArguments,
+}
+
+fn by_order(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=').map(|(id, reason)| (id.trim(), reason.trim())) {
+        Some((id, reason)) if !id.is_empty() && !reason.is_empty() => Ok((id.to_owned(), reason.to_owned())),
+        _ => Err(format!("found `{text}`; expected ID=REASON with a reason, such as L0007=\"pushpin replaced today\"")),
+    }
 }
 
 /// Made-up machines with a known truth, for tests and studies
@@ -301,6 +319,10 @@ pub(super) struct StudyArguments {
 pub(super) enum StudyName {
     /// The four machine classes under one controller (figures 16-22)
     Classes,
+    /// The gate on the production line (Table 3, figures 24, 35-39)
+    Gate,
+    /// The gate over 20 seeds, on fresh lines and on unknown kinds
+    GateSeeds,
     /// The ladder of Table 1 and figures 6, 9, 12-14
     Ladder,
     /// The production line in features (figures 24-34)

@@ -1,9 +1,9 @@
-//! `servotune demo`: the whole chain on a built-in machine, from a sweep to a report.
+//! `servotune demo`: the whole chain on a built-in machine, from a sweep to a report, then eight machines at the gate.
 
 use super::arguments::DemoArguments;
 use super::slot::{self, Slot};
 use super::tune::{provenance, text};
-use super::{Ending, Failure, Screen};
+use super::{Ending, Failure, Screen, demo_gate, gated};
 use crate::document::{read_text, sha256_hex, write_text, write_whole};
 use crate::frf::{PhaseDisplay, ReadSettings, read_file, write_bod_as};
 use crate::identify::{IdentifySettings, identify};
@@ -25,6 +25,9 @@ struct Document<'a> {
     outcome: &'a Outcome,
     gain_table: PathBuf,
     report: PathBuf,
+    machines: &'a [super::gated::Row],
+    machines_table: PathBuf,
+    machines_report: PathBuf,
 }
 
 pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Failure> {
@@ -36,7 +39,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let spec_text = include_str!("../../specs/limits/paper.toml").replace("../profiles/spiral.toml", "profile.toml");
     write_text(&file("spec.toml"), &spec_text)?;
 
-    screen.say(&format!("1/4 sweep of the paper's tunable machine, 40-5000 Hz, 400 points, {} % noise", 100.0 * NOISE));
+    screen.say(&format!("1/5 sweep of the paper's tunable machine, 40-5000 Hz, 400 points, {} % noise", 100.0 * NOISE));
     let taken = measure(&machine, &log_grid(40.0, 5000.0, 400), NOISE, &mut Random::new(1))?;
     let mut bod = Vec::new();
     write_bod_as(&taken, PhaseDisplay::Margin, &mut bod)?;
@@ -46,7 +49,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
         screen.say(&format!("    {note}"));
     }
 
-    screen.say("2/4 identification");
+    screen.say("2/5 identification");
     let id = identify(&sweep.frf, &IdentifySettings::default())
         .map_err(|source| Failure::Identify { file: file("response.bod"), source })?;
     for sentence in identified_sentences(&id) {
@@ -55,7 +58,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let plant = toml::to_string(&PlantFile::from(&id.plant)).map_err(|source| Failure::Toml { source })?;
     write_text(&file("plant.toml"), &plant)?;
 
-    screen.say("3/4 tuning, straight on the measured response and over the model");
+    screen.say("3/5 tuning, straight on the measured response and over the model");
     let spec = Spec::read(&file("spec.toml")).map_err(TuneError::from)?;
     let settings = TuneSettings::default();
     let hold = Hold::NotIncluded;
@@ -74,7 +77,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let gain_table = file("gains.toml");
     table.write(&gain_table)?;
 
-    screen.say("4/4 report");
+    screen.say("4/5 report");
     let page = slot::page(&Slot {
         name: "demo, the paper's tunable machine",
         plant: &id.plant,
@@ -90,9 +93,30 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     })?;
     let report = file("report.html");
     write_text(&report, &page.html())?;
+
+    screen.say("5/5 eight more machines at the gate; those worth it are tuned");
+    let start_digest = sha256_hex(controller_text.as_bytes());
+    let spec_digest = sha256_hex(spec_text.as_bytes());
+    let judged = demo_gate::run(&a.out, &spec, spec_digest, (start.clone(), start_digest), screen)?;
     let words = text(&outcome, Some(&start), slot::units(&id.plant))?;
     let ending = if matches!(outcome, Outcome::Tuned(_)) { Ending::Accepted } else { Ending::Rejected };
-    let shown = format!("{words}\nGain table: {}\nOpen this report: {}\n", gain_table.display(), report.display());
-    screen.result(&Document { outcome: &outcome, gain_table, report }, &shown)?;
+    let shown = format!(
+        "{words}\nGain table: {}\nOpen this report: {}\n\n{}\n{} {}\nOpen this table: {}\n",
+        gain_table.display(),
+        report.display(),
+        gated::sheet(&judged.rows)?.text(),
+        gated::summary(&judged.rows),
+        judged.table.display(),
+        judged.page.display()
+    );
+    let document = Document {
+        outcome: &outcome,
+        gain_table,
+        report,
+        machines: &judged.rows,
+        machines_table: judged.table,
+        machines_report: judged.page,
+    };
+    screen.result(&document, &shown)?;
     Ok(ending)
 }

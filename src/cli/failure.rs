@@ -53,8 +53,14 @@ pub enum Failure {
     Tune(#[from] TuneError),
     #[error(transparent)]
     GainTable(#[from] GainTableError),
-    #[error("no machine: expected --plant PLANT or --frf FRF")]
+    #[error("no machine: expected --plant PLANT, --frf FRF or --machines DIR with --gate GATE")]
     NoMachine,
+    #[error("--override {id}: no such machine in {}; found {found}", folder.display())]
+    NoSuchMachine { folder: PathBuf, id: String, found: String },
+    #[error("--override {id}: given twice; give each machine one reason")]
+    TwiceOverridden { id: String },
+    #[error("{}: already there; give a new folder, so that old gains are not taken for new ones", file.display())]
+    AlreadyThere { file: PathBuf },
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
     #[error(transparent)]

@@ -60,10 +60,10 @@ pub(super) struct TrainArguments {
     #[arg(long, value_name = "R", default_value_t = 0.9)]
     pub correlation_limit: f64,
     /// Coverage of the sets of possible classes
-    #[arg(long, value_name = "SHARE", default_value_t = 0.95)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.98)]
     pub coverage: f64,
     /// Share of known machines that may be taken for unknown ones
-    #[arg(long, value_name = "SHARE", default_value_t = 0.01)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.005)]
     pub novelty_level: f64,
     /// Cost of every action on every class (TOML)
     #[arg(long, value_name = "FILE")]

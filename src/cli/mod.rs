@@ -6,11 +6,13 @@
 mod arguments;
 mod classify;
 mod demo;
+mod demo_gate;
 mod diagnose;
 mod diagnose_arguments;
 mod failure;
 mod features;
 mod gate_arguments;
+mod gated;
 mod identify;
 mod load;
 mod margins;
@@ -23,6 +25,7 @@ mod study;
 mod sweep_arguments;
 mod train;
 mod tune;
+mod tune_machines;
 mod twin;
 
 use arguments::{Arguments, Command};

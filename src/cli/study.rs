@@ -14,6 +14,8 @@ struct Written {
 pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     let made = match a.study {
         StudyName::Classes => study::classes()?,
+        StudyName::Gate => study::gate()?,
+        StudyName::GateSeeds => study::gate_seeds()?,
         StudyName::Ladder => study::ladder()?,
         StudyName::Line => study::line_study()?,
         StudyName::Plants => study::plants()?,

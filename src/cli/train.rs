@@ -24,7 +24,7 @@ pub(super) fn run(a: &TrainArguments, screen: &mut Screen) -> Result<Ending, Fai
         screen.say(&format!("note: {} rows without a label took no part", r.split.unlabelled));
     }
     if !r.conformal.enough {
-        screen.say("note: too few rows for the coverage asked for; sets are as strict as the rows allow");
+        screen.say("note: too few rows for the coverage asked for: sets of possible classes keep no promise and stop nobody; add rows, or ask for less with --coverage");
     }
     screen.say(&format!("wrote {}", a.out.display()));
     screen.result(&Document { gate: &a.out, report: r }, &text(r)?)?;
@@ -119,12 +119,13 @@ fn text(r: &TrainReport) -> Result<String, Failure> {
     }
     let (c, d) = (&r.calibration, &r.decisions);
     out += &format!(
-        "Accuracy on the test part: network {:.2} %, discriminant {:.2} %\n\
+        "Accuracy on the test part: network {:.2} %, discriminant {:.2} %, gate (all judges) {:.2} %\n\
          Calibration error on held-out rows: {:.4} before, {:.4} after (temperature {:.3}); test part {:.4} and {:.4}\n\
          Sets at {:.1} % coverage: test part {:.1} % covered, {:.2} classes on average\n\
          Decisions on the test part: {} of {} left to a person, {} wrong; of {} broken machines {} sent to tune, {} left alone\n",
         100.0 * accuracy(&r.confusion.test),
         100.0 * r.lda.accuracy,
+        100.0 * c.test_accuracy,
         c.held.error_before,
         c.held.error_after,
         c.held.temperature,

@@ -2,7 +2,7 @@
 
 use super::arguments::{ModelArguments, TuneArguments};
 use super::slot::{self, Slot};
-use super::{Ending, Failure, Screen, load, physics};
+use super::{Ending, Failure, Screen, load, physics, tune_machines};
 use crate::document::{read_text, sha256_hex, write_text};
 use crate::feedback::Amplitudes;
 use crate::frf::Sweep;
@@ -76,6 +76,9 @@ impl Given {
 }
 
 pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    if let (Some(machines), Some(gate)) = (&a.machines, &a.gate) {
+        return tune_machines::run(a, machines, gate, screen);
+    }
     let spec = Spec::read(&a.spec).map_err(crate::tune::TuneError::from)?;
     let spec_sha256 = sha256_hex(read_text(&a.spec)?.as_bytes());
     let start = a.controller.as_ref().map(|file| load::controller(file)).transpose()?;
@@ -189,7 +192,7 @@ fn physical_text(
 }
 
 /// Settings of the model that continues the sweep: a sweep with the hold in it has it divided out first.
-fn model_settings(a: &TuneArguments) -> IdentifySettings {
+pub(super) fn model_settings(a: &TuneArguments) -> IdentifySettings {
     let asked = a.model.settings();
     let hold = match (a.hold_included, asked.hold) {
         (true, identify::Hold::NotIncluded) => identify::Hold::Included { sample_time_s: a.sample_time_s },

@@ -99,8 +99,19 @@ impl Bench {
         let levels = NoiseLevels { sensor_rms: 1.0, torque_rms: 0.0, torque_corner_hz: 60.0, from_repeats: false };
         let whitener = Whitener::new(&levels, &given.body, sample_time_s);
         let p = vec![0.0; form.knobs.len()];
-        let mut bench =
-            Bench { form, runs, fit_runs, levels, whitener, means, trajectories: Vec::new(), stack, scene, repeats: Vec::new(), p };
+        let mut bench = Bench {
+            form,
+            runs,
+            fit_runs,
+            levels,
+            whitener,
+            means,
+            trajectories: Vec::new(),
+            stack,
+            scene,
+            repeats: Vec::new(),
+            p,
+        };
         bench.renew()?;
         Ok(bench)
     }

@@ -35,7 +35,9 @@ pub enum DiagnoseError {
     )]
     SampleTime { controller_s: f64, records_s: f64 },
     /// The plant holds physics already.
-    #[error("the plant holds [[plant.physics]] effect \"{effect}\": a diagnosis starts from a linear plant; remove the table, and the effect is found again if it is there")]
+    #[error(
+        "the plant holds [[plant.physics]] effect \"{effect}\": a diagnosis starts from a linear plant; remove the table, and the effect is found again if it is there"
+    )]
     Physics { effect: String },
     /// Nothing moves.
     #[error("record `{record}`: the command never changes; expected a record in which the machine is driven")]

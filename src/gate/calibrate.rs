@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// What calibration did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// Logits are divided by it.
+    /// Leads are divided by it.
     pub temperature: f64,
     /// Rows it was learned from.
     pub rows: usize,
@@ -34,6 +34,8 @@ pub struct Logits {
     pub unit: f64,
 }
 
+/// Doubt that a table without any error leaves, at most: 1/(n + 2) of a handful of rows would forbid every dear decision.
+const MOST_DOUBT: f64 = 0.005;
 /// Bins of the calibration error.
 const BINS: usize = 10;
 
@@ -66,7 +68,7 @@ pub fn calibrate(logits: &[Logits], class: &[usize]) -> Calibration {
     let raw = logits.iter().map(|z| probabilities(&z.raw, 1.0)).collect::<Vec<_>>();
     let scaled: Vec<Vec<f64>> = logits.iter().map(|z| z.raw.iter().map(|v| v / z.unit).collect()).collect();
     let n = class.len() as f64;
-    let doubt = 1.0 / (n + 2.0);
+    let doubt = (1.0 / (n + 2.0)).min(MOST_DOUBT);
     let score = |log_t: f64| {
         let t = log_t.exp();
         let of = |z: &Vec<f64>, y: usize| {

@@ -1,7 +1,8 @@
 //! Conformal sets: which classes a machine may be of, at a stated coverage.
 //!
-//! In: probabilities of rows that the network was not trained on, and their classes. Out: for a new row every class that is not
-//! excluded. One reference a class (Vovk, Gammerman & Shafer 2005, section 4.5), so that small classes are covered as well as large
+//! In: probabilities of rows that a fold's judge was not trained on, and their classes. Out: for a new row every class that is not
+//! excluded. Each fold's judge compares the new row with its own held-out rows, and the folds are counted together (cross-conformal,
+//! Vovk 2015). One reference a class (Vovk, Gammerman & Shafer 2005, section 4.5), so that small classes are covered as well as large
 //! ones; a class with too few rows for the coverage is judged by all rows together. Spec: `specs/gate.md`.
 
 use serde::{Deserialize, Serialize};
@@ -15,54 +16,69 @@ pub struct Conformal {
     pub own_reference: Vec<bool>,
     /// Whether all rows together are enough; otherwise no class can be excluded at this coverage.
     pub enough: bool,
-    /// 1 - probability of the true class, ascending, one list a class.
-    scores: Vec<Vec<f64>>,
+    /// 1 - probability of the true class, ascending, one list a class: `scores[fold][class]`.
+    scores: Vec<Vec<Vec<f64>>>,
 }
 
 impl Conformal {
-    /// Learns from rows not trained on.
-    pub fn of(p: &[Vec<f64>], class: &[usize], classes: usize, coverage: f64) -> Conformal {
-        let mut scores = vec![Vec::new(); classes];
-        for (p, &y) in p.iter().zip(class) {
-            scores[y].push(1.0 - p[y]);
+    /// Learns from rows not trained on; `fold` says whose judge gave a row its probabilities.
+    pub fn of(p: &[Vec<f64>], class: &[usize], fold: &[usize], classes: usize, coverage: f64) -> Conformal {
+        let folds = fold.iter().max().map_or(1, |f| f + 1);
+        let mut scores = vec![vec![Vec::new(); classes]; folds];
+        for ((p, &y), &f) in p.iter().zip(class).zip(fold) {
+            scores[f][y].push(1.0 - p[y]);
         }
-        scores.iter_mut().for_each(|s| s.sort_by(f64::total_cmp));
+        scores.iter_mut().flatten().for_each(|s| s.sort_by(f64::total_cmp));
         // The smallest p-value among n rows is 1/(n + 1).
         let enough = |n: usize| 1.0 / (n as f64 + 1.0) <= 1.0 - coverage + 1e-12;
+        let of_class = |k: usize| scores.iter().map(|s| s[k].len()).sum();
         Conformal {
             coverage,
-            own_reference: scores.iter().map(|s| enough(s.len())).collect(),
+            own_reference: (0..classes).map(|k| enough(of_class(k))).collect(),
             enough: enough(class.len()),
             scores,
         }
     }
 
-    /// The p-value of each class for a row with these probabilities.
-    pub fn p_values(&self, p: &[f64]) -> Vec<f64> {
-        let against = |s: &[f64], score: f64| (s.len() - s.partition_point(|v| *v < score), s.len());
-        p.iter()
-            .enumerate()
-            .map(|(k, p)| {
-                let score = 1.0 - p;
-                let (worse, n) = if self.own_reference[k] {
-                    against(&self.scores[k], score)
-                } else {
-                    self.scores.iter().map(|s| against(s, score)).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
-                };
-                (worse as f64 + 1.0) / (n as f64 + 1.0)
-            })
-            .collect()
+    /// Judges that a new row is to be shown to.
+    pub(super) fn folds(&self) -> usize {
+        self.scores.len()
     }
 
-    /// Classes that are not excluded, ascending; the most probable one is always among them.
+    /// The p-value of each class for a row with these probabilities, one list a fold.
+    pub fn p_values(&self, p: &[Vec<f64>]) -> Vec<f64> {
+        let value = |k: usize| {
+            let (mut worse, mut n) = (0, 0);
+            for (scores, p) in self.scores.iter().zip(p) {
+                for (_, s) in scores.iter().enumerate().filter(|(c, _)| *c == k || !self.own_reference[k]) {
+                    worse += s.len() - s.partition_point(|v| *v < 1.0 - p[k]);
+                    n += s.len();
+                }
+            }
+            (worse as f64 + 1.0) / (n as f64 + 1.0)
+        };
+        (0..self.own_reference.len()).map(value).collect()
+    }
+
+    /// Classes that are not excluded, ascending; none where the row is like no class, which happens to known ones too in the
+    /// share that the coverage leaves.
     ///
     /// Where even all rows together are too few for the coverage, the set is what the rows can support: the strictest level they have.
-    pub fn set(&self, p: &[f64]) -> Vec<usize> {
-        let rows: usize = self.scores.iter().map(Vec::len).sum();
+    pub fn set(&self, p: &[Vec<f64>]) -> Vec<usize> {
+        let rows: usize = self.scores.iter().flatten().map(Vec::len).sum();
         let level = if self.enough { 1.0 - self.coverage } else { 1.0 / (rows as f64 + 1.0) };
-        let best = top(p);
         let values = self.p_values(p);
-        (0..p.len()).filter(|&k| k == best || values[k] > level + 1e-12).collect()
+        (0..values.len()).filter(|&k| values[k] > level + 1e-12).collect()
+    }
+
+    /// Whether the stored lists fit each other.
+    pub(super) fn sound(&self, classes: usize, judges: usize) -> bool {
+        self.own_reference.len() == classes
+            && self.scores.len() == judges
+            && self.coverage > 0.0
+            && self.coverage < 1.0
+            && self.scores.iter().all(|s| s.len() == classes)
+            && self.scores.iter().flatten().all(|s| s.iter().all(|v| v.is_finite()) && s.is_sorted())
     }
 }
 
@@ -90,11 +106,16 @@ mod tests {
                 .unzip()
         };
         let (p, y) = draw(2000);
-        let c = Conformal::of(&p, &y, 2, 0.95);
+        let fold: Vec<usize> = (0..2000).map(|i| i / 400).collect();
+        let c = Conformal::of(&p, &y, &fold, 2, 0.95);
         let (p, y) = draw(40_000);
         for k in 0..2 {
-            let of: Vec<bool> =
-                p.iter().zip(&y).filter(|(_, y)| **y == k).map(|(p, _)| c.set(p).contains(&k)).collect();
+            let of: Vec<bool> = p
+                .iter()
+                .zip(&y)
+                .filter(|(_, y)| **y == k)
+                .map(|(p, _)| c.set(&vec![p.clone(); 5]).contains(&k))
+                .collect();
             let share = of.iter().filter(|i| **i).count() as f64 / of.len() as f64;
             // Given 200 reference rows the coverage scatters by sqrt(0.05 * 0.95 / 200) = 1.5 %; three of them below.
             assert!(share > 0.95 - 0.046, "class {k}: {share}");
@@ -104,8 +125,8 @@ mod tests {
     #[test]
     fn too_few_rows_still_exclude_what_they_can() {
         let p = vec![vec![0.99, 0.01]; 6];
-        let c = Conformal::of(&p, &[0; 6], 2, 0.95);
+        let c = Conformal::of(&p, &[0; 6], &[0; 6], 2, 0.95);
         assert!(!c.enough && !c.own_reference[0]);
-        assert_eq!(c.set(&[0.995, 0.005]), [0]);
+        assert_eq!(c.set(&[vec![0.995, 0.005]]), [0]);
     }
 }

@@ -1,11 +1,12 @@
 //! Cross-validation: every row judged by a network that has not seen it (section 3.2, Table 3).
 //!
-//! In: a table and the rows to deal into folds. Out: loss and accuracy of each fold, and every row's logits. Each fold is cleaned, ranked,
+//! In: a table and the rows to deal into folds. Out: loss and accuracy of each fold, its judge, and what that says of every row. Each fold is cleaned, ranked,
 //! normalised and trained anew on the other folds; a fifth of those, not the fold itself, chooses the epoch. Spec: `specs/gate.md`.
 
 use super::GateError;
 use super::adam::{Rows, judge};
 use super::calibrate::Logits;
+use super::member::{Member, Said};
 use super::network::Desk;
 use super::parallel::each;
 use super::prepare::{PATIENCE, learn, prepare, reach, seed_of};
@@ -29,7 +30,7 @@ pub struct Fold {
 /// Share of the rows outside a fold that choose its epoch.
 const CHOOSE: f64 = 0.2;
 
-/// Folds and, in the order of `rows`, the logits.
+/// Folds, their judges, and what the judge of a row's fold says of it, in the order of `rows`.
 pub(super) fn crossfit(
     table: &Table,
     rows: &[usize],
@@ -38,8 +39,8 @@ pub(super) fn crossfit(
     fold: &[usize],
     hidden: &[usize],
     settings: &TrainSettings,
-) -> Result<(Vec<Fold>, Vec<Logits>), GateError> {
-    let one = |f: usize| -> Result<(Fold, Vec<Logits>), GateError> {
+) -> Result<(Vec<Fold>, Vec<Member>, Vec<Said>), GateError> {
+    let one = |f: usize| -> Result<(Fold, Member, Vec<Said>), GateError> {
         let pick = |inside: bool| {
             rows.iter().zip(fold).filter(|(_, k)| (**k == f) == inside).map(|(r, _)| *r).collect::<Vec<usize>>()
         };
@@ -54,21 +55,19 @@ pub(super) fn crossfit(
         let inputs = p.scale.inputs(&p.chosen, &held);
         let of_held: Vec<usize> = held.iter().map(|&r| class[r]).collect();
         let (loss, accuracy) = judge(&fitted.network, Rows { inputs: &inputs, class: &of_held }, &mut desk);
-        let logits = fitted
-            .network
-            .logits(&inputs, &mut desk)
-            .chunks(classes)
-            .map(|z| Logits { raw: z.to_vec(), unit })
-            .collect();
-        Ok((Fold { loss, accuracy, rows: held.len() }, logits))
+        let member = Member::of(p.scale, fitted.network, unit, &p.chosen, &others, class, classes)?;
+        let said = member.say(&inputs, &mut desk);
+        Ok((Fold { loss, accuracy, rows: held.len() }, member, said))
     };
-    let mut found = Vec::new();
-    let mut logits = vec![Logits { raw: Vec::new(), unit: 1.0 }; rows.len()];
+    let (mut found, mut members) = (Vec::new(), Vec::new());
+    let nothing = Said { network: Logits { raw: Vec::new(), unit: 1.0 }, linear: Vec::new() };
+    let mut all = vec![nothing; rows.len()];
     for (f, result) in each(settings.folds, one).into_iter().enumerate() {
-        let (judged, of_fold) = result?;
+        let (judged, member, said) = result?;
         let places = fold.iter().enumerate().filter(|(_, k)| **k == f).map(|(i, _)| i);
-        places.zip(of_fold).for_each(|(i, z)| logits[i] = z);
+        places.zip(said).for_each(|(i, s)| all[i] = s);
         found.push(judged);
+        members.push(member);
     }
-    Ok((found, logits))
+    Ok((found, members, all))
 }

@@ -5,18 +5,21 @@
 //! classes are left out, so constant or dependent columns do no harm. Spec: `specs/gate.md`.
 
 use super::GateError;
+use super::network::softmax;
+use super::packed::Packed64;
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 /// Singular values below this (after every column has unit spread) count as none.
 const FLAT: f64 = 1e-4;
 
 /// A discriminant.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Discriminant {
-    /// Classes x features.
-    weights: DMatrix<f64>,
+    /// Classes x features, row after row.
+    weights: Packed64,
     /// One a class.
-    intercept: DVector<f64>,
+    intercept: Packed64,
 }
 
 /// Singular values and right vectors of a matrix with at least as many rows as columns.
@@ -33,6 +36,17 @@ fn decompose(m: DMatrix<f64>) -> Result<(DVector<f64>, DMatrix<f64>), GateError>
 
 /// Learns from rows of `features` numbers each, none missing.
 pub fn discriminant(x: &[f64], features: usize, class: &[usize], classes: usize) -> Result<Discriminant, GateError> {
+    learn(x, features, class, classes, 0.0)
+}
+
+/// The same for few rows: the spread inside the classes is learned as if as many rows as there are features had been seen besides, in
+/// which no feature had to do with another.
+pub(super) fn steadied(x: &[f64], features: usize, class: &[usize], classes: usize) -> Result<Discriminant, GateError> {
+    learn(x, features, class, classes, features as f64 / (features + class.len()).max(1) as f64)
+}
+
+/// `shrink` is the share of the unit matrix in the correlations inside the classes.
+fn learn(x: &[f64], features: usize, class: &[usize], classes: usize, shrink: f64) -> Result<Discriminant, GateError> {
     let n = class.len();
     let x = DMatrix::from_row_slice(n, features, x);
     let mut count = vec![0.0f64; classes];
@@ -64,7 +78,13 @@ pub fn discriminant(x: &[f64], features: usize, class: &[usize], classes: usize)
     }
     let freedom = (n.saturating_sub(classes)).max(1) as f64;
     for (j, s) in spread.iter().enumerate() {
-        within.column_mut(j).scale_mut(1.0 / (s * freedom.sqrt()));
+        within.column_mut(j).scale_mut((1.0 - shrink).sqrt() / (s * freedom.sqrt()));
+    }
+    if shrink > 0.0 {
+        within = within.insert_rows(n, features, 0.0);
+        for j in 0..features {
+            within[(n + j, j)] = shrink.sqrt();
+        }
     }
     // Features x kept directions: into coordinates where every class has unit spread.
     let (values, v) = decompose(within)?;
@@ -81,22 +101,51 @@ pub fn discriminant(x: &[f64], features: usize, class: &[usize], classes: usize)
     let turn = DMatrix::from_fn(v.ncols(), kept.len(), |j, i| v[(kept[i], j)]);
     let coordinates = centred * &turn;
     let weights = &coordinates * (whiten * turn).transpose();
-    let intercept = DVector::from_fn(classes, |c, _| {
+    let intercept = |c: usize| {
         prior[c].max(f64::MIN_POSITIVE).ln() - 0.5 * coordinates.row(c).norm_squared() - (weights.row(c) * &overall)[0]
-    });
-    Ok(Discriminant { weights, intercept })
+    };
+    Ok(Discriminant {
+        intercept: Packed64((0..classes).map(intercept).collect()),
+        weights: Packed64(weights.transpose().as_slice().to_vec()),
+    })
 }
 
 impl Discriminant {
+    /// Features that it takes.
+    pub fn features(&self) -> usize {
+        self.weights.0.len() / self.intercept.0.len().max(1)
+    }
+
+    /// Score of each class for one row: the logarithm of its probability but for a constant.
+    pub fn scores(&self, x: &[f64]) -> Vec<f64> {
+        let of = |(w, c): (&[f64], &f64)| c + w.iter().zip(x).map(|(w, x)| w * x).sum::<f64>();
+        self.weights.0.chunks(self.features().max(1)).zip(&self.intercept.0).map(of).collect()
+    }
+
+    /// What each feature adds to the lead of `class` over `other` on the way between two rows.
+    pub(super) fn shares(&self, from: &[f64], to: &[f64], class: usize, other: usize) -> Vec<f64> {
+        let d = self.features();
+        let w = |c: usize, j: usize| self.weights.0[c * d + j];
+        (0..d).map(|j| (w(class, j) - w(other, j)) * (to[j] - from[j])).collect()
+    }
+
     /// The class with the highest score for each row of features.
     pub fn predict(&self, x: &[f64]) -> Vec<usize> {
-        let d = self.weights.ncols();
-        let score = |x: &[f64], c: usize| {
-            self.intercept[c] + x.iter().enumerate().map(|(j, v)| v * self.weights[(c, j)]).sum::<f64>()
-        };
-        x.chunks(d)
-            .map(|x| (0..self.intercept.len()).fold(0, |b, c| if score(x, c) > score(x, b) { c } else { b }))
-            .collect()
+        x.chunks(self.features().max(1)).map(|x| super::conformal::top(&self.scores(x))).collect()
+    }
+
+    /// Probability of each class for one row.
+    pub fn probabilities(&self, x: &[f64]) -> Vec<f64> {
+        let mut p = self.scores(x);
+        softmax(&mut p);
+        p
+    }
+
+    /// Whether the stored lists fit so many features and classes.
+    pub(super) fn sound(&self, features: usize, classes: usize) -> bool {
+        self.intercept.0.len() == classes
+            && self.weights.0.len() == classes * features
+            && self.weights.0.iter().chain(&self.intercept.0).all(|x| x.is_finite())
     }
 }
 

@@ -67,6 +67,15 @@ impl DriftReference {
         }
         DriftReference { feature: column.name.clone(), rows: rows.len(), present, values: Packed64(v) }
     }
+
+    /// Whether the stored list is one that training writes.
+    pub(super) fn sound(&self) -> bool {
+        let v = &self.values.0;
+        self.present <= self.rows
+            && v.len() == self.present.min(SKETCH)
+            && v.iter().all(|x| x.is_finite())
+            && v.is_sorted()
+    }
 }
 
 /// Probability that the greatest distance of two samples of n and m from one distribution is `distance` or more.
@@ -115,6 +124,10 @@ pub fn drift(references: &[DriftReference], table: &Table) -> Result<Drift, Gate
     let mut tests = Vec::new();
     if rows >= LEAST_ROWS {
         for r in references {
+            // A column that is not there at all is `classify`'s business, not drift.
+            if !table.has(&r.feature) {
+                continue;
+            }
             let column = table.column(&r.feature)?;
             let mut v: Vec<f64> = column.values.iter().copied().filter(|v| !v.is_nan()).collect();
             v.sort_by(f64::total_cmp);

@@ -27,6 +27,8 @@ pub enum GateError {
     TwiceId { file: PathBuf, id: String, first: u64, line: u64 },
     #[error("{}: no column `{column}`; the header has: {}", file.display(), found.join(", "))]
     Column { file: PathBuf, column: String, found: Vec<String> },
+    #[error("{}: {count} of {of} columns that strangers are known by are not there, among them {}; make the table as the training table was made", file.display(), missing.join(", "))]
+    FewColumns { file: PathBuf, count: usize, of: usize, missing: Vec<String> },
     #[error("{}:{line}: column `{column}`: found `{found}`; expected a finite number, or an empty field where it is missing", file.display())]
     Number { file: PathBuf, line: u64, column: String, found: String },
     #[error("{}: column `{label}` is `id`, which is carried along; choose another label column", file.display())]

@@ -131,6 +131,19 @@ impl Evidence {
         Some(Vote { class: super::conformal::top(&p), probabilities: p })
     }
 
+    /// Whether the stored lists fit each other.
+    pub(super) fn sound(&self, classes: usize) -> bool {
+        let d = self.columns.len();
+        let fits = |l: &[Vec<f64>]| {
+            l.len() == classes && l.iter().all(|row| row.len() == d && row.iter().all(|x| x.is_finite()))
+        };
+        d > 0
+            && fits(&self.centre)
+            && fits(&self.spread)
+            && self.spread.iter().flatten().all(|s| *s > 0.0)
+            && self.threshold.is_finite()
+    }
+
     /// Whether the vote contradicts a class.
     pub fn contradicts(&self, vote: &Vote, class: usize) -> bool {
         vote.class != class && vote.probabilities[class] < self.threshold

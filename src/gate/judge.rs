@@ -12,10 +12,10 @@ use super::conformal::{Conformal, top};
 use super::costs::Costs;
 use super::drift::{Drift, DriftReference, drift};
 use super::evidence::Evidence;
-use super::network::{Desk, Network};
-use super::novelty::{Novelty, row_of};
+use super::member::{Member, Mix, mean};
+use super::network::Desk;
+use super::novelty::Novelty;
 use super::parallel::each;
-use super::scale::Scale;
 use super::table::{Column, Table};
 use super::verdict::{Doubt, PlantEvidence, Verdict};
 
@@ -32,13 +32,15 @@ pub struct Gate {
     pub label: String,
     /// The classes.
     pub classes: Classes,
-    /// Statistics of the network's features.
-    pub scale: Scale,
-    /// The network.
-    pub network: Network,
-    /// Its temperature.
+    /// The published training's network, with its features and a discriminant on them.
+    pub main: Member,
+    /// The judge of each fold; none where there was no cross-validation.
+    pub members: Vec<Member>,
+    /// How networks and discriminants are mixed.
+    pub mix: Mix,
+    /// What calibration did.
     pub calibration: Calibration,
-    /// Its sets.
+    /// The sets.
     pub conformal: Conformal,
     /// Cost of each decision.
     pub costs: Costs,
@@ -57,6 +59,8 @@ pub(super) struct Judged {
     pub action: Action,
     pub probabilities: Vec<f64>,
     pub set: Vec<usize>,
+    /// Whether the most probable class would be in the set by itself.
+    pub conforms: bool,
     pub doubts: Vec<Doubt>,
     runner_up: usize,
     expected: Vec<f64>,
@@ -67,7 +71,9 @@ pub(super) struct Judged {
 /// The columns that a gate needs, found in a table.
 struct Found<'a> {
     chosen: Vec<&'a Column>,
-    novelty: Vec<&'a Column>,
+    /// The features of each fold's judge.
+    members: Vec<Vec<&'a Column>>,
+    novelty: Vec<Option<&'a Column>>,
     /// The plant's columns that the table has, and where they stand among the gate's.
     evidence: Vec<Option<&'a Column>>,
 }
@@ -75,16 +81,18 @@ struct Found<'a> {
 /// Features shown with a verdict.
 const SHOWN: usize = 3;
 const DESK_ROWS: usize = 16;
+/// How many times likelier than said a possible class is thought to be where the set is disputed.
+const CAUTION: f64 = 5.0;
+/// Share of the columns that strangers are known by which a table may lack.
+const ABSENT: f64 = 0.1;
 
 impl Gate {
     /// A verdict for each row of a table.
     pub fn classify(&self, table: &Table) -> Result<Vec<Verdict>, GateError> {
         let found = self.find(table)?;
         let verdict = |row: usize| {
-            let mut desk = Desk::new(&self.network.sizes, DESK_ROWS);
-            let x = self.scale.inputs(&found.chosen, &[row]);
-            let judged = self.judge(&found, row, &x, &mut desk);
-            let decided = self.decided(&found, row, &x, &judged, &mut desk);
+            let judged = self.judge(&found, row);
+            let decided = self.decided(&found, row, &judged);
             self.tell(table, &found, row, judged, decided)
         };
         Ok(each(table.rows(), verdict))
@@ -93,8 +101,7 @@ impl Gate {
     /// Rows judged without the features that decided.
     pub(super) fn judge_rows(&self, table: &Table, rows: &[usize]) -> Result<Vec<Judged>, GateError> {
         let found = self.find(table)?;
-        let mut desk = Desk::new(&self.network.sizes, 1);
-        Ok(rows.iter().map(|&r| self.judge(&found, r, &self.scale.inputs(&found.chosen, &[r]), &mut desk)).collect())
+        Ok(each(rows.len(), |i| self.judge(&found, rows[i])))
     }
 
     /// Compares a table with the rows that the gate learned from.
@@ -106,15 +113,36 @@ impl Gate {
         let all = |names: &[String]| names.iter().map(|n| table.column(n)).collect::<Result<Vec<_>, _>>();
         let optional = |n: &String| if table.has(n) { table.column(n).map(Some) } else { Ok(None) };
         let columns = self.evidence.as_ref().map_or(&[][..], |e| &e.columns);
-        Ok(Found {
-            chosen: all(&self.scale.features)?,
-            novelty: all(&self.novelty.features)?,
-            evidence: columns.iter().map(optional).collect::<Result<_, _>>()?,
-        })
+        let chosen = all(&self.main.scale.features)?;
+        let members = self.members.iter().map(|m| all(&m.scale.features)).collect::<Result<_, _>>()?;
+        let novelty = self.novelty.features.iter().map(optional).collect::<Result<Vec<_>, _>>()?;
+        let missing = || self.novelty.features.iter().filter(|n| !table.has(n) && !columns.contains(n));
+        let (count, of) = (missing().count(), self.novelty.features.len());
+        if count as f64 > ABSENT * of as f64 {
+            let missing = missing().take(10).cloned().collect();
+            return Err(GateError::FewColumns { file: table.file.clone(), count, of, missing });
+        }
+        Ok(Found { chosen, members, novelty, evidence: columns.iter().map(optional).collect::<Result<_, _>>()? })
     }
 
-    fn judge(&self, found: &Found<'_>, row: usize, x: &[f32], desk: &mut Desk) -> Judged {
-        let p = probabilities(&self.network.logits(x, desk), self.calibration.temperature);
+    /// Logits by the published training's judge, and by that of each fold.
+    fn ask(&self, found: &Found<'_>, row: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let one = |m: &Member, columns: &[&Column]| {
+            let mut desk = Desk::new(&m.network.sizes, 1);
+            let said = m.say(&m.scale.inputs(columns, &[row]), &mut desk);
+            said.first().map_or_else(Vec::new, |s| self.mix.logits(s))
+        };
+        let folds = self.members.iter().zip(&found.members).map(|(m, c)| one(m, c)).collect();
+        (one(&self.main, &found.chosen), folds)
+    }
+
+    fn judge(&self, found: &Found<'_>, row: usize) -> Judged {
+        let (main, mut all) = self.ask(found, row);
+        let judges = if all.is_empty() { std::slice::from_ref(&main) } else { &all };
+        let each: Vec<Vec<f64>> = judges.iter().map(|z| probabilities(z, 1.0)).collect();
+        let mut set = self.conformal.set(&each);
+        all.push(main);
+        let p = probabilities(&mean(&all), 1.0);
         let class = top(&p);
         let runner_up =
             (0..p.len()).filter(|&k| k != class).fold(usize::from(class == 0), |b, k| if p[k] > p[b] { k } else { b });
@@ -125,13 +153,21 @@ impl Gate {
         if 2 * missing.len() > found.chosen.len() {
             doubts.push(Doubt::Missing { features: missing });
         }
-        let novelty = self.novelty.strangeness(&row_of(&found.novelty, row), class);
+        let looked: Vec<f64> = found.novelty.iter().map(|c| c.map_or(f64::NAN, |c| c.values[row])).collect();
+        let novelty = self.novelty.strangeness(&looked, class);
         if novelty.p_value < self.novelty.level {
             let s = novelty.clone();
             doubts.push(Doubt::Unknown { p_value: s.p_value, feature: s.feature, deviations: s.deviations });
         }
-        let set = self.conformal.set(&p);
-        if set.len() > 1 {
+        let conforms = set.contains(&class);
+        if !conforms {
+            set.push(class);
+            set.sort_unstable();
+        }
+        // A dispute matters where the other class could make the action dear, were it likelier than said. Sets of too few rows keep
+        // no promise; they are told and left to the costs.
+        let dear = |&k: &usize| CAUTION * p[k] * self.costs.decide[k][class] > self.costs.inspect[k];
+        if self.conformal.enough && set.iter().any(dear) {
             let possible = set.iter().map(|&k| name(k)).collect();
             doubts.push(Doubt::SeveralClasses { possible, coverage: self.conformal.coverage });
         }
@@ -145,7 +181,7 @@ impl Gate {
             doubts.push(Doubt::OtherAction { class: name(cheapest) });
         }
         let action = if doubts.is_empty() { self.classes.actions[class] } else { Action::Inspect };
-        Judged { class, action, probabilities: p, set, doubts, runner_up, expected, plant, novelty }
+        Judged { class, action, probabilities: p, set, conforms, doubts, runner_up, expected, plant, novelty }
     }
 
     fn ask_plant(&self, found: &Found<'_>, row: usize, class: usize) -> (PlantEvidence, Option<Doubt>) {
@@ -166,20 +202,30 @@ impl Gate {
         (PlantEvidence { says, class, probabilities: vote.probabilities }, doubt)
     }
 
-    fn decided(&self, found: &Found<'_>, row: usize, x: &[f32], judged: &Judged, desk: &mut Desk) -> Vec<Decided> {
-        let from: Vec<f32> = self.scale.median.iter().enumerate().map(|(j, m)| self.scale.input(j, *m)).collect();
-        let share = shares(&self.network, &from, x, judged.class, judged.runner_up, desk);
+    /// By the published training's judge: integrated gradients of its network and the terms of its discriminant, each in its share.
+    fn decided(&self, found: &Found<'_>, row: usize, judged: &Judged) -> Vec<Decided> {
+        let (m, scale) = (&self.main, &self.main.scale);
+        let mut desk = Desk::new(&m.network.sizes, DESK_ROWS);
+        let x = scale.inputs(&found.chosen, &[row]);
+        let from: Vec<f32> = scale.median.iter().enumerate().map(|(j, v)| scale.input(j, *v)).collect();
+        let wide = |x: &[f32]| x.iter().copied().map(f64::from).collect::<Vec<f64>>();
+        let network = shares(&m.network, &from, &x, judged.class, judged.runner_up, &mut desk);
+        let linear = m.linear.shares(&wide(&from), &wide(&x), judged.class, judged.runner_up);
+        let w = self.mix.network_share;
+        let t = self.mix.temperature;
+        let (n, l) = (w / (t * m.unit), (1.0 - w) / (t * self.mix.linear_unit));
+        let share: Vec<f64> = network.iter().zip(&linear).map(|(a, b)| n * a + l * b).collect();
         let mut order: Vec<usize> = (0..share.len()).collect();
         order.sort_by(|&a, &b| share[b].abs().total_cmp(&share[a].abs()).then(a.cmp(&b)));
         let tell = |&j: &usize| {
-            let (value, median) = (found.chosen[j].values[row], self.scale.median[j]);
-            let direction = match self.scale.imputed(j, value).total_cmp(&median) {
+            let (value, median) = (found.chosen[j].values[row], scale.median[j]);
+            let direction = match scale.imputed(j, value).total_cmp(&median) {
                 std::cmp::Ordering::Greater => Direction::Above,
                 std::cmp::Ordering::Less => Direction::Below,
                 std::cmp::Ordering::Equal => Direction::Equal,
             };
             Decided {
-                feature: self.scale.features[j].clone(),
+                feature: scale.features[j].clone(),
                 value: (!value.is_nan()).then_some(value),
                 training_median: median,
                 direction,

@@ -2,7 +2,7 @@
 //!
 //! In: a table of features with a class for each machine. Out: a trained gate, and its verdict on any machine: class, calibrated
 //! probability, action, reasons. In doubt it says `inspect`. Reading order: `table`, `classes`, `split`, `clean`, `boost`, `scale`, `network`,
-//! `adam`, `crossfit`, `calibrate`, `conformal`, `novelty`, `evidence`, `costs`, `train`, `judge`, `file`. Spec: `specs/gate.md`.
+//! `adam`, `crossfit`, `calibrate`, `member`, `conformal`, `novelty`, `evidence`, `costs`, `train`, `judge`, `file`. Spec: `specs/gate.md`.
 
 mod adam;
 mod attribution;
@@ -20,6 +20,7 @@ mod evidence;
 pub mod features;
 mod file;
 mod judge;
+mod member;
 mod network;
 mod novelty;
 mod packed;
@@ -49,6 +50,7 @@ pub use error::GateError;
 pub use evidence::{EVIDENCE, Evidence, Vote};
 pub use file::SCHEMA;
 pub use judge::Gate;
+pub use member::{Member, Mix};
 pub use network::{Desk, Network, parameter_count, softmax};
 pub use novelty::{Novelty, Strangeness};
 pub use prepare::Ranked;

@@ -1,9 +1,9 @@
 //! Novelty: is this machine of any class that the gate has seen?
 //!
-//! In: all cleaned features of the training rows and their classes. Out: for a new row, how often a machine of its class lies as far
-//! out. Two distances from the class's own centre, in its own robust spread: one for an unusual combination (Mahalanobis, with the
-//! correlations shrunk after Ledoit & Wolf 2004) and one for a single feature far out. Both are compared with rows that were held out
-//! of the reference, so the rate of false alarms is what was asked for. Spec: `specs/gate.md`.
+//! In: all features of the training rows that are not mostly missing, and their classes. Out: for a new row, how often a machine of its class lies as far
+//! out. Distances from the class's own centre, in its own robust spread: one for an unusual combination (Mahalanobis, with the
+//! correlations shrunk after Ledoit & Wolf 2004), one for a single feature far out. All are compared with rows that were held out
+//! of the reference, so the rate of false alarms is what was asked for. A third look is at many features: the fifth farthest of all. Spec: `specs/gate.md`.
 
 use super::packed::Packed64;
 use super::scale::median;
@@ -33,10 +33,10 @@ pub struct Novelty {
     /// Rows with a smaller p-value are of no known class.
     pub level: f64,
     reference: Reference,
-    /// Centre and spread of the logarithm of both distances, one pair a class.
-    levels: Vec<[[f64; 2]; 2]>,
+    /// Centre and spread of the logarithm of the distances, one pair a class and look.
+    levels: Vec<[[f64; 2]; LOOKS]>,
     /// Standardised distances of held-out rows, ascending.
-    held: [Packed64; 2],
+    held: [Packed64; LOOKS],
 }
 
 /// How unusual a row is.
@@ -58,9 +58,16 @@ const OWN_SPREAD: usize = 8;
 const CLIP: f64 = 6.0;
 /// Features beyond this many, the least important ones, are not looked at: the root grows with their square.
 pub const MOST_FEATURES: usize = 256;
+/// Features beyond this many are not looked at one by one either.
+pub const MOST_LOOKED_AT: usize = 1024;
+/// Distances: of the combination, of the farthest feature, of the fifth farthest.
+const LOOKS: usize = 3;
+/// The last look's place in the order of distances, where there are a hundred features or more; twenty features for each place otherwise.
+const PLACE: usize = 5;
 
 impl Reference {
-    fn of(columns: &[&Column], rows: &[usize], class: &[usize], classes: usize) -> Reference {
+    /// Correlations are those of the first `roots` columns.
+    fn of(columns: &[&Column], roots: usize, rows: &[usize], class: &[usize], classes: usize) -> Reference {
         let log: Vec<Option<f64>> = columns.iter().map(|c| takes_log(c, rows, class, classes)).collect();
         let looked: Vec<Column> = columns
             .iter()
@@ -107,9 +114,9 @@ impl Reference {
             // The 99th percentile, and never below the normal distribution's 2.58.
             tail[j] = z.get(z.len().saturating_sub(1) * 99 / 100).copied().unwrap_or(3.0).max(2.58);
         }
-        let mut z = DMatrix::<f64>::zeros(rows.len(), d);
+        let mut z = DMatrix::<f64>::zeros(rows.len(), roots);
         for (i, &r) in rows.iter().enumerate() {
-            for (j, c) in columns.iter().enumerate() {
+            for (j, c) in columns.iter().take(roots).enumerate() {
                 let at = class[r] * d + j;
                 let v = (c.values[r] - centre[at]) / spread[at];
                 z[(i, j)] = if v.is_nan() { 0.0 } else { v.clamp(-CLIP, CLIP) };
@@ -125,30 +132,46 @@ impl Reference {
         }
     }
 
-    /// Both distances of a row from a class, and the feature that lies farthest out with its distance.
-    fn distances(&self, row: &[f64], class: usize) -> ([f64; 2], usize, f64) {
-        let d = row.len();
-        let mut y = vec![0.0; d];
-        let (mut square, mut far, mut which, mut deviations) = (0.0, 0.0, 0, 0.0);
+    /// Columns whose correlations are known: the root's rows.
+    fn roots(&self) -> usize {
+        // r (r + 1) / 2 numbers.
+        (((8 * self.root.0.len() + 1) as f64).sqrt() as usize).saturating_sub(1) / 2
+    }
+
+    /// The distances of a row from a class, and the feature that lies farthest out with its distance.
+    fn distances(&self, row: &[f64], class: usize) -> ([f64; LOOKS], usize, f64) {
+        let (d, roots) = (row.len(), self.roots());
+        let mut y = vec![0.0; roots];
+        let (mut square, mut which, mut deviations) = (0.0, 0, 0.0);
+        let mut far = [0.0; PLACE];
         let mut at = 0;
         for j in 0..d {
             let z = (look(row[j], self.log[j]) - self.centre.0[class * d + j]) / self.spread.0[class * d + j];
             let z = if z.is_nan() { 0.0 } else { z.clamp(-1e6, 1e6) };
             let relative = z.abs() / self.tail.0[j];
-            if relative > far {
-                (far, which, deviations) = (relative, j, z.abs());
+            if relative > far[0] {
+                (which, deviations) = (j, z.abs());
             }
-            // Forward substitution, row by row.
-            let mut s = z;
-            for (l, y) in self.root.0[at..at + j].iter().zip(&y) {
-                s -= l * y;
+            // Kept in descending order.
+            let place = far.iter().position(|f| relative > *f).unwrap_or(PLACE);
+            if place < PLACE {
+                far[place..].rotate_right(1);
+                far[place] = relative;
             }
-            y[j] = s / self.root.0[at + j];
-            square += y[j] * y[j];
-            at += j + 1;
+            if j < roots {
+                // Forward substitution, row by row.
+                let mut s = z;
+                for (l, y) in self.root.0[at..at + j].iter().zip(&y) {
+                    s -= l * y;
+                }
+                y[j] = s / self.root.0[at + j];
+                square += y[j] * y[j];
+                at += j + 1;
+            }
         }
+        let last = far[(d / 20).clamp(1, PLACE) - 1];
         // The floor keeps the logarithm of a row in the very centre finite.
-        ([square.max(1e-12).sqrt().ln(), far.max(1e-6).ln()], which, deviations)
+        ([square.max(1e-12).sqrt().ln(), far[0].max(1e-6).ln(), last.max(1e-6).ln()], which, deviations)
     }
 }
 
@@ -204,14 +227,16 @@ fn shrunk_root(z: &DMatrix<f64>) -> Vec<f64> {
 }
 
 /// One row of a table in the order of `columns`.
-pub(super) fn row_of(columns: &[&Column], row: usize) -> Vec<f64> {
+fn row_of(columns: &[&Column], row: usize) -> Vec<f64> {
     columns.iter().map(|c| c.values[row]).collect()
 }
 
 impl Novelty {
-    /// Learns from `rows`; `fold` says which of them are held out together.
+    /// Learns from `rows`; `fold` says which of them are held out together. Columns after the first `roots` are looked at one by one.
+    #[allow(clippy::too_many_arguments, reason = "rows, classes and folds come from three places")]
     pub fn of(
         columns: &[&Column],
+        roots: usize,
         rows: &[usize],
         class: &[usize],
         classes: usize,
@@ -219,12 +244,12 @@ impl Novelty {
         level: f64,
     ) -> Novelty {
         let folds = fold.iter().max().map_or(1, |f| f + 1);
-        let mut held: Vec<(usize, [f64; 2])> = Vec::with_capacity(rows.len());
+        let mut held: Vec<(usize, [f64; LOOKS])> = Vec::with_capacity(rows.len());
         for f in 0..folds {
             let pick = |inside: bool| {
                 rows.iter().zip(fold).filter(|(_, k)| (**k == f) == inside).map(|(r, _)| *r).collect::<Vec<usize>>()
             };
-            let reference = Reference::of(columns, &pick(false), class, classes);
+            let reference = Reference::of(columns, roots, &pick(false), class, classes);
             held.extend(
                 pick(true).into_iter().map(|r| (class[r], reference.distances(&row_of(columns, r), class[r]).0)),
             );
@@ -233,14 +258,14 @@ impl Novelty {
         let spread = |i: usize, k: Option<usize>, m: f64| {
             ROBUST * median(held.iter().filter(|(c, _)| k.is_none_or(|k| *c == k)).map(|(_, s)| (s[i] - m).abs()))
         };
-        let pooled = [0, 1].map(|i| {
+        let pooled: [[f64; 2]; LOOKS] = std::array::from_fn(|i| {
             let m = median(all(i));
             [m, spread(i, None, m).max(1e-6)]
         });
-        let levels: Vec<[[f64; 2]; 2]> = (0..classes)
+        let levels: Vec<[[f64; 2]; LOOKS]> = (0..classes)
             .map(|k| {
                 let n = held.iter().filter(|(c, _)| *c == k).count();
-                [0, 1].map(|i| {
+                std::array::from_fn(|i| {
                     if n < OWN_SPREAD {
                         return pooled[i];
                     }
@@ -249,7 +274,7 @@ impl Novelty {
                 })
             })
             .collect();
-        let standard = [0, 1].map(|i| {
+        let standard: [Packed64; LOOKS] = std::array::from_fn(|i| {
             let mut s: Vec<f64> = held.iter().map(|(k, s)| (s[i] - levels[*k][i][0]) / levels[*k][i][1]).collect();
             s.sort_by(f64::total_cmp);
             Packed64(s)
@@ -257,7 +282,7 @@ impl Novelty {
         Novelty {
             features: columns.iter().map(|c| c.name.clone()).collect(),
             level,
-            reference: Reference::of(columns, rows, class, classes),
+            reference: Reference::of(columns, roots, rows, class, classes),
             levels,
             held: standard,
         }
@@ -266,10 +291,11 @@ impl Novelty {
     /// How unusual a row (in the order of `features`, NaN where missing) is for a machine of `class`.
     pub fn strangeness(&self, row: &[f64], class: usize) -> Strangeness {
         let (s, which, deviations) = self.reference.distances(row, class);
-        let p = [0, 1].map(|i| tail((s[i] - self.levels[class][i][0]) / self.levels[class][i][1], &self.held[i].0));
+        let p = (0..LOOKS).map(|i| tail((s[i] - self.levels[class][i][0]) / self.levels[class][i][1], &self.held[i].0));
+        let least = p.fold(1.0, f64::min);
         Strangeness {
-            // Two looks, so the smaller p-value counts twice (Bonferroni).
-            p_value: (2.0 * p[0].min(p[1])).min(1.0),
+            // Three looks, so the smallest p-value counts three times (Bonferroni).
+            p_value: (LOOKS as f64 * least).min(1.0),
             feature: self.features.get(which).cloned().unwrap_or_default(),
             deviations,
         }
@@ -279,14 +305,22 @@ impl Novelty {
     pub(super) fn sound(&self, classes: usize) -> bool {
         let d = self.features.len();
         let r = &self.reference;
-        let lists = [&r.centre, &r.spread, &r.tail, &r.root, &self.held[0], &self.held[1]];
+        let roots = r.roots();
+        let lists = [&r.centre, &r.spread, &r.tail, &r.root].into_iter().chain(&self.held);
+        let positive = |l: &Packed64| l.0.iter().all(|x| *x > 0.0);
         r.log.len() == d
             && r.centre.0.len() == classes * d
             && r.spread.0.len() == classes * d
             && r.tail.0.len() == d
-            && r.root.0.len() == d * (d + 1) / 2
+            && roots <= d
+            && r.root.0.len() == roots * (roots + 1) / 2
+            && positive(&r.spread)
+            && positive(&r.tail)
+            && self.held.iter().all(|h| h.0.is_sorted())
+            && self.level.is_finite()
             && self.levels.len() == classes
-            && lists.iter().all(|l| l.0.iter().all(|x| x.is_finite()))
+            && self.levels.iter().flatten().all(|l| l[0].is_finite() && l[1] > 0.0)
+            && lists.into_iter().all(|l| l.0.iter().all(|x| x.is_finite()))
     }
 }
 

@@ -13,6 +13,8 @@ use super::crossfit::Fold;
 use super::discriminant::discriminant;
 use super::evidence::Evidence;
 use super::judge::Gate;
+use super::member::Mix;
+use super::network::Desk;
 use super::prepare::{Prepared, Ranked};
 use super::split::Split;
 use super::train::Job;
@@ -166,8 +168,10 @@ pub struct MissedBroken {
 pub struct ConformalReport {
     /// Asked for.
     pub coverage: f64,
-    /// Share of test rows whose set has the true class.
+    /// Share of test rows whose set has the true class; the most probable class is always put in.
     pub test_coverage: f64,
+    /// The same for the sets as the p-values have them, without that.
+    pub test_coverage_bare: f64,
     /// Mean size of a test row's set.
     pub test_set_size: f64,
     /// Classes with a reference of their own.
@@ -182,10 +186,14 @@ pub struct CalibrationReport {
     /// On held-out rows.
     #[serde(flatten)]
     pub held: Calibration,
-    /// Test part, with temperature 1.
+    /// How networks and discriminants are mixed.
+    pub mix: Mix,
+    /// Test part: the network by itself, with temperature 1.
     pub test_error_before: f64,
-    /// Test part, with the temperature.
+    /// Test part: the gate.
     pub test_error_after: f64,
+    /// Share of test rows that the gate, judges together, has right.
+    pub test_accuracy: f64,
 }
 
 /// How a gate was made.
@@ -308,12 +316,9 @@ impl TrainReport {
         let n = truth.len().max(1) as f64;
         let share = |count: usize| count as f64 / n;
         let after: Vec<Vec<f64>> = judged.iter().map(|j| j.probabilities.clone()).collect();
-        let t = gate.calibration.temperature;
-        let sharpen = |p: &Vec<f64>| {
-            let z: Vec<f64> = p.iter().map(|v| t * v.max(1e-300).ln()).collect();
-            super::calibrate::probabilities(&z, 1.0)
-        };
-        let before: Vec<Vec<f64>> = after.iter().map(sharpen).collect();
+        let mut desk = Desk::new(&f.network.sizes, 16);
+        let raw = f.network.logits(&p.scale.inputs(&p.chosen, &split.test), &mut desk);
+        let before: Vec<Vec<f64>> = raw.chunks(job.classes).map(|z| super::calibrate::probabilities(z, 1.0)).collect();
         let said: Vec<(usize, Action)> = judged.iter().map(|j| (j.class, j.action)).collect();
         let decisions = decisions(&truth, &said, &gate.classes, &gate.costs);
         let unknown =
@@ -345,12 +350,21 @@ impl TrainReport {
             search: parts.candidates,
             calibration: CalibrationReport {
                 held: gate.calibration.clone(),
+                mix: gate.mix.clone(),
+                test_accuracy: share(judged.iter().zip(&truth).filter(|(j, t)| j.class == **t).count()),
                 test_error_before: calibration_error(&before, &truth),
                 test_error_after: calibration_error(&after, &truth),
             },
             conformal: ConformalReport {
                 coverage: gate.conformal.coverage,
                 test_coverage: share(judged.iter().zip(&truth).filter(|(j, t)| j.set.contains(t)).count()),
+                test_coverage_bare: share(
+                    judged
+                        .iter()
+                        .zip(&truth)
+                        .filter(|(j, t)| j.set.contains(t) && (j.class != **t || j.conforms))
+                        .count(),
+                ),
                 test_set_size: judged.iter().map(|j| j.set.len()).sum::<usize>() as f64 / n,
                 own_reference: gate.conformal.own_reference.clone(),
                 enough: gate.conformal.enough,

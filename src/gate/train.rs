@@ -6,16 +6,17 @@
 
 use super::GateError;
 use super::adam::{Epoch, Fitted};
-use super::calibrate::{Logits, calibrate, probabilities};
 use super::classes::labelled;
+use super::clean::Cause;
 use super::conformal::Conformal;
 use super::costs::Costs;
 use super::crossfit::crossfit;
 use super::drift::DriftReference;
 use super::evidence::Evidence;
 use super::judge::Gate;
+use super::member::{Member, Mix};
 use super::network::Desk;
-use super::novelty::{MOST_FEATURES, Novelty};
+use super::novelty::{MOST_FEATURES, MOST_LOOKED_AT, Novelty};
 use super::parallel::each;
 use super::prepare::{PATIENCE, Prepared, learn, prepare, reach, seed_of};
 use super::report::{Baseline, Candidate, Confusions, Parts, Published, TrainReport};
@@ -109,38 +110,51 @@ pub fn train(table: &Table, settings: &TrainSettings) -> Result<Trained, GateErr
     let unit = reach(&p, &fitted, &split.validate, k);
     // Deals for the sets, the novelty and the vote, even where no network is cross-validated.
     let deal = folds(&taught, &known.class, k, if settings.folds == 0 { 5 } else { settings.folds }, settings.seed);
-    let (fold_list, held, logits) = if settings.folds > 0 {
-        let (list, logits) = crossfit(table, &taught, &known.class, k, &deal, &hidden, settings)?;
-        (list, taught.clone(), logits)
+    let main = Member::of(p.scale.clone(), fitted.network.clone(), unit, &p.chosen, &taught, &known.class, k)?;
+    let (fold_list, members, held, said) = if settings.folds > 0 {
+        let (list, members, said) = crossfit(table, &taught, &known.class, k, &deal, &hidden, settings)?;
+        (list, members, taught.clone(), said)
     } else {
+        // The discriminant may have learned from the training part only: the validation part is to judge it.
+        let blind =
+            Member::of(p.scale.clone(), fitted.network.clone(), unit, &p.chosen, &split.train, &known.class, k)?;
         let mut desk = Desk::new(&fitted.network.sizes, settings.batch);
-        let z = fitted.network.logits(&p.scale.inputs(&p.chosen, &split.validate), &mut desk);
-        (Vec::new(), split.validate.clone(), z.chunks(k).map(|z| Logits { raw: z.to_vec(), unit }).collect())
+        let said = blind.say(&p.scale.inputs(&p.chosen, &split.validate), &mut desk);
+        (Vec::new(), Vec::new(), split.validate.clone(), said)
     };
     let of_held: Vec<usize> = held.iter().map(|&r| known.class[r]).collect();
-    let mut calibration = calibrate(&logits, &of_held);
-    let held_p: Vec<Vec<f64>> =
-        logits.iter().map(|z| probabilities(&z.raw, calibration.temperature * z.unit)).collect();
-    calibration.temperature *= unit;
-    // Chosen features are always looked at, then the plant's, then the rest by importance.
-    let watched: Vec<&Column> = {
-        let rest = p.kept.iter().skip(p.chosen.len());
-        p.chosen.iter().chain(&p.evidence).chain(rest).copied().take(MOST_FEATURES.max(p.chosen.len())).collect()
+    let fold_of_held = if settings.folds > 0 { deal.clone() } else { vec![0; held.len()] };
+    let (mix, calibration) = Mix::of(&said, &of_held);
+    let held_p: Vec<Vec<f64>> = said.iter().map(|s| mix.probabilities(s)).collect();
+
+    // Chosen features are always looked at, then the plant's, then the rest by importance: the most in combination, others one by one.
+    let rest = p.kept.iter().skip(p.chosen.len());
+    let mut watched: Vec<&Column> = p.chosen.iter().chain(&p.evidence).chain(rest).copied().collect();
+    let roots = watched.len().min(MOST_FEATURES.max(p.chosen.len()));
+    let looked_at = |cause: &Cause| match cause {
+        Cause::Missing { .. } => false,
+        Cause::SingleValue { value } => value.is_some(),
+        Cause::Correlated { .. } => true,
     };
-    // Evidence columns may be absent in another table, so they are no part of what must be there.
-    let needed: Vec<&Column> =
-        watched.iter().copied().filter(|c| !p.evidence.iter().any(|e| e.name == c.name)).collect();
+    for r in p.removed.iter().filter(|r| looked_at(&r.cause)) {
+        watched.extend(table.columns().iter().find(|c| c.name == r.feature));
+    }
+    watched.truncate(MOST_LOOKED_AT.max(p.chosen.len()));
+    // The plant's columns may be absent in another table, and a single value has no distribution.
+    let moved: Vec<&Column> =
+        watched.iter().take(roots).copied().filter(|c| !p.evidence.iter().any(|e| e.name == c.name)).collect();
     let gate = Gate {
         program: env!("CARGO_PKG_VERSION").to_owned(),
         seed: settings.seed,
         table_sha256: table.sha256().to_owned(),
         label: settings.label.clone(),
-        conformal: Conformal::of(&held_p, &of_held, k, settings.coverage),
-        novelty: Novelty::of(&needed, &taught, &known.class, k, &deal, settings.novelty_level),
+        conformal: Conformal::of(&held_p, &of_held, &fold_of_held, k, settings.coverage),
+        novelty: Novelty::of(&watched, roots, &taught, &known.class, k, &deal, settings.novelty_level),
         evidence: Evidence::of(&p.evidence, &taught, &known.class, k, &deal),
-        drift: needed.iter().map(|c| DriftReference::of(c, &taught)).collect(),
-        scale: p.scale.clone(),
-        network: fitted.network.clone(),
+        drift: moved.iter().map(|c| DriftReference::of(c, &taught)).collect(),
+        main,
+        members,
+        mix,
         classes,
         calibration,
         costs,

@@ -53,9 +53,8 @@ pub fn boxplot(
     (quantity, unit): (&str, &str),
     groups: &[Group],
 ) -> Result<Figure, ReportError> {
-    let mut x = Axis::linear("Class", "");
-    x.range = Some((-0.6, groups.len() as f64 - 0.4));
-    let mut panel = Panel::new(x, Axis::linear(quantity, unit));
+    let names = groups.iter().map(|g| g.name);
+    let mut panel = Panel::new(Axis::named("Class", names), Axis::linear(quantity, unit));
     panel.height = 1.4;
     for (i, group) in groups.iter().enumerate() {
         let Some(b) = summary(group.values) else { continue };

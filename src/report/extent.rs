@@ -81,6 +81,7 @@ pub(super) fn x_view<'a>(axis: &Axis, panels: impl Iterator<Item = &'a Panel>) -
                 reach.see(circle.centre.0 + circle.radius);
             }
             Mark::Note(note) => reach.see(note.at.0),
+            Mark::Tile(tile) => [tile.x.0, tile.x.1].into_iter().for_each(|x| reach.see(x)),
             Mark::Line(_) | Mark::Region(_) => {}
         }
     }
@@ -98,6 +99,7 @@ pub(super) fn y_view(panel: &Panel) -> View {
                 reach.see(circle.centre.1 + circle.radius);
             }
             Mark::Note(note) => reach.see(note.at.1),
+            Mark::Tile(tile) => [tile.y.0, tile.y.1].into_iter().for_each(|y| reach.see(y)),
             Mark::Line(line) if line.on == Direction::Y => reach.see(line.at),
             Mark::Line(_) | Mark::Region(_) => {}
         }

@@ -46,6 +46,8 @@ pub struct Axis {
     pub range: Option<(f64, f64)>,
     /// Where the tick marks stand.
     pub ticks: Ticks,
+    /// Names of the places 0, 1, ...; where there are any, they stand instead of numbers.
+    pub names: Vec<String>,
 }
 
 /// How values become lengths.
@@ -81,6 +83,8 @@ pub enum Mark {
     Circle(Circle),
     /// Words at a place.
     Note(Note),
+    /// A shaded rectangle with words in its middle.
+    Tile(Tile),
 }
 
 /// The meaning of a colour; `palette.rs` has the colours themselves.
@@ -181,6 +185,21 @@ pub struct Region {
     pub ink: Ink,
 }
 
+/// A shaded rectangle with words in its middle: a cell of a matrix.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tile {
+    /// Left and right edge.
+    pub x: (f64, f64),
+    /// Lower and upper edge.
+    pub y: (f64, f64),
+    /// How strong the shade is, 0 to 1.
+    pub shade: f64,
+    /// Words in its middle; may be empty.
+    pub text: String,
+    /// Colour of the shade.
+    pub ink: Ink,
+}
+
 /// One of the two axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
@@ -225,7 +244,15 @@ impl Axis {
             scale: Scale::Linear,
             range: None,
             ticks: Ticks::Decimal,
+            names: Vec::new(),
         }
+    }
+
+    /// A linear axis whose places 0, 1, ... have names.
+    pub fn named<'a>(label: &str, names: impl IntoIterator<Item = &'a str>) -> Self {
+        let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
+        let range = Some((-0.5, names.len().max(1) as f64 - 0.5));
+        Axis { names, range, ..Axis::linear(label, "") }
     }
 
     /// A logarithmic frequency axis in Hz.

@@ -4,7 +4,7 @@
 
 use super::extent::{View, x_view, y_view};
 use super::figure::{Direction, Figure, Ink, Kind, Mark, Panel};
-use super::ticks::{Tick, ticks};
+use super::ticks::{Tick, axis_ticks};
 
 /// How large a picture is and how much fits into it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,7 +167,7 @@ pub(super) fn place(figure: &Figure, size: Size, title: bool) -> Layout<'_> {
         let view_x = shared.unwrap_or_else(|| x_view(&panel.x, std::iter::once(panel)));
         let view_y = y_view(panel);
         let height = size.panel_height * panel.height.clamp(0.3, 3.0);
-        let widest = ticks(&view_y, panel.y.ticks, height, SPACING.1)
+        let widest = axis_ticks(&panel.y, &view_y, height, SPACING.1, 0.3 * size.width)
             .iter()
             .filter_map(|tick| tick.label.as_deref())
             .map(|label| text_width(label, 11.5))
@@ -191,8 +191,8 @@ pub(super) fn place(figure: &Figure, size: Size, title: bool) -> Layout<'_> {
             area: Rect { x: left, y: 0.0, w: width, h: height },
             x: view_x,
             y: view_y,
-            x_ticks: ticks(&view_x, panel.x.ticks, width, SPACING.0),
-            y_ticks: ticks(&view_y, panel.y.ticks, height, SPACING.1),
+            x_ticks: axis_ticks(&panel.x, &view_x, width, SPACING.0, width / (view_x.hi - view_x.lo) - 4.0),
+            y_ticks: axis_ticks(&panel.y, &view_y, height, SPACING.1, 0.3 * size.width),
             x_labelled: !figure.share_x || index + 1 == count,
             headers: Vec::new(),
         };

@@ -3,7 +3,7 @@
 //! In: a placed panel. Out: path data. Convention: a NaN lifts the pen; a point is a stroke of no length with round
 //! ends, so that zooming by a plain transform keeps it round. Spec: `specs/report.md`.
 
-use super::figure::{Circle, Direction, Kind, Mark, Region, RuleLine, Scale, Series};
+use super::figure::{Circle, Direction, Kind, Mark, Region, RuleLine, Scale, Series, Tile};
 use super::layout::{Layout, Placed};
 use super::palette::class;
 use std::fmt::Write;
@@ -40,7 +40,23 @@ pub(super) fn draw(layout: &Layout, placed: &Placed, mark: &Mark, points: usize)
             }
             element(&format!("M{} {}h0", px(x), px(y)), "dots", class(note.ink), None)
         }
+        Mark::Tile(t) => tile(placed, t),
     }
+}
+
+/// The strongest shade leaves words on it legible in light and in dark.
+const STRONGEST: f64 = 0.42;
+
+fn tile(placed: &Placed, tile: &Tile) -> String {
+    let (left, right) = (placed.px(tile.x.0), placed.px(tile.x.1));
+    let (bottom, top) = (placed.py(tile.y.0), placed.py(tile.y.1));
+    if ![left, right, bottom, top].iter().all(|v| v.is_finite()) {
+        return String::new();
+    }
+    let path = format!("M{} {}H{}V{}H{}z", px(left), px(bottom), px(right), px(top), px(left));
+    let shade = px(STRONGEST * tile.shade.clamp(0.0, 1.0));
+    let shaded = format!(r#"<path fill-opacity="{shade}""#);
+    element(&path, "fill", class(tile.ink), None).replacen("<path", &shaded, 1)
 }
 
 fn element(path: &str, style: &str, ink: &str, key: Option<usize>) -> String {

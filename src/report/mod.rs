@@ -15,6 +15,8 @@ mod words;
 
 pub mod bode;
 pub mod boxplot;
+pub mod confusion;
+pub mod curve;
 pub mod figure;
 pub mod histogram;
 pub mod identified;

@@ -63,7 +63,8 @@ fn render(figure: &Figure, size: Size, id: &str, alone: bool) -> String {
         escape(&figure.caption)
     );
     if alone {
-        let _ = write!(svg, "<style>{STRUCTURE}{}</style>", LIGHT.rules());
+        // A screen narrower than the picture shows all of it, smaller.
+        let _ = write!(svg, "<style>svg.plot{{max-width:100%;height:auto}}{STRUCTURE}{}</style>", LIGHT.rules());
     }
     let _ = write!(svg, r#"<rect class="paper" width="{w}" height="{h}"/>"#);
     if let Some(title) = layout.title {
@@ -117,17 +118,28 @@ fn view_data(axis: &Axis, view: &super::extent::View) -> String {
     format!("{scale} {ticks} {} {}", view.lo, view.hi)
 }
 
+/// Names of the places on an axis, as the unzoomed picture writes them; nothing where there are numbers.
+fn names_data(axis: &str, ticks: &[super::ticks::Tick], of: &Axis) -> String {
+    if of.names.is_empty() {
+        return String::new();
+    }
+    let words = ticks.iter().map(|t| format!("{}={}", t.value, t.label.as_deref().unwrap_or_default()));
+    format!(r#" data-names-{axis}="{}""#, escape(&words.collect::<Vec<_>>().join("|")))
+}
+
 fn draw_panel(svg: &mut String, layout: &Layout, placed: &Placed, index: usize, id: &str, points: usize) {
     let area = placed.area;
     let (x, y, w, h) = (px(area.x), px(area.y), px(area.w), px(area.h));
     let panel = placed.panel;
     let _ = write!(
         svg,
-        r#"<g class="panel" data-panel="{index}" data-area="{x} {y} {w} {h}" data-x="{}" data-y="{}"{}{}>"#,
+        r#"<g class="panel" data-panel="{index}" data-area="{x} {y} {w} {h}" data-x="{}" data-y="{}"{}{}{}{}>"#,
         view_data(&panel.x, &placed.x),
         view_data(&panel.y, &placed.y),
         if panel.equal_aspect { r#" data-equal="1""# } else { "" },
         if placed.x_labelled { r#" data-labelled="1""# } else { "" },
+        names_data("x", &placed.x_ticks, &panel.x),
+        names_data("y", &placed.y_ticks, &panel.y),
     );
     let _ = write!(svg, r#"<clipPath id="{id}-c{index}"><rect x="{x}" y="{y}" width="{w}" height="{h}"/></clipPath>"#);
     draw_ticks(svg, placed);
@@ -169,6 +181,7 @@ fn draw_ticks(svg: &mut String, placed: &Placed) {
             if at - half > free {
                 free = at + half + 2.0;
                 let (x, y) = (px(at), px(area.y + area.h + 16.0));
+                let label = escape(label);
                 let _ = write!(words, r#"<text text-anchor="middle" x="{x}" y="{y}">{label}</text>"#);
             }
         }
@@ -179,6 +192,7 @@ fn draw_ticks(svg: &mut String, placed: &Placed) {
         let _ = write!(svg, r#"<path{fine} d="M{} {}h{}"/>"#, px(area.x), px(at), px(area.w));
         if let Some(label) = &tick.label {
             let (x, y) = (px(area.x - 6.0), px(at + 4.0));
+            let label = escape(label);
             let _ = write!(words, r#"<text text-anchor="end" x="{x}" y="{y}">{label}</text>"#);
         }
     }

@@ -5,7 +5,8 @@
 //! Spec: `specs/report.md`.
 
 use super::extent::View;
-use super::figure::{Scale, Ticks};
+use super::figure::{Axis, Scale, Ticks};
+use super::layout::fitted;
 use super::number::typographic;
 
 /// One tick mark; without words it is a fine grid line.
@@ -23,6 +24,15 @@ pub(super) fn ticks(view: &View, policy: Ticks, length: f64, spacing: f64) -> Ve
         Scale::Linear => linear(view.lo, view.hi, policy, length, spacing),
         Scale::Log10 => logarithmic(view, policy, length, spacing),
     }
+}
+
+/// Ticks of an axis: its names where it has any, each cut to `room` pixels, numbers otherwise.
+pub(super) fn axis_ticks(axis: &Axis, view: &View, length: f64, spacing: f64, room: f64) -> Vec<Tick> {
+    if axis.names.is_empty() {
+        return ticks(view, axis.ticks, length, spacing);
+    }
+    let tick = |(i, name): (usize, &String)| Tick { value: i as f64, label: Some(fitted(name, 11.5, room)) };
+    axis.names.iter().enumerate().map(tick).filter(|t| view.holds(t.value)).collect()
 }
 
 /// The smallest allowed step that is not below `raw`.

@@ -25,6 +25,7 @@ type Spot = (Anchor, f64, f64);
 /// Writes the words of all marks; those of points first, since they have the least choice.
 pub(super) fn draw_words(svg: &mut String, placed: &Placed) {
     draw_headers(svg, placed);
+    draw_tiles(svg, placed);
     let mut taken: Vec<Rect> = Vec::new();
     for mark in &placed.panel.marks {
         if let Mark::Note(note) = mark
@@ -69,6 +70,27 @@ pub(super) fn draw_words(svg: &mut String, placed: &Placed) {
             }
             _ => {}
         }
+    }
+}
+
+/// Words of tiles stand in their middle, cut to their width.
+fn draw_tiles(svg: &mut String, placed: &Placed) {
+    for mark in &placed.panel.marks {
+        let Mark::Tile(tile) = mark else { continue };
+        let (x, y) = (placed.px(0.5 * (tile.x.0 + tile.x.1)), placed.py(0.5 * (tile.y.0 + tile.y.1)));
+        if tile.text.is_empty() || !(x.is_finite() && y.is_finite()) {
+            continue;
+        }
+        let room = (placed.px(tile.x.1) - placed.px(tile.x.0)).abs() - 4.0;
+        let _ = write!(
+            svg,
+            r#"<text class="word ip" text-anchor="middle" data-x="{}" data-y="{}" x="{}" y="{}">{}</text>"#,
+            px(x),
+            px(y),
+            px(x),
+            px(y + 4.0),
+            escape(&fitted(&tile.text, FONT_PX, room))
+        );
     }
 }
 

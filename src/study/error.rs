@@ -3,6 +3,7 @@
 use crate::controller::ControllerError;
 use crate::feedback::FeedbackError;
 use crate::frf::{FrfError, FrfShapeError};
+use crate::gate::GateError;
 use crate::identify::IdentifyError;
 use crate::lti::LtiError;
 use crate::pes::PesError;
@@ -41,6 +42,10 @@ pub enum StudyError {
     Pes(#[from] PesError),
     #[error(transparent)]
     Report(#[from] ReportError),
+    #[error(transparent)]
+    Gate(#[from] GateError),
+    #[error("the numbers of the study cannot be written as JSON: {0}")]
+    Json(#[from] serde_json::Error),
     /// A measured record that this study rests on is not there.
     #[error("{}: the measured record that this study rests on is not there; give its folder with --data", file.display())]
     Absent { file: PathBuf },

@@ -5,6 +5,8 @@
 
 mod classes;
 mod error;
+mod gate;
+mod gate_seeds;
 mod hdd;
 mod ladder;
 mod line;
@@ -15,6 +17,8 @@ mod plants;
 
 pub use classes::classes;
 pub use error::StudyError;
+pub use gate::gate;
+pub use gate_seeds::gate_seeds;
 pub use hdd::hdd;
 pub use ladder::ladder;
 pub use line::line_study;

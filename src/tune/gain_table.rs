@@ -92,6 +92,18 @@ pub struct Provenance {
     pub evaluations: usize,
     /// SHA-256 of spec.toml.
     pub spec_sha256: String,
+    /// Class that the gate gave the machine, where one was asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gate_class: Option<String>,
+    /// What the gate said to do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gate_action: Option<String>,
+    /// Calibrated probability of that class.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gate_probability: Option<f64>,
+    /// Why the machine was tuned whatever the gate said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gate_override: Option<String>,
     /// Effects beyond linear that the table was tuned and judged with.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub physics: Vec<String>,
@@ -103,7 +115,7 @@ pub struct Provenance {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputDigest {
-    /// What it was used as: "plant", "frf", "controller", "profile".
+    /// What it was used as: "plant", "frf", "controller", "profile", "gate".
     pub role: String,
     /// SHA-256 of its bytes.
     pub sha256: String,
@@ -192,6 +204,10 @@ impl GainTable {
                 seed,
                 evaluations: work.evaluations,
                 spec_sha256,
+                gate_class: None,
+                gate_action: None,
+                gate_probability: None,
+                gate_override: None,
                 physics: Vec::new(),
                 inputs,
             },

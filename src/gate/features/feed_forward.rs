@@ -1,4 +1,4 @@
-//! FF_Factor where no log has it: how much velocity feed-forward would take out of the PES.
+//! FF_Factor_estimated: how much velocity feed-forward would take out of the PES.
 //!
 //! In: the record. Out: the amount, in the PES's unit, that leaves the least PES. Feed-forward of the velocity shifts the reference by
 //! f h(t), h the speed of the move over its full speed as far as the loop passes it on: 1 - e^(-t/tau). The least squares over the

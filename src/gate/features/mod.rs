@@ -26,5 +26,5 @@ pub use folder::{Found, machine_folders, read_machine, read_machines};
 pub use machine::{LogEntry, PesRecord, RawMachine};
 pub use resonance::{Resonance, resonances};
 pub use row::Row;
-pub use table::{FeatureTable, features};
+pub use table::{FeatureTable, csv_field, features};
 pub use view::ResponseView;

@@ -7,13 +7,15 @@ use std::f64::consts::TAU;
 
 /// Edges of the bands (Hz).
 const EDGES: [u32; 15] = [0, 100, 200, 400, 600, 800, 1000, 1250, 1500, 2000, 3000, 4000, 6000, 8000, 12000];
+/// The same for the window, whose 200 samples have no bin below 137 Hz at the paper's servo rate.
+const WINDOW_EDGES: [u32; 14] = [0, 200, 400, 600, 800, 1000, 1250, 1500, 2000, 3000, 4000, 6000, 8000, 12000];
 /// Multiples of half the paper's spindle speed of 120 Hz, and the mains (Hz).
 const LINES: [u32; 6] = [50, 60, 100, 120, 240, 360];
 
 /// Adds the features over frequency of the moving record and of its window.
 pub(super) fn spectrum(moving: &[f64], window: &[f64], rate: f64, row: &mut Row) {
-    describe("pes", moving, rate, row);
-    describe("pes_window", window, rate, row);
+    describe("pes", moving, rate, &EDGES, row);
+    describe("pes_window", window, rate, &WINDOW_EDGES, row);
     let bare = detrended(moving);
     for hz in LINES {
         row.push(format!("pes_line_{hz}_hz"), line(&bare, f64::from(hz), rate));
@@ -32,7 +34,7 @@ fn line(x: &[f64], hz: f64, rate: f64) -> f64 {
 }
 
 /// Power of the samples less their line, by Hann's window, so that slow motion does not leak into every band.
-fn describe(name: &str, x: &[f64], rate: f64, row: &mut Row) {
+fn describe(name: &str, x: &[f64], rate: f64, edges: &[u32], row: &mut Row) {
     let n = x.len();
     let tapered: Vec<f64> = detrended(x)
         .iter()
@@ -46,7 +48,7 @@ fn describe(name: &str, x: &[f64], rate: f64, row: &mut Row) {
     let total: f64 = power.iter().sum();
     let here = n >= 16 && rate.is_finite() && total > 0.0;
     let mut put = |what: String, value: f64| row.push(format!("{name}_{what}"), if here { value } else { f64::NAN });
-    for edge in EDGES.windows(2) {
+    for edge in edges.windows(2) {
         let (low, high) = (f64::from(edge[0]), f64::from(edge[1]));
         let bins = || power.iter().enumerate().filter(|(i, _)| hz(*i) > low && hz(*i) <= high);
         // A band beyond half the servo rate, or narrower than a bin, is not seen.

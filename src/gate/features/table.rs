@@ -26,19 +26,22 @@ pub struct FeatureTable {
 
 /// Name of the feed-forward feature, in a log (case does not matter) and in the table.
 const FEED_FORWARD: &str = "FF_Factor";
+/// The estimate from the PES: another quantity in another unit, so it never stands in the logged factor's column.
+const ESTIMATED: &str = "FF_Factor_estimated";
 
 /// The features that come from the measurements alone.
 fn measured(machine: &RawMachine) -> Row {
     let mut row = Row::default();
     pes_features(machine.pes.as_ref(), &mut row);
     response_features(machine.response.as_ref(), &mut row);
+    row.push(ESTIMATED, feed_forward(machine.pes.as_ref()));
     row
 }
 
 /// The table of all machines: measured features first, then the logs' numbers by name.
 ///
-/// FF_Factor is the logs' where any log has it, then empty for machines without; otherwise it is estimated from the PES. A key
-/// of a log that has the name of a measured feature, `id` or `label` is carried as `log_NAME`. Bytes equal for any number of threads.
+/// FF_Factor is the log's, empty for a machine without; FF_Factor_estimated comes from the PES. A key of a log that has the name of a
+/// measured feature, `id` or `label` is carried as `log_NAME`. Bytes equal for any number of threads.
 pub fn features(machines: &[RawMachine]) -> FeatureTable {
     let mut order: Vec<&RawMachine> = machines.iter().collect();
     order.sort_by(|a, b| a.id.cmp(&b.id));
@@ -58,19 +61,16 @@ pub fn features(machines: &[RawMachine]) -> FeatureTable {
     let logs: Vec<BTreeMap<String, f64>> =
         order.iter().map(|m| m.log.iter().map(|e| (column(&e.key), e.value)).collect()).collect();
     let keys: BTreeSet<&String> = logs.iter().flat_map(BTreeMap::keys).filter(|k| *k != FEED_FORWARD).collect();
-    let logged = logs.iter().any(|l| l.contains_key(FEED_FORWARD));
     let mut names = template.names().to_vec();
     names.push(FEED_FORWARD.to_owned());
     names.extend(keys.iter().map(|k| (*k).clone()));
     let rows = rows
         .iter()
         .zip(&logs)
-        .zip(&order)
-        .map(|((row, log), machine)| {
+        .map(|(row, log)| {
             let of_log = |key: &str| log.get(key).copied().unwrap_or(f64::NAN);
             let mut values = row.values().to_vec();
-            let factor = if logged { of_log(FEED_FORWARD) } else { feed_forward(machine.pes.as_ref()) };
-            values.push(factor);
+            values.push(of_log(FEED_FORWARD));
             values.extend(keys.iter().map(|k| of_log(k)));
             values
         })
@@ -91,16 +91,29 @@ impl FeatureTable {
         Some(self.rows.iter().map(|r| r[at]).collect())
     }
 
+    /// Adds the columns among `names` that the table lacks, empty, and gives their names: keys that no log of these machines has.
+    pub fn complete<'a>(&mut self, names: impl IntoIterator<Item = &'a str>) -> Vec<String> {
+        let mut added = Vec::new();
+        for name in names {
+            if !self.names.iter().any(|n| n == name) {
+                self.names.push(name.to_owned());
+                self.rows.iter_mut().for_each(|r| r.push(f64::NAN));
+                added.push(name.to_owned());
+            }
+        }
+        added
+    }
+
     /// The table as CSV: `id`, the features, `label` where there is any; an empty field is missing.
     pub fn csv(&self) -> String {
         let mut text = String::from("id");
         for name in &self.names {
             text.push(',');
-            text.push_str(&field(name));
+            text.push_str(&csv_field(name));
         }
         text.push_str(if self.labels.is_some() { ",label\n" } else { "\n" });
         for (i, (id, row)) in self.ids.iter().zip(&self.rows).enumerate() {
-            text.push_str(&field(id));
+            text.push_str(&csv_field(id));
             for value in row {
                 text.push(',');
                 if value.is_finite() {
@@ -110,7 +123,7 @@ impl FeatureTable {
             }
             if let Some(labels) = &self.labels {
                 text.push(',');
-                text.push_str(&labels[i].as_deref().map(field).unwrap_or_default());
+                text.push_str(&labels[i].as_deref().map(csv_field).unwrap_or_default());
             }
             text.push('\n');
         }
@@ -124,7 +137,7 @@ fn short(value: f64) -> f64 {
 }
 
 /// A field of CSV, in quotes where it must be.
-fn field(text: &str) -> String {
+pub fn csv_field(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) || text.trim() != text {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {

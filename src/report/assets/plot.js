@@ -7,11 +7,19 @@ function make(parent, tag, attributes, text) {
   parent.appendChild(e);
   return e;
 }
-function axisOf(text) {
+function axisOf(text, names) {
   var f = text.split(" ");
   var a = { log: f[0] === "log", policy: f[1], lo: Number(f[2]), hi: Number(f[3]) };
   a.from = a.lo; a.to = a.hi;
+  a.names = names === undefined ? null : names.split("|").map(function (n) {
+    var at = n.indexOf("=");
+    return { value: Number(n.slice(0, at)), label: n.slice(at + 1) };
+  });
   return a;
+}
+function marksOf(a, length, spacing) {
+  if (!a.names) return ticks(a.log, a.policy, a.from, a.to, length, spacing);
+  return a.names.filter(function (n) { return n.value >= a.from && n.value <= a.to; });
 }
 function bend(axis, value) {
   if (value === null || value === undefined) return NaN;
@@ -24,7 +32,7 @@ function Plot(fig, svg, data, hidden, share) {
   this.readout.className = "readout plot"; this.readout.hidden = true;
   this.panels = Array.prototype.map.call(svg.querySelectorAll("g.panel"), function (g, i) {
     var a = g.dataset.area.split(" ").map(Number);
-    var p = { g: g, x: a[0], y: a[1], w: a[2], h: a[3], ax: axisOf(g.dataset.x), ay: axisOf(g.dataset.y), equal: !!g.dataset.equal,
+    var p = { g: g, x: a[0], y: a[1], w: a[2], h: a[3], ax: axisOf(g.dataset.x, g.dataset.namesX), ay: axisOf(g.dataset.y, g.dataset.namesY), equal: !!g.dataset.equal,
       labelled: !!g.dataset.labelled, data: data.panels[i], grid: g.querySelector(".grid"), tick: g.querySelector(".tick"),
       layer: g.querySelector(".data"), words: g.querySelectorAll(".word") };
     p.over = make(g, "g", { "class": "over" });
@@ -90,7 +98,7 @@ Plot.prototype.draw = function (p) {
   });
   p.grid.textContent = ""; p.tick.textContent = "";
   var free = -Infinity, self = this;
-  ticks(p.ax.log, p.ax.policy, p.ax.from, p.ax.to, p.w, 62).forEach(function (t) {
+  marksOf(p.ax, p.w, 62).forEach(function (t) {
     var at = self.column(p, bend(p.ax, t.value)), half = t.label ? t.label.length * 3.5 : 0;
     make(p.grid, "path", { d: "M" + at + " " + p.y + "v" + p.h, "class": t.label ? "" : "fine" });
     if (p.labelled && t.label && at - half > free) {
@@ -98,7 +106,7 @@ Plot.prototype.draw = function (p) {
       make(p.tick, "text", { x: at, y: p.y + p.h + 16, "text-anchor": "middle" }, t.label);
     }
   });
-  ticks(p.ay.log, p.ay.policy, p.ay.from, p.ay.to, p.h, 28).forEach(function (t) {
+  marksOf(p.ay, p.h, 28).forEach(function (t) {
     var at = self.row(p, bend(p.ay, t.value));
     make(p.grid, "path", { d: "M" + p.x + " " + at + "h" + p.w, "class": t.label ? "" : "fine" });
     if (t.label) make(p.tick, "text", { x: p.x - 6, y: at + 4, "text-anchor": "end" }, t.label);
