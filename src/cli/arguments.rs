@@ -331,6 +331,8 @@ pub(super) enum StudyName {
     Plants,
     /// The nine measured responses of a fast steering mirror
     Mirror,
+    /// Diagnoses of the cases in the folder --data, beside their answers
+    Mismatch,
     /// The motor bench with flexible coupling, measured
     Motor,
     /// The nine cases of the public HDD benchmark plant

@@ -19,6 +19,10 @@ use thiserror::Error;
 #[allow(missing_docs, reason = "each variant carries its own message")]
 pub enum StudyError {
     #[error(transparent)]
+    Diagnose(#[from] crate::diagnose::DiagnoseError),
+    #[error(transparent)]
+    Document(#[from] crate::document::DocumentError),
+    #[error(transparent)]
     Twin(#[from] TwinError),
     #[error(transparent)]
     Lti(#[from] LtiError),

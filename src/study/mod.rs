@@ -12,6 +12,7 @@ mod ladder;
 mod line;
 mod measured;
 mod mirror;
+mod mismatch;
 mod motor;
 mod plants;
 
@@ -23,6 +24,7 @@ pub use hdd::hdd;
 pub use ladder::ladder;
 pub use line::line_study;
 pub use mirror::mirror;
+pub use mismatch::mismatch;
 pub use motor::motor;
 pub use plants::plants;
 
