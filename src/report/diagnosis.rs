@@ -37,9 +37,14 @@ impl Shown<'_> {
         self.made.bench.scene.sample_time_s
     }
 
+    /// Whether the laws in the model are findings; otherwise they are only the nearest ones.
+    pub fn named(&self) -> bool {
+        self.made.diagnosis.verdict != Verdict::LocatedUnexplained
+    }
+
     /// Names of the three models: as given, refitted, with the findings.
     pub fn models(&self) -> [&'static str; 3] {
-        ["model as given", "linear refit", "with findings"]
+        ["model as given", "linear refit", if self.named() { "with findings" } else { "best model tried" }]
     }
 }
 
@@ -179,9 +184,14 @@ fn cards(s: &Shown) -> Vec<Card> {
         verdict: None,
     };
     vec![
-        card(format!("{what} rms, model as given"), f.rms_before, times(f.rms_before), None),
-        card("after a linear refit".into(), f.rms_refit_linear, times(f.rms_refit_linear), None),
-        card("with the findings".into(), f.rms_after, times(f.rms_after), Some(good)),
+        card(format!("{what} rms, as given"), f.rms_before, times(f.rms_before), None),
+        card("After a linear refit".into(), f.rms_refit_linear, times(f.rms_refit_linear), None),
+        card(
+            (if s.named() { "With the findings" } else { "Best model tried" }).into(),
+            f.rms_after,
+            times(f.rms_after),
+            Some(good),
+        ),
         card("Noise floor rms".into(), f.noise_floor, "one record".into(), None),
         share,
     ]
@@ -189,7 +199,7 @@ fn cards(s: &Shown) -> Vec<Card> {
 
 fn findings_section(s: &Shown) -> Result<Section, ReportError> {
     let d = &s.made.diagnosis;
-    let columns = ["Effect", "Part of the machine", "Law", "Not told apart from"].map(Column::words);
+    let columns = ["Effect", "Part of the machine", "Not told apart from"].map(Column::words);
     let chance = Column::words("Chance under noise alone");
     let mut list = Table::new("Findings, strongest first", columns.into_iter().chain([chance]).collect());
     let mut numbers = Table::new(
@@ -208,8 +218,7 @@ fn findings_section(s: &Shown) -> Result<Section, ReportError> {
         let port = port.as_ref().and_then(|v| v.as_str()).unwrap_or_default().to_owned();
         let others: Vec<String> = f.family.iter().filter(|n| **n != f.effect).map(|n| words(n)).collect();
         let others = if others.is_empty() { "nothing: told apart".to_owned() } else { others.join(", ") };
-        let law = facts(&f.effect).map_or("", |x| x.equation);
-        let p = if f.p_value < 1e-300 {
+        let p = if f.p_value <= 1.1e-300 {
             "below 1e\u{2212}300".into()
         } else {
             NumberFormat::Significant(2).page(f.p_value)
@@ -217,7 +226,6 @@ fn findings_section(s: &Shown) -> Result<Section, ReportError> {
         list.push(vec![
             words(&f.effect).as_str().into(),
             port.as_str().into(),
-            law.into(),
             others.as_str().into(),
             p.as_str().into(),
         ])?;
@@ -237,6 +245,11 @@ fn findings_section(s: &Shown) -> Result<Section, ReportError> {
         }
     }
     let mut blocks = vec![Block::Table(list)];
+    for f in &d.findings {
+        if let Some(x) = facts(&f.effect) {
+            blocks.push(Block::Prose(format!("Law of {}: {}", words(&f.effect), x.equation)));
+        }
+    }
     if !numbers.is_empty() {
         blocks.push(Block::Table(numbers));
     }
@@ -246,9 +259,12 @@ fn findings_section(s: &Shown) -> Result<Section, ReportError> {
 
 fn next_section(s: &Shown) -> Section {
     let next = &s.made.diagnosis.next_experiment;
-    let mut blocks = vec![Block::Prose(format!("{}.", capital(next.what.trim_end_matches('.'))))];
+    let mut blocks = vec![Block::Prose(format!("{}.", capital(next.what.replace('`', "").trim_end_matches('.'))))];
     if next.expected_separation > 0.0 {
-        let found = NumberFormat::Significant(3).page(next.expected_separation);
+        // Beyond a million the number only says that one of the two simulations runs away.
+        let sure = 1e6;
+        let found = NumberFormat::Significant(3).page(next.expected_separation.min(sure));
+        let found = if next.expected_separation > sure { format!("more than {found}") } else { found };
         blocks.push(Block::Prose(format!(
             "Expected separation: {found} (twice the difference of log-likelihood between the model found and its \
              strongest rival; above some 20 one record decides)."
@@ -273,10 +289,11 @@ fn fit_section(s: &Shown) -> Result<Section, ReportError> {
     {
         blocks.push(Block::Prose(format!(
             "Feedback hides errors. From the recorded command alone the error is {} {u} rms as given, {} after the linear \
-             refit and {} with the findings.",
+             refit and {} with the corrected model; there the noise alone makes {}.",
             short(open.rms_before),
             short(open.rms_refit_linear),
             short(open.rms_after),
+            short(open.noise_floor),
             u = s.position
         )));
     }

@@ -6,6 +6,7 @@
 use super::ReportError;
 use super::diagnosis::Shown;
 use super::figure::{Axis, Figure, Ink, Kind, Panel, Scale, Series};
+use super::number::typographic;
 use super::time::{CurveKind, TimeCurve, TimePanel, time};
 use crate::diagnose::Run;
 use crate::numeric::spectrum::forward;
@@ -39,7 +40,7 @@ pub(super) fn error_figure(s: &Shown) -> Result<Figure, ReportError> {
     ];
     let caption = "Recorded less simulated position. The lowest panel shows only what the best model leaves, beside the noise \
                    of one record.";
-    time(&format!("Before and after on `{}` ({})", run.name, role(run)), caption, &panels, None)
+    time(&format!("Before and after on {} ({})", run.name, role(run)), caption, &panels, None)
 }
 
 fn role(run: &Run) -> &'static str {
@@ -52,28 +53,33 @@ fn role(run: &Run) -> &'static str {
 /// Amplitude density of the error of the drawn record, three models and the noise.
 pub(super) fn spectrum_figure(s: &Shown) -> Result<Figure, ReportError> {
     let t = s.sample_time_s();
+    // Ticks read best near 1: the power of a thousand nearest the middle of the noise.
+    let level = s.made.bench.levels.sensor_rms * (2.0 * t).sqrt();
+    let power = if level > 0.0 { 3 * (level.log10() / 3.0).floor() as i32 } else { 0 };
+    let unit = 10f64.powi(power);
+    let words = if power == 0 { String::new() } else { format!("1e{power} ") };
+    let words = typographic(&words);
     let mut panel = Panel::new(
         Axis::frequency(),
-        Axis { scale: Scale::Log10, ..Axis::linear("Amplitude density", &format!("{}/\u{221a}Hz", s.position)) },
+        Axis { scale: Scale::Log10, ..Axis::linear("Amplitude density", &format!("{words}{}/\u{221a}Hz", s.position)) },
     );
     panel.height = 1.2;
     for (m, name) in s.models().into_iter().enumerate() {
-        let (hz, amplitude) = density(&[&s.made.errors[m][s.run]], t);
+        let (hz, amplitude) = density(&[&s.made.errors[m][s.run]], t, unit);
         if !hz.is_empty() {
             panel.marks.push(Series::new(name, INKS[m], Kind::Solid, &hz, &amplitude)?.into());
         }
     }
     let repeats = repeat_noise(&s.made.errors[2], &s.made.bench.runs);
     let views: Vec<&Vec<f64>> = repeats.iter().collect();
-    let (hz, amplitude) = density(&views, t);
+    let (hz, amplitude) = density(&views, t, unit);
     let (name, words) = if hz.is_empty() {
         ("sensor noise", "The floor is the sensor's white noise as estimated; there are no repeats to measure it.")
     } else {
         ("noise floor", "The floor is the spread of repeated records about their mean.")
     };
     let floor = if hz.is_empty() {
-        let level = s.made.bench.levels.sensor_rms * (2.0 * t).sqrt();
-        Series::new(name, Ink::Limit, Kind::Dashed, &[10.0, 0.5 / t], &[level, level])?
+        Series::new(name, Ink::Limit, Kind::Dashed, &[10.0, 0.5 / t], &[level / unit, level / unit])?
     } else {
         Series::new(name, Ink::Limit, Kind::Dashed, &hz, &amplitude)?
     };
@@ -100,9 +106,9 @@ fn repeat_noise(errors: &[Vec<f64>], runs: &[Run]) -> Vec<Vec<f64>> {
     out
 }
 
-/// One-sided amplitude density (unit/√Hz) of series, Hann-tapered, the power averaged over series and over bands of a
+/// One-sided amplitude density (over `unit`, per √Hz) of series, Hann-tapered, the power averaged over series and over bands of a
 /// thirtieth of a decade; series with values that are not finite are left out.
-fn density(series: &[&Vec<f64>], sample_time_s: f64) -> (Vec<f64>, Vec<f64>) {
+fn density(series: &[&Vec<f64>], sample_time_s: f64, unit: f64) -> (Vec<f64>, Vec<f64>) {
     let mut bins: Vec<(f64, f64)> = Vec::new();
     for x in series.iter().filter(|x| x.len() > 7 && x.iter().all(|v| v.is_finite())) {
         let n = x.len();
@@ -121,7 +127,7 @@ fn density(series: &[&Vec<f64>], sample_time_s: f64) -> (Vec<f64>, Vec<f64>) {
     for part in bins.chunk_by(|a, b| band(a.0) == band(b.0)) {
         let count = part.len() as f64;
         hz.push(part.iter().map(|b| b.0).sum::<f64>() / count);
-        amplitude.push((part.iter().map(|b| b.1).sum::<f64>() / count).sqrt());
+        amplitude.push((part.iter().map(|b| b.1).sum::<f64>() / count).sqrt() / unit);
     }
     (hz, amplitude)
 }
@@ -136,12 +142,12 @@ mod tests {
         let (t, rms) = (2e-5, 0.3);
         let mut random = Random::new(7);
         let x: Vec<f64> = (0..40_000).map(|_| rms * random.normal()).collect();
-        let (hz, amplitude) = density(&[&x], t);
+        let (hz, amplitude) = density(&[&x], t, 1.0);
         let expected = rms * (2.0 * t).sqrt();
         // Bands above 2.5 kHz average over 1e5 bins·decade/30: some hundred bins, so 5 sigma of the amplitude is below 25 %.
         for (f, a) in hz.iter().zip(&amplitude).filter(|(f, _)| **f > 2500.0) {
             assert!((a / expected - 1.0).abs() < 0.25, "{f} Hz: {a} beside {expected}");
         }
-        assert!(density(&[&vec![f64::INFINITY; 100]], t).0.is_empty());
+        assert!(density(&[&vec![f64::INFINITY; 100]], t, 1.0).0.is_empty());
     }
 }

@@ -54,7 +54,13 @@ fn against(name: &str) -> Against {
 }
 
 /// What an effect adds along a trajectory, strengths applied, at its place of entry.
-fn added(effect: &dyn Effect, inner: &[f64], strengths: &[f64], scene: &Scene, motion: &Trajectory) -> Vec<f64> {
+pub(super) fn added(
+    effect: &dyn Effect,
+    inner: &[f64],
+    strengths: &[f64],
+    scene: &Scene,
+    motion: &Trajectory,
+) -> Vec<f64> {
     let facts = effect.facts();
     let samples = &motion.samples;
     let mut law = effect.law(inner, scene);
@@ -71,7 +77,7 @@ fn added(effect: &dyn Effect, inner: &[f64], strengths: &[f64], scene: &Scene, m
 }
 
 /// Strengths of a chosen effect in one segment.
-fn own(c: &Chosen, segment: usize) -> &[f64] {
+pub(super) fn own(c: &Chosen, segment: usize) -> &[f64] {
     if c.effect.facts().per_record {
         c.setting.strengths.get(segment * c.effect.facts().columns..).unwrap_or(&[])
     } else {
@@ -169,13 +175,29 @@ fn law_figure(s: &Shown, c: &Chosen, segment: usize, value: &[f64]) -> Result<Fi
         panel.marks.push(RuleLine::horizontal(-noise, "", Ink::Limit));
     }
     let run = &bench.runs[bench.stack.segments[segment].runs[0]].name;
-    let caption = format!("{}. Along the motion of `{run}`, where it is strongest.", facts.equation);
-    Ok(Figure { title: format!("The law found: {name}"), caption, share_x: false, panels: vec![panel] })
+    let caption = format!("{}. Along the motion of {run}, where it is strongest.", facts.equation);
+    Ok(Figure {
+        title: format!("{}: {name}", if s.named() { "The law found" } else { "The nearest law" }),
+        caption,
+        share_x: false,
+        panels: vec![panel],
+    })
 }
 
 /// Effects that change stiffness and damping with the amplitude of the motion.
 const AMPLITUDE: [&str; 5] =
     ["pivot_friction", "coulomb_friction", "nonlinear_spring", "cable_spring", "aerodynamic_drag"];
+
+/// Acceleration per command, stiffness (1/s²) and viscous rate (1/s): x'' = b u - k x - c x'.
+fn numbers(plant: &Plant) -> [f64; 3] {
+    let [b, k, c] = match plant.body {
+        Body::SecondOrder { dc_gain, natural_frequency_rad_s: w, damping_ratio } => {
+            [dc_gain * w * w, w * w, 2.0 * damping_ratio * w]
+        }
+        Body::FreeInertia { acceleration_gain, viscous_rate_per_s } => [acceleration_gain, 0.0, viscous_rate_per_s],
+    };
+    [b * plant.resonance_gain, k, c]
+}
 
 /// Natural frequency (Hz) and damping ratio of the body with its torque effects at one amplitude (position_unit): the
 /// frequency at which the describing function's stiffness balances the inertia.
@@ -185,13 +207,7 @@ fn at_amplitude(
     scene: &Scene,
     amplitude: f64,
 ) -> Option<(f64, f64)> {
-    let (b, k, c) = match plant.body {
-        Body::SecondOrder { dc_gain, natural_frequency_rad_s: w, damping_ratio } => {
-            (dc_gain * w * w, w * w, 2.0 * damping_ratio * w)
-        }
-        Body::FreeInertia { acceleration_gain, viscous_rate_per_s } => (acceleration_gain, 0.0, viscous_rate_per_s),
-    };
-    let b = b * plant.resonance_gain;
+    let [b, k, c] = numbers(plant);
     let mut w = if k > 0.0 { k.sqrt() } else { TAU };
     for _ in 0..40 {
         let mut stiffness = k;
@@ -240,7 +256,7 @@ pub(super) fn amplitude_figure(s: &Shown) -> Result<Option<Figure>, ReportError>
         let mut panel = Panel::new(across(), Axis::linear(label, unit));
         panel.height = 0.75;
         let y: Vec<f64> = found.iter().map(|(_, (f, z))| if pick == 0 { *f } else { *z }).collect();
-        panel.marks.push(Series::new("with findings", Ink::Data(0), Kind::Solid, &x, &y)?.into());
+        panel.marks.push(Series::new(s.models()[2], Ink::Data(0), Kind::Solid, &x, &y)?.into());
         if let Body::SecondOrder { natural_frequency_rad_s: w, damping_ratio, .. } = s.made.refitted.body {
             let level = if pick == 0 { w / TAU } else { damping_ratio };
             let kind = Kind::Dashed;
@@ -260,43 +276,51 @@ pub(super) fn amplitude_figure(s: &Shown) -> Result<Option<Figure>, ReportError>
     Ok(Some(Figure { title, caption, share_x: true, panels }))
 }
 
-/// Torque beyond the given plant over time, beside the torque of the findings, on the record with most of it.
+/// Takes the mean out: a constant torque is a record's own offset.
+fn centred(mut x: Vec<f64>) -> Vec<f64> {
+    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+    x.iter_mut().for_each(|v| *v -= mean);
+    x
+}
+
+/// Torque beyond the linear part of the corrected model over time, beside the torque of its effects, on the record with most.
 pub(super) fn unexplained_figure(s: &Shown) -> Result<Option<Figure>, ReportError> {
     let bench = &s.made.bench;
-    let energy = |i: usize| bench.trajectories[i].unexplained.iter().map(|v| v * v).sum::<f64>();
-    let Some(i) = (0..bench.trajectories.len()).max_by(|&a, &b| energy(a).total_cmp(&energy(b))) else {
+    // The smoother worked with the scene's plant; the same motion under the corrected plant asks for another torque.
+    let ([b0, k0, c0], [b, k, c]) = (numbers(&bench.scene.plant), numbers(&s.made.corrected.plant));
+    let beyond = |i: usize| {
+        let motion = &bench.trajectories[i];
+        let torque = |(m, w): (&Sample, &f64)| (b0 * (m.i + w) - (k0 - k) * m.x - (c0 - c) * m.v) / b - m.i;
+        centred(motion.samples.iter().zip(&motion.unexplained).map(torque).collect())
+    };
+    let every: Vec<Vec<f64>> = (0..bench.trajectories.len()).map(beyond).collect();
+    let energy = |i: usize| every[i].iter().map(|v| v * v).sum::<f64>();
+    let Some(i) = (0..every.len()).max_by(|&a, &b| energy(a).total_cmp(&energy(b))) else {
         return Ok(None);
     };
     let motion = &bench.trajectories[i];
     let at: Vec<f64> = motion.samples.iter().map(|m| m.t).collect();
-    let mut found = vec![0.0; at.len()];
-    let torques: Vec<&Chosen> =
-        s.made.selection.model.chosen.iter().filter(|c| c.effect.facts().entry == Entry::Torque).collect();
-    for c in &torques {
-        let part = added(c.effect, &c.setting.inner, own(c, i), &bench.scene, motion);
-        found.iter_mut().zip(part).for_each(|(f, p)| *f += p);
+    // What the corrected plant carries, and what belongs to the record alone.
+    let lasting = s.made.corrected.effects.iter().map(|(e, x)| (*e, &x.inner, &x.strengths[..]));
+    let passing = s.made.selection.model.chosen.iter().filter(|c| c.effect.facts().per_record);
+    let passing = passing.map(|c| (c.effect, &c.setting.inner, own(c, i)));
+    let mut found: Option<Vec<f64>> = None;
+    for (effect, inner, strengths) in lasting.chain(passing).filter(|p| p.0.facts().entry == Entry::Torque) {
+        let part = added(effect, inner, strengths, &bench.scene, motion);
+        let sum = found.get_or_insert_with(|| vec![0.0; at.len()]);
+        sum.iter_mut().zip(part).for_each(|(f, p)| *f += p);
     }
-    let mut curves = vec![TimeCurve {
-        name: "torque beyond the linear plant",
-        time_s: &at,
-        value: &motion.unexplained,
-        ink: Ink::Muted,
-        kind: CurveKind::Line,
-    }];
-    if !torques.is_empty() {
-        let (name, ink) = ("torque of the findings", Ink::Data(0));
-        curves.push(TimeCurve { name, time_s: &at, value: &found, ink, kind: CurveKind::Line });
-    }
+    let found = found.map(centred);
+    let line = |name, value, ink| TimeCurve { name, time_s: &at, value, ink, kind: CurveKind::Line };
+    let mut curves = vec![line("torque beyond the linear plant", &every[i], Ink::Muted)];
+    curves.extend(found.as_ref().map(|f| line("torque of the laws in the model", f, Ink::Data(0))));
     let noise = bench.levels.torque_rms;
     let limits = [(noise, "torque noise (rms)"), (-noise, "")];
-    let panel = TimePanel {
-        quantity: "Torque",
-        unit: s.command,
-        curves: &curves,
-        limits: if noise > 0.0 { &limits } else { &[] },
-    };
+    let limits: &[(f64, &str)] = if noise > 0.0 { &limits } else { &[] };
+    let panel = TimePanel { quantity: "Torque", unit: s.command, curves: &curves, limits };
     let run = &bench.runs[bench.stack.segments[i].runs[0]].name;
-    let caption = "Estimated from the recorded motion by a smoother, in command units. It holds whatever the linear plant does \
-                   not account for: missing physics, noise, and numbers that are off.";
-    time(&format!("Torque that the linear plant does not explain, `{run}`"), caption, &[panel], None).map(Some)
+    let caption = "Estimated from the recorded motion by a smoother, in command units, each curve less its mean; the linear \
+                   plant is the corrected one. Where both curves agree, nothing is left to explain.";
+    let title = format!("Torque that the linear plant does not explain, {run}");
+    time(&title, caption, &[panel], None).map(Some)
 }

@@ -5,8 +5,11 @@
 
 use super::ReportError;
 use super::diagnosis::{Shown, words};
-use super::figure::{Axis, Figure, Ink, Kind, Panel, Region, RuleLine, Series};
+use super::diagnosis_law::{added, own};
+use super::figure::{Axis, Figure, Ink, Kind, Mark, Panel, Region, Series};
 use crate::diagnose::Finding;
+use crate::lti::{DiscretePlant, PlantState};
+use crate::physics::Entry;
 
 /// Windows of a record, as where the findings are located.
 const WINDOWS: usize = 48;
@@ -42,13 +45,34 @@ fn rms(x: &[f64]) -> f64 {
     (x.iter().map(|v| v * v).sum::<f64>() / x.len().max(1) as f64).sqrt()
 }
 
-/// The strongest segment among those a finding names; its intervals of time belong there.
-pub(super) fn strongest(s: &Shown, order: &[usize], f: &Finding) -> Option<usize> {
+/// The segment that shows a finding most, which its intervals of time belong to: by what its law adds to the position, whitened;
+/// by the error itself where there is no law.
+fn strongest(s: &Shown, map: &Map, f: &Finding) -> Option<usize> {
     let bench = &s.made.bench;
-    let named = |g: usize| {
-        bench.stack.segments[g].runs.iter().any(|&r| f.place.records.iter().any(|n| *n == bench.runs[r].name))
+    let chosen = &s.made.selection.model.chosen;
+    let Some(c) = chosen.iter().find(|c| f.family.iter().any(|n| n == c.effect.facts().name)) else {
+        return map.order.first().copied();
     };
-    order.iter().copied().find(|&g| named(g))
+    let sampled = DiscretePlant::of(&bench.scene.plant, s.sample_time_s()).ok()?;
+    let mut signal = bench.stack.series(|i| {
+        let mut y = added(c.effect, &c.setting.inner, own(c, i), &bench.scene, &bench.trajectories[i]);
+        if c.effect.facts().entry != Entry::Position {
+            let mut state = PlantState::at_rest(&sampled);
+            for v in &mut y {
+                let u = std::mem::replace(v, state.position());
+                state.command(u);
+                state.advance(&sampled);
+            }
+        }
+        bench.whitener.apply(&mut y);
+        y
+    });
+    bench.fit(Vec::new()).local_basis().project(&mut signal);
+    let energy = |g: usize| {
+        let part = &bench.stack.segments[g];
+        signal[part.start..part.start + part.len].iter().map(|v| v * v).sum::<f64>()
+    };
+    (0..bench.stack.segments.len()).max_by(|&a, &b| energy(a).total_cmp(&energy(b)))
 }
 
 /// Name of a segment: its record, and how many repeats stand together.
@@ -64,6 +88,7 @@ pub(super) fn time_map(s: &Shown, map: &Map) -> Result<Figure, ReportError> {
     let shown = &map.order[..map.order.len().min(RECORDS)];
     let longest = shown.iter().map(|&g| map.errors[g].len()).max().unwrap_or(0) as f64 * t;
     let (scale, unit) = if longest < 1.0 { (1e3, "ms") } else { (1.0, "s") };
+    let home: Vec<Option<usize>> = s.made.diagnosis.findings.iter().map(|f| strongest(s, map, f)).collect();
     let mut panels = Vec::new();
     for (i, &g) in shown.iter().enumerate() {
         let error = &map.errors[g];
@@ -73,7 +98,7 @@ pub(super) fn time_map(s: &Shown, map: &Map) -> Result<Figure, ReportError> {
         let mut panel = Panel::new(Axis::linear("Time", unit), Axis::linear("Error", "noise rms"));
         panel.height = 0.55;
         panel.x.range = Some((0.0, longest * scale));
-        for f in s.made.diagnosis.findings.iter().filter(|f| strongest(s, &map.order, f) == Some(g)) {
+        for (f, _) in s.made.diagnosis.findings.iter().zip(&home).filter(|(_, h)| **h == Some(g)) {
             for (k, [from, to]) in f.place.time_s.iter().enumerate() {
                 let label = if k == 0 { words(&f.effect) } else { String::new() };
                 panel.marks.push(Region::of_x(from * scale, to * scale, &label, Ink::Data(4)));
@@ -81,13 +106,18 @@ pub(super) fn time_map(s: &Shown, map: &Map) -> Result<Figure, ReportError> {
         }
         let kind = Kind::Bars { from: 0.0, to: 0.92 * width as f64 * t * scale };
         panel.marks.push(Series::new(&name(s, g), Ink::Data((i % 6) as u8), kind, &at, &height)?.into());
-        panel.marks.push(RuleLine::horizontal(1.0, if i == 0 { "noise alone" } else { "" }, Ink::Limit));
+        panel.marks.push(noise_line(0.0, longest * scale)?);
         panels.push(panel);
     }
     level(&mut panels);
     let caption = "What the linear refit leaves, rms in each window, in units of the noise. Records with most error first; \
                    shaded: the windows that hold nine tenths of a finding, in the record that shows it most.";
     Ok(Figure { title: "Error by record and time".into(), caption: caption.into(), share_x: true, panels })
+}
+
+/// Noise alone; a curve with a name in the legend, since words on bars are hard to read.
+fn noise_line(from: f64, to: f64) -> Result<Mark, ReportError> {
+    Ok(Series::new("noise alone", Ink::Limit, Kind::Dashed, &[from, to], &[1.0, 1.0])?.into())
 }
 
 /// One scale for all panels, so that bars compare.
@@ -126,7 +156,7 @@ pub(super) fn zone_map(s: &Shown, map: &Map) -> Result<Figure, ReportError> {
         let height: Vec<f64> = sums[d].iter().map(bar).collect();
         panel.marks.push(Series::new(label, ink, kind, &at, &height)?.into());
     }
-    panel.marks.push(RuleLine::horizontal(1.0, "noise alone", Ink::Limit));
+    panel.marks.push(noise_line(low, high)?);
     let mut panels = vec![panel];
     level(&mut panels);
     let caption = "The same error over all fit records, by position and direction of motion; shaded: the zone that holds nine \

@@ -58,15 +58,14 @@ pub(super) fn records_table(s: &Shown) -> Result<Table, ReportError> {
     let d = &s.made.diagnosis;
     let number = |name: &str| Column::numbers(name, s.position, COMPARED);
     let mut table = Table::new(
-        "Record by record: error rms under the three models",
+        &format!("Record by record: error rms under the three models; noise floor {} {}", short(s.floor()), s.position),
         vec![
             Column::words("Record"),
             Column::words("Used for"),
             number("Largest motion"),
             number("Model as given"),
             number("Linear refit"),
-            number("With findings"),
-            number("Noise floor"),
+            number(s.models()[2]),
         ],
     );
     let floor = s.floor();
@@ -75,12 +74,11 @@ pub(super) fn records_table(s: &Shown) -> Result<Table, ReportError> {
         let after = Cell::from(r.rms_after);
         table.push(vec![
             r.record.as_str().into(),
-            (if r.role == "fit" { "fit" } else { "hold-out" }).into(),
+            (if r.role == "fit" { "fit" } else { "hold\u{2011}out" }).into(),
             r.amplitude.into(),
             r.rms_before.into(),
             r.rms_refit_linear.into(),
             if good { after } else { after.flagged(Badge::Warn, "above the noise") },
-            floor.into(),
         ])?;
     }
     Ok(table)
