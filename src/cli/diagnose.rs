@@ -2,15 +2,31 @@
 
 use super::diagnose_arguments::DiagnoseArguments;
 use super::{Ending, Failure, Screen, load};
-use crate::diagnose::{DiagnoseSettings, Diagnosed, Verdict, diagnose};
+use crate::diagnose::{DiagnoseSettings, Verdict, diagnose};
 use crate::document::write_text;
 use crate::lti::PlantFile;
 use crate::recording::{Case, Record, RecordEntry, Role};
+use crate::report::diagnosis::diagnosis_page;
 use std::fmt::Write;
 use std::path::PathBuf;
 
 /// The file of the corrected model, in the output folder.
 const CORRECTED: &str = "plant_corrected.toml";
+/// The page for people, beside it.
+const REPORT: &str = "report.html";
+
+/// What the report was made from.
+fn provenance(case: &Case) -> Vec<(String, String)> {
+    let name = |p: &PathBuf| p.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let mut rows = vec![
+        ("program".to_owned(), format!("servotune {}", env!("CARGO_PKG_VERSION"))),
+        ("plant".to_owned(), name(&case.plant)),
+    ];
+    rows.extend(case.controller.iter().map(|c| ("controller".to_owned(), name(c))));
+    let records: Vec<String> = case.records.iter().map(|(e, _)| e.name()).collect();
+    rows.push(("records".to_owned(), records.join(", ")));
+    rows
+}
 
 fn case(a: &DiagnoseArguments) -> Result<Case, Failure> {
     if let Some(folder) = &a.case {
@@ -50,15 +66,19 @@ pub(super) fn run(a: &DiagnoseArguments, screen: &mut Screen) -> Result<Ending, 
     let case = case(a)?;
     let plant = load::plant(&case.plant)?;
     let controller = case.controller.as_ref().map(|f| load::controller(f)).transpose()?;
-    let made = diagnose(&case, &plant, controller.as_ref(), &DiagnoseSettings::default(), |m| {
+    let mut made = diagnose(&case, &plant, controller.as_ref(), &DiagnoseSettings::default(), |m| {
         screen.say(&format!("{}: {m}", case.id))
     })?;
-    let Diagnosed { mut diagnosis, corrected, .. } = made;
-    if !matches!(diagnosis.verdict, Verdict::NoMismatch | Verdict::DataFault) {
-        let text = toml::to_string(&PlantFile::from(&corrected.plant)).map_err(|source| Failure::Toml { source })?;
+    if !matches!(made.diagnosis.verdict, Verdict::NoMismatch | Verdict::DataFault) {
+        let text =
+            toml::to_string(&PlantFile::from(&made.corrected.plant)).map_err(|source| Failure::Toml { source })?;
         write_text(&a.out.join(CORRECTED), &text)?;
-        diagnosis.corrected_model = Some(CORRECTED.into());
+        made.diagnosis.corrected_model = Some(CORRECTED.into());
     }
+    screen.say(&format!("{}: drawing the report", case.id));
+    let page = diagnosis_page(&made, provenance(&case))?;
+    write_text(&a.out.join(REPORT), &page.html())?;
+    let diagnosis = made.diagnosis;
     let json = serde_json::to_string_pretty(&diagnosis).map_err(|source| Failure::Json { source })?;
     write_text(&a.out.join("diagnosis.json"), &format!("{json}\n"))?;
     let mut text = format!(

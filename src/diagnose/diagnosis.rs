@@ -242,11 +242,9 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
             d.verdict = Verdict::LocatedUnexplained;
             d.findings.push(super::name::unexplained(bench, selection, explained));
         }
-    } else if !clean {
-        if d.findings.is_empty() {
-            d.verdict = Verdict::LocatedUnexplained;
-            d.findings.push(super::name::unexplained(bench, selection, 0.0));
-        }
+    } else if !clean && d.findings.is_empty() {
+        d.verdict = Verdict::LocatedUnexplained;
+        d.findings.push(super::name::unexplained(bench, selection, 0.0));
     }
     linear_story(d, bench, selection);
     if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)

@@ -257,7 +257,7 @@ pub fn quantum(y: &[f64]) -> Option<f64> {
     // The grid's step divides every difference; printed decimals make a grid too, a power of ten fine.
     let on_grid = values.windows(2).all(|w| {
         let steps = (w[1] - w[0]) / smallest;
-        (steps - steps.round()).abs() < 0.02 * steps.max(1.0).min(5.0)
+        (steps - steps.round()).abs() < 0.02 * steps.clamp(1.0, 5.0)
     });
     let decimal = (smallest.log10() - smallest.log10().round()).abs() < 1e-3;
     (on_grid && !(decimal && span / smallest > 1e4)).then_some(smallest)

@@ -128,9 +128,10 @@ pub fn floor(series: &[Vec<f64>], runs: &[&Run]) -> Option<f64> {
             continue;
         }
         let r = group.len() as f64;
-        for k in 0..run.len() {
-            let mean = group.iter().map(|&j| series[j][k]).sum::<f64>() / r;
-            sum += group.iter().map(|&j| (series[j][k] - mean).powi(2)).sum::<f64>();
+        for k in 0..series[i].len() {
+            let at = |j: &usize| series[*j][k];
+            let mean = group.iter().map(at).sum::<f64>() / r;
+            sum += group.iter().map(|j| (at(j) - mean).powi(2)).sum::<f64>();
             n += r - 1.0;
         }
     }

@@ -17,6 +17,15 @@ const FAMILY: f64 = 20.0;
 /// The same as a share of what the effect explains: laws differ from any machine by more than noise.
 const FAMILY_SHARE: f64 = 0.01;
 
+/// Sliding length over the sensor's noise below which friction counts as dry.
+const DRY: f64 = 12.0;
+
+/// Whether two names are the two ends of one law, told apart by the sliding length alone.
+fn same_drag(a: &str, b: &str) -> bool {
+    let drag = ["pivot_friction", "coulomb_friction"];
+    drag.contains(&a) && drag.contains(&b)
+}
+
 fn text_of(name: &str) -> (&'static str, crate::physics::Port) {
     facts(name).map_or(("something that the model does not hold", crate::physics::Port::Torque), |f| (f.says, f.port))
 }
@@ -43,13 +52,20 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, step: &Step, index: 
         |hz: f64| bench.scene.spindle_hz.is_some_and(|s| ((hz / s).round() - hz / s).abs() < 0.004 && hz > 0.9 * s);
     let own = c.effect.facts().name;
     // A line at a multiple of the spindle is run-out, whichever law carried it.
-    let name = if own == "line_disturbance" && spindle(chosen.setting.inner[0]) { "repeatable_runout" } else { own };
+    let inner = &chosen.setting.inner;
+    let name = match own {
+        "line_disturbance" if spindle(inner[0]) => "repeatable_runout",
+        // A pre-sliding length that the sensor's noise covers is no pre-sliding: the drag is dry.
+        "pivot_friction" if inner[0] < DRY * bench.scene.noise => "coulomb_friction",
+        _ => own,
+    };
     let mut family = vec![name.to_owned()];
     for (j, other) in &step.tried {
         let rival = step.candidates[*j].effect.facts().name;
         if other.cost - model.cost < FAMILY.max(FAMILY_SHARE * gain * 0.1)
             && !family.iter().any(|f| f == rival)
             && rival != own
+            && !same_drag(rival, name)
         {
             family.push(rival.to_owned());
         }

@@ -123,7 +123,12 @@ pub fn select(
             let name = c.effect.facts().name;
             let seen = worth.iter().filter(|&&j| step.candidates[j].effect.facts().name == name).count();
             let leads = worth.first().is_none_or(|&j| step.candidates[j].effect.facts().name == name);
-            let new = model.chosen.iter().all(|m| m.effect.facts().name != name || again(name, &m.setting, &c.setting));
+            let new = model.chosen.iter().all(|m| {
+                let other = m.effect.facts().name;
+                let drag = ["pivot_friction", "coulomb_friction"];
+                !(drag.contains(&name) && drag.contains(&other))
+                    && (other != name || again(name, &m.setting, &c.setting))
+            });
             if new
                 && c.log_p_value(library.len()) < limit
                 && c.concealed < 0.9995

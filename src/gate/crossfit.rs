@@ -30,6 +30,9 @@ pub struct Fold {
 /// Share of the rows outside a fold that choose its epoch.
 const CHOOSE: f64 = 0.2;
 
+/// Folds, their judges, and the words on each row.
+type Crossfitted = (Vec<Fold>, Vec<Member>, Vec<Said>);
+
 /// Folds, their judges, and what the judge of a row's fold says of it, in the order of `rows`.
 pub(super) fn crossfit(
     table: &Table,
@@ -39,7 +42,7 @@ pub(super) fn crossfit(
     fold: &[usize],
     hidden: &[usize],
     settings: &TrainSettings,
-) -> Result<(Vec<Fold>, Vec<Member>, Vec<Said>), GateError> {
+) -> Result<Crossfitted, GateError> {
     let one = |f: usize| -> Result<(Fold, Member, Vec<Said>), GateError> {
         let pick = |inside: bool| {
             rows.iter().zip(fold).filter(|(_, k)| (**k == f) == inside).map(|(r, _)| *r).collect::<Vec<usize>>()

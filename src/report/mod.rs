@@ -4,6 +4,10 @@
 //! a page, [`page::Page`] as one HTML file that needs nothing else. Convention: every number has its unit beside it;
 //! every text from outside is escaped. Spec: `specs/report.md`.
 
+mod diagnosis_error;
+mod diagnosis_law;
+mod diagnosis_place;
+mod diagnosis_tables;
 mod error;
 mod extent;
 mod html;
@@ -17,6 +21,7 @@ pub mod bode;
 pub mod boxplot;
 pub mod confusion;
 pub mod curve;
+pub mod diagnosis;
 pub mod figure;
 pub mod histogram;
 pub mod identified;

@@ -43,7 +43,9 @@ fn agrees(d: &Diagnosis, answer: &[String]) -> bool {
     match first {
         "none" => matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit),
         "linear_parameters" => d.verdict == Verdict::Refit,
-        "misalignment" | "lost_samples" | "time_base_drift" => d.verdict == Verdict::DataFault && names.contains(&first),
+        "misalignment" | "lost_samples" | "time_base_drift" => {
+            d.verdict == Verdict::DataFault && names.contains(&first)
+        }
         other if other.starts_with("unexplained") => {
             matches!(d.verdict, Verdict::LocatedUnexplained | Verdict::Undecidable)
         }
@@ -83,8 +85,7 @@ pub fn mismatch(folder: &Path) -> Result<Study, StudyError> {
 
 fn row(d: &Diagnosis, folder: &Path) -> Result<Row, StudyError> {
     let file = folder.join("answers").join(format!("{}.json", d.id));
-    let answer: Option<Answer> =
-        if file.is_file() { Some(serde_json::from_str(&read_text(&file)?)?) } else { None };
+    let answer: Option<Answer> = if file.is_file() { Some(serde_json::from_str(&read_text(&file)?)?) } else { None };
     let mut parameters = Vec::new();
     for (effect, values) in answer.iter().flat_map(|a| &a.answer) {
         for (name, truth) in values {
