@@ -128,12 +128,13 @@ pub fn floor(series: &[Vec<f64>], runs: &[&Run]) -> Option<f64> {
             continue;
         }
         let r = group.len() as f64;
-        for k in 0..series[i].len() {
-            let at = |j: &usize| series[*j][k];
-            let mean = group.iter().map(at).sum::<f64>() / r;
-            sum += group.iter().map(|j| (at(j) - mean).powi(2)).sum::<f64>();
-            n += r - 1.0;
-        }
+        let members: Vec<&[f64]> = group.iter().map(|&j| &series[j][..]).collect();
+        let spread = |k: usize| {
+            let mean = members.iter().map(|m| m[k]).sum::<f64>() / r;
+            members.iter().map(|m| (m[k] - mean).powi(2)).sum::<f64>()
+        };
+        sum += (0..run.len()).map(spread).sum::<f64>();
+        n += run.len() as f64 * (r - 1.0);
     }
     (n > 0.0 && f64::is_finite(sum)).then(|| (sum / n).sqrt())
 }
