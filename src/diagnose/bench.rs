@@ -5,7 +5,7 @@ use super::linear::{Carrier, LinearForm, Sampled};
 use super::refit::{Chosen, Fit, simulation_error};
 use super::run::{Run, mean_run};
 use super::stack::Stack;
-use super::trajectory::{Smoother, Trajectory};
+use super::trajectory::{Smoother, Trajectory, acting};
 use super::whiten::{NoiseLevels, Whitener};
 use crate::lti::{LtiError, Plant};
 use crate::physics::{Entry, Port, Scene};
@@ -178,7 +178,7 @@ impl Bench {
             for c in chosen {
                 let facts = c.effect.facts();
                 let sensed = facts.entry == Entry::Position && matches!(facts.port, Port::Sensor | Port::Disk);
-                if !sensed && facts.entry != Entry::Torque {
+                if !sensed && facts.entry == Entry::Position {
                     continue;
                 }
                 let raw = raw_columns(c.effect, &c.setting.inner, &self.scene, motion);
@@ -187,6 +187,9 @@ impl Bench {
                     false => &c.setting.strengths[..],
                 };
                 for (column, s) in raw.iter().zip(own) {
+                    // A command reaches the arm late, like the one it is added to.
+                    let late = (facts.entry == Entry::Command).then(|| acting(&sampled.delayed, column));
+                    let column = late.as_ref().unwrap_or(column);
                     if sensed {
                         run.position.iter_mut().zip(column).for_each(|(y, v)| *y -= s * v);
                     } else {

@@ -66,6 +66,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, step: &Step, index: 
             && !family.iter().any(|f| f == rival)
             && rival != own
             && !same_drag(rival, name)
+            && !(name == "repeatable_runout" && rival == "line_disturbance" && bench.scene.spindle_hz.is_some())
         {
             family.push(rival.to_owned());
         }

@@ -2,9 +2,9 @@
 //!
 //! Dahl's law (P. Dahl, Aerospace Corp. TOR-0158, 1968): dz/dx = (1 - sgn(dx) z)/x_s with z = friction torque over its sliding
 //! level; exact over a step: z1 = s - (s - z0) exp(-|dx|/x_s), s = sgn(dx). Maxwell-slip form (Al-Bender, Lampaert, Swevers
-//! 2005): a row of spring-slider elements with evenly spread yield lengths up to x_s, whose first loading is the parabola
-//! z = 2 d/x_s - (d/x_s)². The inner parameter `shape` chooses: 0 Dahl, 1 Maxwell slip with that parabola, 2 Maxwell slip with
-//! Dahl's first loading 1 - exp(-d/x_s).
+//! 2005): a row of spring-slider elements with evenly spread yield lengths up to 2 x_s, whose first loading is the parabola
+//! z = d/x_s - (d/x_s)²/4. In every shape x_s is the sliding level over the first stiffness. The inner parameter `shape`
+//! chooses: 0 Dahl, 1 Maxwell slip with that parabola, 2 Maxwell slip with Dahl's first loading 1 - exp(-d/x_s).
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene, logarithmic};
@@ -19,7 +19,7 @@ static FACTS: Facts = Facts {
     columns: 1,
     fixed: false,
     per_record: false,
-    equation: "tau = -F z, dz/dx = (1 - sgn(dx) z)/x_s (Dahl) or a row of Maxwell-slip elements up to x_s",
+    equation: "tau = -F z, dz/dx = (1 - sgn(dx) z)/x_s (Dahl) or a row of Maxwell-slip elements up to 2 x_s",
     says: "the arm behaves like a bearing that sticks: after each reversal it first acts as a spring, then slides at a constant drag",
     confused_with: &["coulomb_friction", "cable_spring", "nonlinear_spring", "linear_parameters"],
     experiment: "the same multisine at three amplitudes over a decade, and a slow triangle with small nested reversals",
@@ -99,9 +99,9 @@ impl Law for MaxwellSlip {
     }
 }
 
-/// First loading of evenly spread yield lengths.
+/// First loading of evenly spread yield lengths; all slide at two sliding lengths.
 fn parabola(d: f64) -> f64 {
-    if d < 1.0 { d * (2.0 - d) } else { 1.0 }
+    if d < 2.0 { d * (1.0 - 0.25 * d) } else { 1.0 }
 }
 
 /// First loading of Dahl's law.
@@ -125,7 +125,7 @@ impl Effect for PivotFriction {
         if inner[1] < 0.5 {
             Box::new(Dahl { length: inner[0], z: 0.0 })
         } else {
-            let (curve, end): (fn(f64) -> f64, f64) = if inner[1] < 1.5 { (parabola, 1.0) } else { (exponential, 6.0) };
+            let (curve, end): (fn(f64) -> f64, f64) = if inner[1] < 1.5 { (parabola, 2.0) } else { (exponential, 6.0) };
             Box::new(MaxwellSlip::of(curve, end, inner[0]))
         }
     }

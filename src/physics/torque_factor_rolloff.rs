@@ -52,7 +52,8 @@ impl Effect for TorqueFactorRolloff {
     }
 
     fn law(&self, _inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        Box::new(Rolloff { travel: scene.travel })
+        // The magnet's zones are told by the position as recorded.
+        Box::new(Rolloff { travel: scene.travel * scene.arm_over_record() })
     }
 
     fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {
