@@ -254,7 +254,7 @@ pub fn add(name: &str, q: f64, u: &[f64; 8], ts: f64, t: &mut Truth) -> Fact {
             vec![("amplitude", p.scale_amplitude, 1, 0), ("period", p.scale_period, 1, 0)]
         }
         "quantisation" => {
-            p.quantum = grow(q, 3e-4, 0.06);
+            p.quantum = grow(q, 1e-4, 0.06);
             vec![("step", p.quantum, 1, 0)]
         }
         "encoder_noise" => {
@@ -273,7 +273,10 @@ pub fn add(name: &str, q: f64, u: &[f64; 8], ts: f64, t: &mut Truth) -> Fact {
             let gap = grow(q, 2e-5, 0.08);
             let wp = TAU * at(0, 500.0, (0.35 / ts).min(4800.0));
             let zp = at(1, 0.008, 0.04);
-            t.plant.modes.push(Mode { wz: wp * (1.0 + sign(2) * gap), zz: zp, wp, zp });
+            let wz = wp * (1.0 + sign(2) * gap);
+            t.plant.modes.push(Mode { wz, zz: zp, wp, zp });
+            // The plant below the mode stays as it is.
+            t.plant.gain *= (wp / wz).powi(2);
             let f = wp / TAU;
             place = json!({"frequency_hz": [[f * (1.0 - 3.0 * zp - gap), f * (1.0 + 3.0 * zp + gap)]]});
             vec![("frequency_hz", f, 0, 0), ("damping_ratio", zp, 0, 0)]
@@ -293,7 +296,7 @@ pub fn add(name: &str, q: f64, u: &[f64; 8], ts: f64, t: &mut Truth) -> Fact {
             vec![("frequency_hz", f, 0, 0), ("growth", p.damp_growth, -1, 0)]
         }
         "backlash" => {
-            p.play = grow(q, 3e-4, 0.15);
+            p.play = grow(q, 2e-5, 0.15);
             vec![("gap", p.play, 1, 0)]
         }
         "base_mode" => {

@@ -175,7 +175,8 @@ fn vary(plant: &Plant, theta: &[f64]) -> Plant {
 }
 
 /// Linear model fitted to records by damped Gauss-Newton on the simulation error, with weak priors on the modes.
-pub fn absorb(start: &Plant, recs: &[Recorded], noise: Noise, ts: f64, rounds: usize) -> Option<Plant> {
+/// `rigid`: only the spring and the damping are fitted.
+pub fn absorb(start: &Plant, recs: &[Recorded], noise: Noise, ts: f64, rounds: usize, rigid: bool) -> Option<Plant> {
     let n = 4 + 4 * start.modes.len();
     let prior: Vec<f64> =
         (0..n).map(|i| if i < 3 { 1.0 } else if i == 3 { 0.3 } else if (i - 4) % 4 < 2 { 0.02 } else { 0.3 }).collect();
@@ -200,7 +201,7 @@ pub fn absorb(start: &Plant, recs: &[Recorded], noise: Noise, ts: f64, rounds: u
     for _ in 0..rounds {
         let mut columns = Vec::with_capacity(n);
         for i in 0..n {
-            if start.k == 0.0 && i == 1 {
+            if start.k == 0.0 && i == 1 || rigid && i != 1 && i != 2 {
                 columns.push((0..e.len()).map(|j| if j == e.len() - n + i { 1.0 } else { 0.0 }).collect());
                 continue;
             }

@@ -17,6 +17,7 @@ mod outside;
 mod physics;
 mod random;
 mod set;
+mod showcase;
 mod world;
 mod write;
 

@@ -278,9 +278,13 @@ pub fn make(order: &Order, out: &Path, attempt: u64) -> Option<Value> {
         let multisines: Vec<usize> =
             (0..all.len()).filter(|&i| stage.plans[i].group.starts_with("multisine") && !stage.plans[i].holdout).collect();
         let one = *r.pick(&multisines);
-        given = absorb(&stage.plant, &recs[one..=one], stage.noise, stage.ts, 6)?;
+        given = absorb(&stage.plant, &recs[one..=one], stage.noise, stage.ts, 6, false)?;
     }
     let seen = visibility(&stage, &given, &recs)?;
+    if facts.is_empty() {
+        let (projected, raw, _) = stage.lambda(&truth)?;
+        lambdas.insert("numerical".into(), json!({"projected": projected, "raw": raw}));
+    }
     write::case(order, out, &stage, &given, &recs, &scale, &mut r).ok()?;
     let names: Vec<&str> = match order.kind {
         "null" => vec!["none"],

@@ -2,6 +2,7 @@
 
 use crate::effects::{FAULTS, OUTSIDE, PAIRS, SINGLES};
 use crate::make::{Order, make as make_case};
+use crate::showcase;
 use crate::random::Random;
 use rayon::prelude::*;
 use serde_json::json;
@@ -72,6 +73,14 @@ fn power(seed: u64) -> Vec<Order> {
     list
 }
 
+fn p58(seed: u64, count: usize) -> Vec<Order> {
+    let mut r = Random::new(seed, 2);
+    let order = |id: String, kind, seed| Order { id, seed, kind, effects: vec![], lambda: 0.0, absorbed: true, plain: true, strength: None };
+    let mut list: Vec<Order> = (1..=count).map(|i| order(format!("P58_{i}"), "p58", r.bits())).collect();
+    list.extend((1..=count).map(|i| order(format!("P58_null_{i}"), "p58_null", r.bits())));
+    list
+}
+
 pub fn make(out: &Path, seed: u64, set: &str, count: Option<usize>) -> Result<(), String> {
     let cases = out.to_path_buf();
     let answers = out.join("answers");
@@ -79,6 +88,7 @@ pub fn make(out: &Path, seed: u64, set: &str, count: Option<usize>) -> Result<()
     let orders = match set {
         "benchmark" => benchmark(seed, count.unwrap_or(COUNT)),
         "power" => power(seed),
+        "p58" => p58(seed, count.unwrap_or(2)),
         other => return Err(format!("unknown set {other}: benchmark, power or p58")),
     };
     let began = std::time::Instant::now();
@@ -89,7 +99,11 @@ pub fn make(out: &Path, seed: u64, set: &str, count: Option<usize>) -> Result<()
                 // An effect that a machine can not show at the strength asked for gets less of it, then another machine.
                 let mut order = order.clone();
                 order.lambda /= 1.6f64.powi(attempt - 1);
-                if let Some(answer) = make_case(&order, &cases, attempt as u64) {
+                let answer = match order.kind {
+                    "p58" | "p58_null" => showcase::make(&order, order.kind == "p58_null", &cases, attempt as u64),
+                    _ => make_case(&order, &cases, attempt as u64),
+                };
+                if let Some(answer) = answer {
                     let file = answers.join(format!("{}.json", order.id));
                     let text = serde_json::to_string_pretty(&answer).map_err(|e| e.to_string())?;
                     return std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()));

@@ -117,7 +117,10 @@ pub fn run(plant: &Plant, p: &Physics, law: Option<&Law>, d: &Drive, noise: Nois
     };
     let segments = [segment(part), segment(dt - part)];
     let b = plant.b * plant.gain;
-    let u0 = plant.k * d.start / b;
+    // The reading, not the arm, rests at the start: monic modes have a static gain of their own.
+    let full: f64 = plant.modes.iter().map(|m| (m.wz / m.wp).powi(2)).product();
+    let rest = d.start / full;
+    let u0 = plant.k * rest / b;
     let mut law_now = law.cloned();
     if let Some(l) = &mut law_now {
         l.kp *= 1.0 + p.law_gain;
@@ -129,7 +132,7 @@ pub fn run(plant: &Plant, p: &Physics, law: Option<&Law>, d: &Drive, noise: Nois
     let mut running = law_now.as_ref().map(|l| Running::new(l, u0, d.seed % 3 == 0));
     let n = d.reference.len();
     let mut past = vec![u0; whole + 2];
-    let (mut x, mut v) = (d.start, 0.0f64);
+    let (mut x, mut v) = (rest, 0.0f64);
     let mut slip = vec![0.0f64; p.slip.k.len()];
     let (mut slip_force, mut tip) = (0.0f64, x);
     let mut modes: Vec<[f64; 2]> = Vec::new();
@@ -144,7 +147,6 @@ pub fn run(plant: &Plant, p: &Physics, law: Option<&Law>, d: &Drive, noise: Nois
         .iter()
         .map(|m| [(m.wz * m.wz - m.wp * m.wp) / (m.wp * m.wp), (2.0 * m.zz * m.wz - 2.0 * m.zp * m.wp) / m.wp])
         .collect();
-    let full = dc[plant.modes.len()];
     let (mut amp, mut slewed) = (u0, u0);
     let (mut sensor, mut base, mut base_v) = (x * full, 0.0f64, 0.0f64);
     let (mut creep, mut bias, mut turn) = (x, 0.0, x);
