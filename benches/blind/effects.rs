@@ -384,7 +384,7 @@ pub fn add(name: &str, q: f64, u: &[f64; 8], ts: f64, t: &mut Truth) -> Fact {
 /// Adds an effect that the library does not hold.
 pub fn add_outside(kind: Outside, q: f64, u: &[f64; 8], t: &mut Truth) -> Fact {
     t.physics.outside = kind;
-    t.physics.outside_level = grow(q, 1e-5, 0.08);
+    t.physics.outside_level = grow(q, 1e-7, 0.3);
     t.physics.outside_scale = match kind {
         Outside::SqueezeFilm | Outside::Gyroscopic | Outside::TwoArm => 100.0 + 150.0 * u[0],
         Outside::CoggingLatch => 1.5 + 3.0 * u[0],

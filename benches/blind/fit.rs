@@ -120,10 +120,31 @@ pub fn solve(a: &[Vec<f64>], b: &[f64], ridge: f64) -> Vec<f64> {
     (0..n).map(|i| y[i] * scale[i]).collect()
 }
 
-/// (projected, raw) lambda of what the records hold beyond `plant`, and raw lambda of each record.
-pub fn lambda(plant: &Plant, recs: &[Recorded], noise: Noise, ts: f64) -> Option<(f64, f64, Vec<f64>)> {
-    let mut a = vec![vec![0.0; 4]; 4];
-    let (mut b, mut raw, mut rest) = (vec![0.0; 4], Vec::new(), 0.0);
+/// (projected, raw) lambda of what the records hold beyond `plant`, and raw lambda of each record. Projected: what a linear
+/// refit (gain, spring, damping, delay unless `hold_delay`) and each record's own offset, torque and initial state leave over.
+pub fn lambda(plant: &Plant, recs: &[Recorded], noise: Noise, ts: f64, hold_delay: bool) -> Option<(f64, f64, Vec<f64>)> {
+    let (mut best, raw, each, mut at) = pass(plant, recs, noise, ts, hold_delay)?;
+    // A far refit is not the tangent's: go there and look again.
+    for _ in 0..2 {
+        if raw < 5.0 * best {
+            break;
+        }
+        let Some(next) = at.take().and_then(|p| pass(&p, recs, noise, ts, hold_delay)) else { break };
+        if next.0 < best {
+            best = next.0;
+            at = next.3;
+        }
+    }
+    Some((best, raw, each))
+}
+
+type Pass = (f64, f64, Vec<f64>, Option<Plant>);
+
+fn pass(plant: &Plant, recs: &[Recorded], noise: Noise, ts: f64, hold_delay: bool) -> Option<Pass> {
+    let count = if hold_delay { 3 } else { 4 };
+    let step = 1e-3;
+    let mut a = vec![vec![0.0; count]; count];
+    let (mut b, mut raw, mut rest) = (vec![0.0; count], Vec::new(), 0.0);
     for rec in recs {
         let q = local(plant, rec.clean.len(), ts, noise);
         let base = replay(plant, rec, ts)?;
@@ -134,29 +155,38 @@ pub fn lambda(plant: &Plant, recs: &[Recorded], noise: Noise, ts: f64) -> Option
         raw.push(own);
         rest += own;
         let mut columns = Vec::new();
-        for i in 0..4 {
-            let mut p = plant.clone();
-            let step = 1e-3;
-            match i {
-                0 => p.b *= 1.0 + step,
-                1 => p.k = if p.k > 0.0 { p.k * (1.0 + step) } else { 10.0 },
-                2 => p.c *= 1.0 + step,
-                _ => p.delay *= 1.0 + 10.0 * step,
-            }
+        for i in 0..count {
+            let p = moved(plant, i, step);
             let mut c: Vec<f64> = replay(&p, rec, ts)?.iter().zip(&base).map(|(a, b)| (a - b) / step).collect();
             whiten(&mut c, noise);
             project(&mut c, &q);
             columns.push(c);
         }
-        for i in 0..4 {
+        for i in 0..count {
             b[i] += dot(&columns[i], &e);
-            for j in 0..4 {
+            for j in 0..count {
                 a[i][j] += dot(&columns[i], &columns[j]);
             }
         }
     }
     let x = solve(&a, &b, 1e-9);
-    Some(((rest - dot(&x, &b)).max(0.0), rest, raw))
+    let mut there = plant.clone();
+    for (i, x) in x.iter().enumerate() {
+        there = moved(&there, i, x.clamp(-0.6, 0.6));
+    }
+    Some(((rest - dot(&x, &b)).max(0.0), rest, raw, (there.k >= 0.0 && there.delay > 0.0).then_some(there)))
+}
+
+/// The plant with one linear parameter moved by a relative step.
+fn moved(plant: &Plant, which: usize, step: f64) -> Plant {
+    let mut p = plant.clone();
+    match which {
+        0 => p.b *= 1.0 + step,
+        1 => p.k += step * if p.k > 0.0 { p.k } else { 1e4 },
+        2 => p.c *= 1.0 + step,
+        _ => p.delay *= 1.0 + step,
+    }
+    p
 }
 
 fn vary(plant: &Plant, theta: &[f64]) -> Plant {

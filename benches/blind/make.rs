@@ -170,6 +170,7 @@ impl Stage {
         list
     }
 
+    /// Oracle lambda of a truth over all fitted records, from one record of each group.
     pub fn lambda(&self, t: &Truth) -> Option<(f64, f64, Vec<f64>)> {
         let few = self.few();
         let mut quiet = t.clone();
@@ -180,7 +181,7 @@ impl Stage {
             quiet.physics.windage = 0.0;
         }
         let recs = self.take(&quiet, &few, SEARCH)?;
-        let (p, raw, each) = lambda(&self.plant, &recs, self.noise, self.ts)?;
+        let (p, raw, each) = lambda(&self.plant, &recs, self.noise, self.ts, t.physics.extra_delay > 0.0)?;
         // Repeats count in proportion.
         let fitted = self.plans.iter().filter(|p| !p.holdout).count() as f64 / few.len() as f64;
         let fitted = if t.shocked.is_some() || !t.faults.only.is_empty() { 1.0 } else { fitted };
@@ -203,7 +204,7 @@ fn strength(stage: &Stage, name: &str, u: &[f64; 8], want: f64) -> Option<f64> {
         stage.lambda(&t).map(|l| l.0)
     };
     let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..7 {
+    for _ in 0..8 {
         let q = (low + high) / 2.0;
         match at(q) {
             Some(l) if l < want => {
@@ -241,7 +242,7 @@ pub fn make(order: &Order, out: &Path, attempt: u64) -> Option<Value> {
         let mut alone = stage.truth();
         put(name, q, &u, stage.ts, &mut alone);
         let (projected, raw, each) = stage.lambda(&alone)?;
-        if graded && order.strength.is_none() && projected < 3.0 {
+        if graded && projected < 5.0f64.min(0.5 * order.lambda) {
             return None;
         }
         let named = contract_name(name);
