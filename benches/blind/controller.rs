@@ -54,7 +54,8 @@ impl Law {
         let one = C::new(1.0, 0.0);
         let z1 = C::polar(1.0, -w * self.ts);
         let d = one - z1;
-        let mut c = C::new(self.kp, 0.0) + C::new(self.ki * self.ts, 0.0) / d
+        let mut c = C::new(self.kp, 0.0)
+            + C::new(self.ki * self.ts, 0.0) / d
             + d * self.kd / (C::new(self.ts, 0.0) + d * self.tf);
         for s in self.sections() {
             let z2 = z1 * z1;
@@ -101,10 +102,8 @@ impl Law {
         let mut fc = r.range(430.0, 620.0) * (110e-6 / (plant.delay + ts)).min(1.15);
         for _ in 0..30 {
             let wc = TAU * fc;
-            let strongest = plant
-                .modes
-                .iter()
-                .max_by(|a, b| plant.response(a.wp).abs().total_cmp(&plant.response(b.wp).abs()))?;
+            let strongest =
+                plant.modes.iter().max_by(|a, b| plant.response(a.wp).abs().total_cmp(&plant.response(b.wp).abs()))?;
             let kd = 1.0;
             let kp = kd * wc / r.range(2.6, 3.6);
             let ki = kp * wc / r.range(12.0, 25.0);
@@ -142,7 +141,8 @@ impl Law {
 
     pub fn toml(&self, units: &Units) -> String {
         let scale = units.command / units.length;
-        let mut t = format!("sample_time_s = {:e}\noutput_limit = {:e}\n\n[pid]\n", self.ts, self.limit * units.command);
+        let mut t =
+            format!("sample_time_s = {:e}\noutput_limit = {:e}\n\n[pid]\n", self.ts, self.limit * units.command);
         let _ = writeln!(t, "kp = {:e}\nki_per_s = {:e}", self.kp * scale, self.ki * scale);
         let _ = writeln!(t, "kd_s = {:e}\nderivative_filter_s = {:e}", self.kd * scale, self.tf);
         for (f, d) in &self.lowpass {

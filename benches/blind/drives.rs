@@ -96,7 +96,15 @@ pub fn plans(r: &mut Random, w: &Wishes, seed: u64) -> Vec<Plan> {
     }
     let small_move = w.reach * r.range(0.25, 0.5);
     if !w.one_amplitude {
-        list.push(("spiral_a", false, false, 0.0, spiral(n, w.ts, 0.0, small_move, w.speed * 0.6, true), none.clone(), m4));
+        list.push((
+            "spiral_a",
+            false,
+            false,
+            0.0,
+            spiral(n, w.ts, 0.0, small_move, w.speed * 0.6, true),
+            none.clone(),
+            m4,
+        ));
     }
     let from = -w.reach * r.sign();
     list.push(("spiral_b", false, false, from, spiral(n, w.ts, from, -2.0 * from, w.speed, true), none.clone(), m3));
@@ -105,7 +113,15 @@ pub fn plans(r: &mut Random, w: &Wishes, seed: u64) -> Vec<Plan> {
     list.push(("holdout_multisine", true, false, 0.0, zone(0.0), multisine(r, n, w.ts, between), 1));
     let start = w.reach * r.range(-0.9, -0.2);
     let length = w.reach * r.range(0.8, 1.6);
-    list.push(("holdout_spiral", true, false, start, spiral(n, w.ts, start, length, w.speed * r.range(0.7, 1.2), true), none.clone(), 1));
+    list.push((
+        "holdout_spiral",
+        true,
+        false,
+        start,
+        spiral(n, w.ts, start, length, w.speed * r.range(0.7, 1.2), true),
+        none.clone(),
+        1,
+    ));
     if r.chance(0.6) {
         let rms = if w.one_amplitude { 3.0 * a } else { (3.0 * a).max(1.5 * b).min(3.0 * b) };
         list.push(("holdout_beyond", true, true, 0.0, zone(0.0), multisine(r, n, w.ts, rms), 1));

@@ -119,8 +119,12 @@ pub fn family(name: &str) -> &'static [&'static str] {
         "amplifier_lag" | "extra_delay" | "sensor_lag" => {
             &["amplifier_lag", "extra_delay", "sensor_lag", "linear_parameters"]
         }
-        "bearing_bias" | "cable_spring" | "offset_drift" => &["bearing_bias", "cable_spring", "offset_drift", "pivot_friction"],
-        "torque_factor_rolloff" | "gain_drift" | "torque_ripple" => &["torque_factor_rolloff", "gain_drift", "torque_ripple"],
+        "bearing_bias" | "cable_spring" | "offset_drift" => {
+            &["bearing_bias", "cable_spring", "offset_drift", "pivot_friction"]
+        }
+        "torque_factor_rolloff" | "gain_drift" | "torque_ripple" => {
+            &["torque_factor_rolloff", "gain_drift", "torque_ripple"]
+        }
         "unmodelled_resonance" | "base_mode" | "mode_shift" | "modal_damping" => {
             &["unmodelled_resonance", "base_mode", "mode_shift", "modal_damping"]
         }
@@ -304,7 +308,11 @@ pub fn add(name: &str, q: f64, u: &[f64; 8], ts: f64, t: &mut Truth) -> Fact {
             p.base_hz = at(0, 12.0, 60.0);
             p.base_damping = at(1, 0.015, 0.08);
             place = json!({"frequency_hz": [[p.base_hz * 0.7, p.base_hz * 1.4]]});
-            vec![("frequency_hz", p.base_hz, 0, 0), ("damping_ratio", p.base_damping, 0, 0), ("mass_ratio", p.base_ratio, 0, 0)]
+            vec![
+                ("frequency_hz", p.base_hz, 0, 0),
+                ("damping_ratio", p.base_damping, 0, 0),
+                ("mass_ratio", p.base_ratio, 0, 0),
+            ]
         }
         "repeatable_runout" => {
             p.runout = grow(q, 5e-5, 0.25);
@@ -330,7 +338,11 @@ pub fn add(name: &str, q: f64, u: &[f64; 8], ts: f64, t: &mut Truth) -> Fact {
             p.shock_length = at(2, 1e-3, 6e-3);
             t.shocked = Some(0);
             place = json!({"time_s": [[p.shock_at, p.shock_at + p.shock_length + 0.01]], "one_record": true});
-            vec![("amplitude_command", p.shock, 0, 1), ("time_s", p.shock_at, 0, 0), ("duration_s", p.shock_length, 0, 0)]
+            vec![
+                ("amplitude_command", p.shock, 0, 1),
+                ("time_s", p.shock_at, 0, 0),
+                ("duration_s", p.shock_length, 0, 0),
+            ]
         }
         "offset_drift" => {
             p.offset_rate = sign(0) * grow(q, 1e-5, 0.3);
@@ -360,10 +372,15 @@ pub fn add(name: &str, q: f64, u: &[f64; 8], ts: f64, t: &mut Truth) -> Fact {
         }
         "lost_samples" | "stuck_samples" => {
             let many = 1 + (u[0] * 2.99) as usize;
-            let list = (0..many).map(|i| (0.15 + 0.7 * (u[1 + i] + i as f64) / many as f64, 1 + (u[5] * 7.99) as usize));
+            let list =
+                (0..many).map(|i| (0.15 + 0.7 * (u[1 + i] + i as f64) / many as f64, 1 + (u[5] * 7.99) as usize));
             let list: Vec<(f64, usize)> = list.collect();
             let count: usize = list.iter().map(|l| l.1).sum();
-            if name == "lost_samples" { t.faults.lost = list } else { t.faults.stuck = list.iter().map(|l| (l.0, l.1 * 6)).collect() }
+            if name == "lost_samples" {
+                t.faults.lost = list
+            } else {
+                t.faults.stuck = list.iter().map(|l| (l.0, l.1 * 6)).collect()
+            }
             t.faults.only = vec![1];
             place = json!({"one_record": true});
             vec![("count", if name == "lost_samples" { count } else { 6 * count } as f64, 0, 0)]

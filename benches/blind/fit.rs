@@ -122,7 +122,13 @@ pub fn solve(a: &[Vec<f64>], b: &[f64], ridge: f64) -> Vec<f64> {
 
 /// (projected, raw) lambda of what the records hold beyond `plant`, and raw lambda of each record. Projected: what a linear
 /// refit (gain, spring, damping, delay unless `hold_delay`) and each record's own offset, torque and initial state leave over.
-pub fn lambda(plant: &Plant, recs: &[Recorded], noise: Noise, ts: f64, hold_delay: bool) -> Option<(f64, f64, Vec<f64>)> {
+pub fn lambda(
+    plant: &Plant,
+    recs: &[Recorded],
+    noise: Noise,
+    ts: f64,
+    hold_delay: bool,
+) -> Option<(f64, f64, Vec<f64>)> {
     let (mut best, raw, each, mut at) = pass(plant, recs, noise, ts, hold_delay)?;
     // A far refit is not the tangent's: go there and look again.
     for _ in 0..2 {
@@ -208,8 +214,19 @@ fn vary(plant: &Plant, theta: &[f64]) -> Plant {
 /// `rigid`: only the spring and the damping are fitted.
 pub fn absorb(start: &Plant, recs: &[Recorded], noise: Noise, ts: f64, rounds: usize, rigid: bool) -> Option<Plant> {
     let n = 4 + 4 * start.modes.len();
-    let prior: Vec<f64> =
-        (0..n).map(|i| if i < 3 { 1.0 } else if i == 3 { 0.3 } else if (i - 4) % 4 < 2 { 0.02 } else { 0.3 }).collect();
+    let prior: Vec<f64> = (0..n)
+        .map(|i| {
+            if i < 3 {
+                1.0
+            } else if i == 3 {
+                0.3
+            } else if (i - 4) % 4 < 2 {
+                0.02
+            } else {
+                0.3
+            }
+        })
+        .collect();
     let steps: Vec<f64> = (0..n).map(|i| if i < 4 || (i - 4) % 4 >= 2 { 1e-3 } else { 1e-4 }).collect();
     let residual = |theta: &[f64]| -> Option<Vec<f64>> {
         let p = vary(start, theta);

@@ -77,7 +77,11 @@ impl Plant {
     pub fn toml(&self, units: &Units) -> String {
         let mut t = String::new();
         let ratio = units.length / units.command;
-        let _ = writeln!(t, "position_unit = \"{}\"\ncommand_unit = \"{}\"\n\n[plant]", units.length_name, units.command_name);
+        let _ = writeln!(
+            t,
+            "position_unit = \"{}\"\ncommand_unit = \"{}\"\n\n[plant]",
+            units.length_name, units.command_name
+        );
         if self.k > 0.0 {
             let w = self.k.sqrt();
             let _ = writeln!(t, "dc_gain = {:e}\nnatural_frequency_rad_s = {:.9}", self.b / self.k * ratio, w);

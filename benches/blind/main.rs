@@ -3,7 +3,13 @@
 //! `cargo bench --bench blind -- make --out DIR --seed N --set benchmark|power|p58 [--count N]`
 //! `cargo bench --bench blind -- commit DIR`
 //! `cargo bench --bench blind -- score DIR --diagnoses DDIR --out results/mismatch`
-#![allow(missing_docs, clippy::print_stdout, clippy::print_stderr, clippy::too_many_arguments, clippy::many_single_char_names)]
+#![allow(
+    missing_docs,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    clippy::too_many_arguments,
+    clippy::many_single_char_names
+)]
 
 mod commit;
 mod complex;
@@ -16,8 +22,10 @@ mod make;
 mod outside;
 mod physics;
 mod random;
+mod score;
 mod set;
 mod showcase;
+mod statistics;
 mod world;
 mod write;
 
@@ -42,9 +50,15 @@ fn main() -> ExitCode {
             }
         }
         Some("commit") => folder.ok_or("commit needs DIR".into()).and_then(|d| commit::commit(&d)),
+        Some("score") => match (folder, option("--diagnoses"), option("--out")) {
+            (Some(d), Some(ddir), Some(out)) => score::score(&d, &PathBuf::from(ddir), &PathBuf::from(out)),
+            _ => Err("score needs DIR, --diagnoses DDIR and --out OUT".into()),
+        },
         // Run with nothing to do, as `cargo bench` does for all benches.
         _ => {
-            eprintln!("blind: make --out DIR --seed N --set benchmark|power|p58 [--count N] | commit DIR | score DIR --diagnoses DDIR --out OUT");
+            eprintln!(
+                "blind: make --out DIR --seed N --set benchmark|power|p58 [--count N] | commit DIR | score DIR --diagnoses DDIR --out OUT"
+            );
             Ok(())
         }
     };

@@ -24,8 +24,6 @@ pub struct Order {
     pub absorbed: bool,
     /// Plain records: closed loop, two amplitudes, repeats.
     pub plain: bool,
-    /// Ask for a strength instead of a lambda.
-    pub strength: Option<f64>,
 }
 
 const FINE: usize = 64;
@@ -234,11 +232,7 @@ pub fn make(order: &Order, out: &Path, attempt: u64) -> Option<Value> {
         let mut u = [0.0; 8];
         u.iter_mut().for_each(|u| *u = r.unit());
         let graded = !matches!(order.kind, "fault") && *name != "controller_mismatch";
-        let q = match order.strength {
-            Some(q) => q,
-            None if graded => strength(&stage, name, &u, order.lambda)?,
-            None => r.range(0.3, 1.0),
-        };
+        let q = if graded { strength(&stage, name, &u, order.lambda)? } else { r.range(0.3, 1.0) };
         let mut alone = stage.truth();
         put(name, q, &u, stage.ts, &mut alone);
         let (projected, raw, each) = stage.lambda(&alone)?;
@@ -276,8 +270,9 @@ pub fn make(order: &Order, out: &Path, attempt: u64) -> Option<Value> {
         }
     }
     if order.absorbed {
-        let multisines: Vec<usize> =
-            (0..all.len()).filter(|&i| stage.plans[i].group.starts_with("multisine") && !stage.plans[i].holdout).collect();
+        let multisines: Vec<usize> = (0..all.len())
+            .filter(|&i| stage.plans[i].group.starts_with("multisine") && !stage.plans[i].holdout)
+            .collect();
         let one = *r.pick(&multisines);
         given = absorb(&stage.plant, &recs[one..=one], stage.noise, stage.ts, 6, false)?;
     }

@@ -26,7 +26,17 @@ impl Stranger {
             Outside::Preisach => vec![-1.0; 12],
             _ => vec![0.0; 4],
         };
-        Self { kind: p.outside, level: p.outside_level, scale: p.outside_scale, draw, states, x, next, now, past: Vec::new() }
+        Self {
+            kind: p.outside,
+            level: p.outside_level,
+            scale: p.outside_scale,
+            draw,
+            states,
+            x,
+            next,
+            now,
+            past: Vec::new(),
+        }
     }
 
     /// Torque in V, held over one sample.
@@ -88,7 +98,8 @@ impl Stranger {
                     self.now = self.draw.sign();
                     self.states[1] += self.now * 40.0;
                 }
-                self.states[1] += dt * (-(TAU * 90.0).powi(2) * self.states[0] - 40.0 * self.states[1] - 3.0 * v / scale);
+                self.states[1] +=
+                    dt * (-(TAU * 90.0).powi(2) * self.states[0] - 40.0 * self.states[1] - 3.0 * v / scale);
                 self.states[0] += dt * self.states[1];
                 let s = self.states[0] * 14.0;
                 level * (s + 0.5 * s * s * s.signum())

@@ -2,8 +2,8 @@
 
 use crate::effects::{FAULTS, OUTSIDE, PAIRS, SINGLES};
 use crate::make::{Order, make as make_case};
-use crate::showcase;
 use crate::random::Random;
+use crate::showcase;
 use rayon::prelude::*;
 use serde_json::json;
 use std::path::Path;
@@ -53,7 +53,7 @@ fn benchmark(seed: u64, count: usize) -> Vec<Order> {
             let linear = effects.iter().any(|e| matches!(*e, "extra_delay" | "time_base_drift"));
             let absorbed = r.chance(0.55) && !matches!(kind, "linear" | "fault") && !linear;
             let id = format!("B{:03}", i + 1);
-            Order { id, seed: r.bits(), kind, effects, lambda, absorbed, plain: false, strength: None }
+            Order { id, seed: r.bits(), kind, effects, lambda, absorbed, plain: false }
         })
         .collect()
 }
@@ -61,12 +61,22 @@ fn benchmark(seed: u64, count: usize) -> Vec<Order> {
 fn power(seed: u64) -> Vec<Order> {
     let mut r = Random::new(seed, 1);
     let mut list = Vec::new();
-    for (letter, effect) in ["pivot_friction", "coulomb_friction", "torque_factor_rolloff", "extra_delay"].iter().enumerate() {
+    for (letter, effect) in
+        ["pivot_friction", "coulomb_friction", "torque_factor_rolloff", "extra_delay"].iter().enumerate()
+    {
         for step in 0..8 {
             for twin in 0..2 {
                 let lambda = 2.5 * 2.4f64.powi(step);
                 let id = format!("W{}{step}{twin}", letter + 1);
-                list.push(Order { id, seed: r.bits(), kind: "single", effects: vec![effect], lambda, absorbed: false, plain: true, strength: None });
+                list.push(Order {
+                    id,
+                    seed: r.bits(),
+                    kind: "single",
+                    effects: vec![effect],
+                    lambda,
+                    absorbed: false,
+                    plain: true,
+                });
             }
         }
     }
@@ -75,7 +85,8 @@ fn power(seed: u64) -> Vec<Order> {
 
 fn p58(seed: u64, count: usize) -> Vec<Order> {
     let mut r = Random::new(seed, 2);
-    let order = |id: String, kind, seed| Order { id, seed, kind, effects: vec![], lambda: 0.0, absorbed: true, plain: true, strength: None };
+    let order =
+        |id: String, kind, seed| Order { id, seed, kind, effects: vec![], lambda: 0.0, absorbed: true, plain: true };
     let mut list: Vec<Order> = (1..=count).map(|i| order(format!("P58_{i}"), "p58", r.bits())).collect();
     list.extend((1..=count).map(|i| order(format!("P58_null_{i}"), "p58_null", r.bits())));
     list

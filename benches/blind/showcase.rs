@@ -86,7 +86,8 @@ pub fn make(order: &Order, null: bool, out: &Path, attempt: u64) -> Option<Value
         plans: plans(&mut r, order.seed, ts, rms),
         base,
     };
-    let mut truth = Truth { plant: plant.clone(), physics: stage.base.clone(), faults: Faults::default(), shocked: None };
+    let mut truth =
+        Truth { plant: plant.clone(), physics: stage.base.clone(), faults: Faults::default(), shocked: None };
     let (mut answer, mut small) = (Map::new(), Value::Null);
     let mut given;
     if null {
@@ -117,13 +118,22 @@ pub fn make(order: &Order, null: bool, out: &Path, attempt: u64) -> Option<Value
         }
         small = json!(w / TAU);
         if !hit {
-            eprintln!("{}: fit {:.1} Hz {:.3}, small {:.1} Hz, length {length:.4}", order.id, given.k.sqrt() / TAU, given.c / (2.0 * given.k.sqrt()), w / TAU);
+            eprintln!(
+                "{}: fit {:.1} Hz {:.3}, small {:.1} Hz, length {length:.4}",
+                order.id,
+                given.k.sqrt() / TAU,
+                given.c / (2.0 * given.k.sqrt()),
+                w / TAU
+            );
             return None;
         }
         given = absorb(&given, &stage.take(&truth, &[0], 64)?, noise, ts, 5, true)?;
         let s = &truth.physics.slip;
-        answer.insert("pivot_friction".into(), json!({"sliding_length": s.length(), "level_command": s.level() / (plant.b * plant.gain),
-            "stiffness_per_s2": s.stiffness(), "small_signal_hz": w / TAU}));
+        answer.insert(
+            "pivot_friction".into(),
+            json!({"sliding_length": s.length(), "level_command": s.level() / (plant.b * plant.gain),
+            "stiffness_per_s2": s.stiffness(), "small_signal_hz": w / TAU}),
+        );
         answer.insert("torque_factor_rolloff".into(), json!({"drop_at_15": 0.06}));
         answer.insert("cable_spring".into(), facts.figures.iter().map(|f| (f.0.to_owned(), json!(f.1))).collect());
     }

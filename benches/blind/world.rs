@@ -104,7 +104,15 @@ fn field(x: f64, drop: f64) -> f64 {
 }
 
 /// Runs one record; nothing comes back when the machine runs away.
-pub fn run(plant: &Plant, p: &Physics, law: Option<&Law>, d: &Drive, noise: Noise, ts: f64, fine: usize) -> Option<Track> {
+pub fn run(
+    plant: &Plant,
+    p: &Physics,
+    law: Option<&Law>,
+    d: &Drive,
+    noise: Noise,
+    ts: f64,
+    fine: usize,
+) -> Option<Track> {
     let mut draw = Random::new(d.seed, 0x5eed);
     let dt = ts * (1.0 + p.clock);
     let delay = plant.delay + p.extra_delay;
@@ -190,7 +198,13 @@ pub fn run(plant: &Plant, p: &Physics, law: Option<&Law>, d: &Drive, noise: Nois
         // Command.
         let r = d.reference[k];
         let u = match (&d.command, &mut running) {
-            (Some(c), _) => if live { c[k] } else { u0 },
+            (Some(c), _) => {
+                if live {
+                    c[k]
+                } else {
+                    u0
+                }
+            }
             (None, Some(l)) => l.step(r - read),
             (None, None) => u0,
         };

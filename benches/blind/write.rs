@@ -25,7 +25,15 @@ fn number(out: &mut String, x: f64) {
     }
 }
 
-pub fn case(order: &Order, out: &Path, stage: &Stage, given: &Plant, recs: &[Recorded], s: &Units, r: &mut Random) -> std::io::Result<()> {
+pub fn case(
+    order: &Order,
+    out: &Path,
+    stage: &Stage,
+    given: &Plant,
+    recs: &[Recorded],
+    s: &Units,
+    r: &mut Random,
+) -> std::io::Result<()> {
     let dir = out.join(&order.id);
     let _ = std::fs::remove_dir_all(&dir);
     std::fs::create_dir_all(dir.join("records"))?;
@@ -47,7 +55,8 @@ pub fn case(order: &Order, out: &Path, stage: &Stage, given: &Plant, recs: &[Rec
     for (plan, rec) in stage.plans.iter().zip(recs) {
         let file = format!("records/{}.csv.gz", plan.name);
         let role = if plan.holdout { "holdout" } else { "fit" };
-        let _ = write!(text, "\n[[records]]\nfile = \"{file}\"\nrole = \"{role}\"\nrepeat_group = \"{}\"\n", plan.group);
+        let _ =
+            write!(text, "\n[[records]]\nfile = \"{file}\"\nrole = \"{role}\"\nrepeat_group = \"{}\"\n", plan.group);
         let mut csv = String::with_capacity(rec.clean.len() * 64);
         csv.push_str("time_s,reference,excitation,command,position");
         csv.push_str(if with_pes { ",pes" } else { "" });
