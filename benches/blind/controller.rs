@@ -73,11 +73,11 @@ impl Law {
     /// (Ms, crossover in Hz, phase margin in degrees), or nothing when the loop is not stable by its crossings.
     pub fn judge(&self, plant: &Plant) -> Option<(f64, f64, f64)> {
         let n = 3000;
-        let (low, high) = (2.0, 0.49 / self.ts);
+        let (low, high) = (2.0f64, 0.49 / self.ts);
         let (mut ms, mut cross, mut margin) = (0.0f64, 0.0, 0.0);
         let mut before = C::new(0.0, 0.0);
         for i in 0..=n {
-            let f = low * (high / low as f64).powf(i as f64 / n as f64);
+            let f = low * (high / low).powf(i as f64 / n as f64);
             let l = self.open_loop(plant, TAU * f);
             ms = ms.max(1.0 / (l + C::new(1.0, 0.0)).abs());
             if i > 0 && before.abs() > 1.0 && l.abs() <= 1.0 {

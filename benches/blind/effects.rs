@@ -112,35 +112,6 @@ pub const FAULTS: [&str; 8] = [
     "misalignment_whole",
 ];
 
-/// Names that count as the right family where these records cannot tell them apart.
-pub fn family(name: &str) -> &'static [&'static str] {
-    match name {
-        "pivot_friction" | "coulomb_friction" => &["pivot_friction", "coulomb_friction"],
-        "amplifier_lag" | "extra_delay" | "sensor_lag" => {
-            &["amplifier_lag", "extra_delay", "sensor_lag", "linear_parameters"]
-        }
-        "bearing_bias" | "cable_spring" | "offset_drift" => {
-            &["bearing_bias", "cable_spring", "offset_drift", "pivot_friction"]
-        }
-        "torque_factor_rolloff" | "gain_drift" | "torque_ripple" => {
-            &["torque_factor_rolloff", "gain_drift", "torque_ripple"]
-        }
-        "unmodelled_resonance" | "base_mode" | "mode_shift" | "modal_damping" => {
-            &["unmodelled_resonance", "base_mode", "mode_shift", "modal_damping"]
-        }
-        "repeatable_runout" | "line_disturbance" => &["repeatable_runout", "line_disturbance"],
-        "broadband_disturbance" | "encoder_noise" | "jitter" | "quantisation" => {
-            &["broadband_disturbance", "encoder_noise", "jitter", "quantisation"]
-        }
-        "misalignment" | "time_base_drift" | "lost_samples" => &["misalignment", "time_base_drift", "lost_samples"],
-        "current_saturation" | "slew_limit" => &["current_saturation", "slew_limit"],
-        "backlash" | "dead_band" => &["backlash", "dead_band"],
-        "encoder_scale_error" | "encoder_cyclic_error" => &["encoder_scale_error", "encoder_cyclic_error"],
-        "nonlinear_spring" => &["nonlinear_spring", "cable_spring"],
-        _ => &[],
-    }
-}
-
 /// `from` at q = 0 to `to` at q = 1, by equal factors.
 fn grow(q: f64, from: f64, to: f64) -> f64 {
     from * (to / from).powf(q)
@@ -149,14 +120,14 @@ fn grow(q: f64, from: f64, to: f64) -> f64 {
 /// Adds effect `name` of strength `q` in 0..1; the shape `u` (uniform draws) fixes everything else.
 pub fn add(name: &str, q: f64, u: &[f64; 8], ts: f64, t: &mut Truth) -> Fact {
     let p = &mut t.physics;
-    let at = |i: usize, low: f64, high: f64| low * (high / low as f64).powf(u[i]);
+    let at = |i: usize, low: f64, high: f64| low * (high / low).powf(u[i]);
     let sign = |i: usize| if u[i] < 0.5 { -1.0 } else { 1.0 };
     let b = t.plant.b * t.plant.gain;
     let mut place = json!({});
     let figures: Vec<Figure> = match name {
         "pivot_friction" => {
             // Friction takes over a share of the small-signal stiffness (all of it when strong).
-            let share = grow(q, 1e-3, 1.0);
+            let share = grow(q, 1e-7, 1.0);
             let whole = if t.plant.k > 0.0 { t.plant.k } else { 250.0f64.powi(2) };
             let mut r = Random::new((u[1] * 1e15) as u64, 77);
             let elements = 20 + (u[2] * 20.99) as usize;
@@ -171,7 +142,7 @@ pub fn add(name: &str, q: f64, u: &[f64; 8], ts: f64, t: &mut Truth) -> Fact {
             ]
         }
         "coulomb_friction" => {
-            p.coulomb = grow(q, 5e-6, 0.08);
+            p.coulomb = grow(q, 1e-7, 0.08);
             vec![("level_command", p.coulomb, 0, 1)]
         }
         "bearing_bias" => {
@@ -199,7 +170,7 @@ pub fn add(name: &str, q: f64, u: &[f64; 8], ts: f64, t: &mut Truth) -> Fact {
             vec![("cubic_command", p.cubic, -3, 1)]
         }
         "torque_factor_rolloff" => {
-            p.rolloff = grow(q, 5e-5, 0.35);
+            p.rolloff = grow(q, 1e-6, 0.35);
             place = json!({"position_ends": true});
             vec![("drop_at_15", p.rolloff, 0, 0)]
         }

@@ -8,7 +8,10 @@
     clippy::print_stdout,
     clippy::print_stderr,
     clippy::too_many_arguments,
-    clippy::many_single_char_names
+    clippy::many_single_char_names,
+    clippy::type_complexity,
+    clippy::needless_range_loop,
+    clippy::collapsible_if
 )]
 
 mod commit;
@@ -16,6 +19,7 @@ mod complex;
 mod controller;
 mod drives;
 mod effects;
+mod family;
 mod fit;
 mod machine;
 mod make;

@@ -3,6 +3,7 @@
 use crate::controller::Law;
 use crate::drives::{Plan, Wishes, plans};
 use crate::effects::{self, Fact, Faults, OUTSIDE, Truth};
+use crate::family::family;
 use crate::fit::{Recorded, absorb, lambda};
 use crate::machine::{Plant, Units};
 use crate::physics::Physics;
@@ -288,7 +289,7 @@ pub fn make(order: &Order, out: &Path, attempt: u64) -> Option<Value> {
         "outside" => vec!["unexplained"],
         _ => facts.iter().map(|f| f.0).collect(),
     };
-    let families: Vec<Vec<&str>> = names.iter().map(|n| effects::family(n).to_vec()).collect();
+    let families: Vec<Vec<&str>> = names.iter().map(|n| family(n).to_vec()).collect();
     let mut harmless = Vec::new();
     if stage.base.quantum > 0.0 {
         harmless.push("quantisation");

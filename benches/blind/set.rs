@@ -109,7 +109,9 @@ pub fn make(out: &Path, seed: u64, set: &str, count: Option<usize>) -> Result<()
             for attempt in 1..=12 {
                 // An effect that a machine can not show at the strength asked for gets less of it, then another machine.
                 let mut order = order.clone();
-                order.lambda /= 1.6f64.powi(attempt - 1);
+                // Weak ones get more of it.
+                let less = if order.lambda < 40.0 { 1.25f64 } else { 1.0 / 1.6 };
+                order.lambda *= less.powi(attempt - 1);
                 let answer = match order.kind {
                     "p58" | "p58_null" => showcase::make(&order, order.kind == "p58_null", &cases, attempt as u64),
                     _ => make_case(&order, &cases, attempt as u64),

@@ -4,6 +4,7 @@
 use crate::controller::Law;
 use crate::drives::{Plan, multisine, spiral};
 use crate::effects::{self, Faults, Truth};
+use crate::family::family;
 use crate::fit::absorb;
 use crate::machine::{Mode, Plant, Units};
 use crate::make::{Order, Stage, linear, visibility};
@@ -144,7 +145,7 @@ pub fn make(order: &Order, null: bool, out: &Path, attempt: u64) -> Option<Value
     let units = Units { length: 1.0, command: 1.0, length_name: "track", command_name: "V" };
     write::case(order, out, &stage, &given, &recs, &units, &mut r).ok()?;
     let names = if null { vec!["none"] } else { vec!["pivot_friction", "torque_factor_rolloff", "cable_spring"] };
-    let families: Vec<Vec<&str>> = names.iter().map(|n| effects::family(n).to_vec()).collect();
+    let families: Vec<Vec<&str>> = names.iter().map(|n| family(n).to_vec()).collect();
     let roles: Map<String, Value> =
         stage.plans.iter().map(|p| (p.name.clone(), json!({"holdout": p.holdout, "beyond": p.beyond}))).collect();
     Some(json!({

@@ -137,7 +137,7 @@ pub fn run(
             n.0 *= 1.0 + p.law_notch;
         }
     }
-    let mut running = law_now.as_ref().map(|l| Running::new(l, u0, d.seed % 3 == 0));
+    let mut running = law_now.as_ref().map(|l| Running::new(l, u0, d.seed.is_multiple_of(3)));
     let n = d.reference.len();
     let mut past = vec![u0; whole + 2];
     let (mut x, mut v) = (rest, 0.0f64);
