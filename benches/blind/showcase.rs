@@ -101,7 +101,7 @@ pub fn make(order: &Order, null: bool, out: &Path, attempt: u64) -> Option<Value
         truth.physics.rolloff = 0.06;
         truth.plant.k = 0.0;
         let (mut w, mut length) = (TAU * 77.0, 0.03f64);
-        truth.plant.c = 2.0 * 0.02 * w;
+        truth.plant.c = 2.0 * 0.005 * w;
         let shape = r.bits();
         given = plant.clone();
         let mut hit = false;
@@ -118,7 +118,8 @@ pub fn make(order: &Order, null: bool, out: &Path, attempt: u64) -> Option<Value
             length *= (zf / PAPER.1).powf(0.6).clamp(0.6, 1.6);
         }
         small = json!(w / TAU);
-        if !hit {
+        // What is asked of this set: a small-signal mode of 70 to 83 Hz; another bearing is drawn where it does not.
+        if !hit || w < TAU * 70.0 {
             eprintln!(
                 "{}: fit {:.1} Hz {:.3}, small {:.1} Hz, length {length:.4}",
                 order.id,
