@@ -12,6 +12,8 @@ const T: f64 = 1e-4;
 const N: usize = 2000;
 const STEPS: usize = 32;
 const NOISE: f64 = 2e-3;
+/// Delays are whole steps of the integrator, so that its commands switch where the truth says.
+const MORE: f64 = 20.0 * T / STEPS as f64;
 
 /// Gain, stiffness, viscous rate, delay (s), dry friction (command), clip of the command.
 #[derive(Clone, Copy)]
@@ -24,7 +26,8 @@ struct Truth {
     clip: f64,
 }
 
-const GIVEN: Truth = Truth { b: 8e6, k: 1.4e5, c: 160.0, delay: 1.3e-4, coulomb: 0.0, clip: f64::INFINITY };
+const GIVEN: Truth =
+    Truth { b: 8e6, k: 1.4e5, c: 160.0, delay: 42.0 * T / STEPS as f64, coulomb: 0.0, clip: f64::INFINITY };
 
 fn plant() -> Plant {
     let w = GIVEN.k.sqrt();
@@ -138,10 +141,10 @@ fn wrong_linear_parameters_are_a_refit_and_the_refit_is_right() {
 
 #[test]
 fn more_delay_is_named_and_measured() {
-    let d = diagnosed(&Truth { delay: GIVEN.delay + 6e-5, ..GIVEN });
+    let d = diagnosed(&Truth { delay: GIVEN.delay + MORE, ..GIVEN });
     assert_eq!(d.findings[0].effect, "extra_delay", "{:?}", d.verdict);
     let e = &d.findings[0].parameters["delay_s"];
-    assert!((e.value / 6e-5 - 1.0).abs() < 0.05 && e.low < 6e-5 && 6e-5 < e.high, "{e:?}");
+    assert!((e.value / MORE - 1.0).abs() < 0.05 && e.low < MORE && MORE < e.high, "{e:?}");
 }
 
 #[test]
