@@ -101,13 +101,13 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let words = text(&outcome, Some(&start), slot::units(&id.plant))?;
     let ending = if matches!(outcome, Outcome::Tuned(_)) { Ending::Accepted } else { Ending::Rejected };
     let shown = format!(
-        "{words}\nGain table: {}\nOpen this report: {}\n\n{}\n{} {}\nOpen this table: {}\n",
-        gain_table.display(),
-        report.display(),
+        "{words}\n{}\n{} {}\nOpen this table: {}\n\nGain table: {}\nOpen this report: {}\n",
         gated::sheet(&judged.rows)?.text(),
         gated::summary(&judged.rows),
         judged.table.display(),
-        judged.page.display()
+        judged.page.display(),
+        gain_table.display(),
+        report.display()
     );
     let document = Document {
         outcome: &outcome,

@@ -102,21 +102,21 @@ fn check(
         if faults.is_empty() {
             let helps = |e: f64| e < 0.3 * r.error;
             if helps(r.error_shifted) && r.shift_samples.abs() > 0.05 && r.error_shifted <= 1.1 * r.error_scaled {
-                found = Some(super::name::misalignment(r, sample_time_s, &fit));
+                found = Some(super::log_finding::misalignment(r, sample_time_s, &fit));
                 for run in runs.iter_mut() {
                     shift(run, r.shift_samples);
                 }
             } else if helps(r.error_scaled) {
-                found = Some(super::name::scale(r, &fit));
+                found = Some(super::log_finding::scale(r, &fit));
                 closed = false;
             } else {
-                found = Some(super::name::controller_mismatch(r, &fit));
+                found = Some(super::log_finding::controller_mismatch(r, &fit));
                 closed = false;
             }
         }
     }
     if !faults.is_empty() {
-        found = Some(super::name::samples(&faults));
+        found = Some(super::log_finding::samples(&faults));
         closed = closed && replay.as_ref().is_some_and(|r| r.error <= REPLAY);
     }
     Ok(Hygiene { replay, faults, finding: found, closed })

@@ -13,6 +13,7 @@ mod finding;
 mod hygiene;
 mod judge;
 mod linear;
+mod log_finding;
 mod name;
 mod place;
 mod refit;

@@ -313,6 +313,7 @@ impl Novelty {
             && r.spread.0.len() == classes * d
             && r.tail.0.len() == d
             && roots <= d
+            && (roots > 0 || d == 0)
             && r.root.0.len() == roots * (roots + 1) / 2
             && positive(&r.spread)
             && positive(&r.tail)

@@ -1,0 +1,101 @@
+//! Findings about the logs themselves, from what hygiene saw.
+
+use super::finding::{Estimate, Finding, Where};
+use super::hygiene::{Replay, SampleFault};
+use super::name::{everywhere, plain, text_of};
+use super::run::Run;
+use std::collections::BTreeMap;
+
+/// The position log is shifted.
+pub(super) fn misalignment(r: &Replay, sample_time_s: f64, runs: &[&Run]) -> Finding {
+    let (says, port) = text_of("misalignment");
+    let parameters = BTreeMap::from([
+        (
+            "samples".to_owned(),
+            Estimate {
+                value: r.shift_samples,
+                low: r.shift_samples - 0.05,
+                high: r.shift_samples + 0.05,
+                unit: "samples".into(),
+            },
+        ),
+        ("shift_s".to_owned(), plain(r.shift_samples * sample_time_s, "s")),
+    ]);
+    Finding {
+        effect: "misalignment".into(),
+        family: vec!["misalignment".into()],
+        port,
+        p_value: 1e-300,
+        says: format!(
+            "In the log {says}: shifted by {:.2} samples, the documented controller gives the recorded command again.",
+            r.shift_samples
+        ),
+        parameters,
+        place: everywhere(runs),
+    }
+}
+
+/// Position or command is logged in other units, or with the other sign.
+pub(super) fn scale(r: &Replay, runs: &[&Run]) -> Finding {
+    let parameters = BTreeMap::from([
+        ("position_factor".to_owned(), plain(r.position_factor, "1")),
+        ("command_factor".to_owned(), plain(r.command_factor, "1")),
+    ]);
+    let sign = if r.position_factor < 0.0 { "with the sign turned round" } else { "in other units" };
+    Finding {
+        effect: "linear_parameters".into(),
+        family: vec!["linear_parameters".into()],
+        port: crate::physics::Port::Time,
+        p_value: 1e-300,
+        says: format!(
+            "The position is logged {sign}: the controller's command follows from the log only with a factor of {:.6}.",
+            r.position_factor
+        ),
+        parameters,
+        place: everywhere(runs),
+    }
+}
+
+/// The command does not follow from the documented law.
+pub(super) fn controller_mismatch(r: &Replay, runs: &[&Run]) -> Finding {
+    let (says, port) = text_of("controller_mismatch");
+    Finding {
+        effect: "controller_mismatch".into(),
+        family: vec!["controller_mismatch".into()],
+        port,
+        p_value: 1e-300,
+        says: format!(
+            "{says}: replayed over the log, the documented law misses the recorded command by {:.2} % rms.",
+            100.0 * r.error
+        ),
+        parameters: BTreeMap::from([("replay_error".to_owned(), plain(r.error, "1"))]),
+        place: everywhere(runs),
+    }
+}
+
+/// Samples are missing, doubled or stuck.
+pub(super) fn samples(faults: &[SampleFault]) -> Finding {
+    let (says, port) = text_of("lost_samples");
+    let first = &faults[0];
+    let records: Vec<String> = faults.iter().map(|f| f.record.clone()).collect();
+    Finding {
+        effect: "lost_samples".into(),
+        family: vec!["lost_samples".into()],
+        port,
+        p_value: 1e-300,
+        says: format!(
+            "{says}: record {} at {:.6} s, {} samples{}.",
+            first.record,
+            first.time_s,
+            first.samples,
+            if first.stuck { " stuck" } else { "" }
+        ),
+        parameters: BTreeMap::from([("samples".to_owned(), plain(first.samples, "samples"))]),
+        place: Where {
+            records,
+            time_s: faults.iter().map(|f| [f.time_s, f.time_s]).collect(),
+            velocity_sign: "both",
+            ..Where::default()
+        },
+    }
+}
