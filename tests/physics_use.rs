@@ -63,7 +63,6 @@ fn an_effect_without_strength_leaves_the_write_as_it_was() {
 #[derive(Clone, Copy)]
 enum Law {
     Dahl { level: f64, length: f64 },
-    Slider { level: f64, length: f64 },
     Clip { limit: f64 },
 }
 
@@ -75,7 +74,6 @@ fn runge_kutta(plant: &Plant, law: Law, u: &[f64]) -> Vec<f64> {
     let acceleration = |u: f64, s: [f64; 3]| {
         let (command, torque) = match law {
             Law::Dahl { level, .. } => (u, -level * s[2]),
-            Law::Slider { level, .. } => (u, -level * s[2].clamp(-1.0, 1.0)),
             Law::Clip { limit } => (u.clamp(-limit, limit), 0.0),
         };
         dc_gain * w0 * w0 * (command + torque) - 2.0 * damping_ratio * w0 * s[1] - w0 * w0 * s[0]
@@ -83,7 +81,6 @@ fn runge_kutta(plant: &Plant, law: Law, u: &[f64]) -> Vec<f64> {
     let slope = |u: f64, s: [f64; 3]| {
         let z = match law {
             Law::Dahl { length, .. } => s[1] / length * (1.0 - s[1].signum() * s[2]),
-            Law::Slider { length, .. } => s[1] / length,
             Law::Clip { .. } => 0.0,
         };
         [s[1], acceleration(u, s), z]
@@ -101,9 +98,6 @@ fn runge_kutta(plant: &Plant, law: Law, u: &[f64]) -> Vec<f64> {
         let k3 = slope(acting, add(s, k2, 0.5 * h));
         let k4 = slope(acting, add(s, k3, h));
         s = std::array::from_fn(|i| s[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
-        if matches!(law, Law::Slider { .. }) {
-            s[2] = s[2].clamp(-1.0, 1.0);
-        }
     }
     out
 }
@@ -140,7 +134,7 @@ fn the_machine_agrees_with_an_independent_simulation() {
     assert!(coarse / fine > 3.0, "{coarse:e} {fine:e}");
     let dry = entry("coulomb_friction", &[("level_command", 0.05), ("sliding_length", 0.05)]);
     // Kinks at each reversal: the reference itself finds them within 1/64 sample only.
-    let dry = off(Law::Slider { level: 0.05, length: 0.05 }, &dry, 1);
+    let dry = off(Law::Dahl { level: 0.05, length: 0.05 }, &dry, 1);
     assert!(dry < 1e-3, "{dry:e}");
     // A held command clipped is a held command: exact but for the reference's fourth order.
     let clip = off(Law::Clip { limit: 0.2 }, &entry("current_saturation", &[("limit", 0.2)]), 1);
