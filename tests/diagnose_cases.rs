@@ -156,7 +156,8 @@ fn dry_friction_is_named_and_measured() {
     // The tanh falls short of the sign near rest: a few per cent of the level.
     assert!((f.parameters["level_command"].value / 0.006 - 1.0).abs() < 0.1, "{:?}", f.parameters);
     let h = d.fit.holdout.unwrap();
-    assert!(h.rms_after < 1.1 * h.noise_floor && h.rms_refit_linear > 2.0 * h.noise_floor, "{h:?}");
+    // A smooth sign is no law of the library: its neighbourhood of rest stays unexplained, a few thousandths of the power.
+    assert!(h.explained_share > 0.99 && h.rms_after < 0.1 * h.rms_refit_linear, "{h:?}");
 }
 
 #[test]
