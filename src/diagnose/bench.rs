@@ -1,13 +1,14 @@
 //! Everything that a diagnosis works on, made in order: given plant, noise, filter, refit, motion.
 
 use super::columns::raw_columns;
-use super::linear::{Carrier, LinearForm, Sampled};
+use super::linear::{Carrier, LinearForm, Sampled, free_motions};
+use super::lines::{Line, take_lines};
 use super::refit::{Chosen, Fit, simulation_error};
 use super::run::{Run, mean_run};
-use super::stack::Stack;
+use super::stack::{Basis, Stack};
 use super::trajectory::{Smoother, Trajectory, acting};
 use super::whiten::{NoiseLevels, Whitener};
-use crate::lti::{LtiError, Plant};
+use crate::lti::{Body, LtiError, Plant};
 use crate::physics::{Entry, Port, Scene};
 use crate::recording::Role;
 
@@ -24,6 +25,8 @@ pub struct Bench {
     pub levels: NoiseLevels,
     /// Its whitening filter.
     pub whitener: Whitener,
+    /// Lines whose phase differs from run to run; they are taken out of the mean runs.
+    pub lines: Vec<Line>,
     /// The mean run of every segment of the stack.
     pub means: Vec<Run>,
     /// The motion behind each of them.
@@ -34,8 +37,6 @@ pub struct Bench {
     pub scene: Scene,
     /// What repeats differ by, whitened, with the run it belongs to; empty without repeats.
     pub repeats: Vec<(usize, Vec<f64>)>,
-    /// Linear parameters of the last refit.
-    pub p: Vec<f64>,
 }
 
 /// Series that hold noise only: each repeat less the mean of its group, scaled back to the noise of one record.
@@ -65,93 +66,125 @@ fn noise_series(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<(usize, Vec<f
     out
 }
 
+fn values(series: &[(usize, Vec<f64>)]) -> Vec<Vec<f64>> {
+    series.iter().map(|s| s.1.clone()).collect()
+}
+
+/// Errors with each record's own start and constant torque taken out.
+fn without_start(errors: &[(usize, Vec<f64>)], free: &dyn Fn(usize) -> Vec<Vec<f64>>) -> Vec<(usize, Vec<f64>)> {
+    let mut out = errors.to_vec();
+    for (_, e) in &mut out {
+        let mut basis = Basis::default();
+        free(e.len()).into_iter().for_each(|c| basis.add_local(0, c));
+        basis.project(e);
+    }
+    out
+}
+
+/// Levels and filter of series that hold noise only.
+fn noise_of(series: &[Vec<f64>], body: &Body, sample_time_s: f64, from_repeats: bool) -> (NoiseLevels, Whitener) {
+    let levels = NoiseLevels::fit(series, body, sample_time_s, from_repeats);
+    let mut whitener = Whitener::new(&levels, body, sample_time_s);
+    let filtered = whitener.applied(series);
+    whitener.refine(&filtered);
+    (levels, whitener)
+}
+
+/// Machine and size of its motion in the fit records; speed and noise come later.
+pub fn scene(given: &Plant, runs: &[Run], sample_time_s: f64, spindle_hz: Option<f64>) -> Scene {
+    let fit: Vec<&Run> = runs.iter().filter(|r| r.role == Role::Fit).collect();
+    let extremes = |of: &dyn Fn(&Run) -> &[f64]| {
+        let all = fit.iter().flat_map(|r| of(r).iter().copied());
+        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
+    };
+    let (low, high) = extremes(&|r| &r.position);
+    let (least, most) = extremes(&|r| &r.input);
+    let step = fit.iter().flat_map(|r| r.input.windows(2).map(|w| (w[1] - w[0]).abs())).fold(0.0f64, f64::max);
+    Scene {
+        plant: given.clone(),
+        sample_time_s,
+        spindle_hz,
+        travel: low.abs().max(high.abs()).max(1e-12),
+        centre: 0.5 * (low + high),
+        speed: 1.0,
+        command: least.abs().max(most.abs()).max(1e-12),
+        command_step: step.max(1e-15),
+        noise: 0.0,
+        duration_s: fit.iter().map(|r| r.len()).max().unwrap_or(0) as f64 * sample_time_s,
+        indexed: fit.iter().any(|r| r.spindle_rad.is_some()),
+        warm: fit.iter().any(|r| r.temperature.is_some()),
+    }
+}
+
 impl Bench {
     /// Sets up a diagnosis of `given` on these runs.
     pub fn new(given: &Plant, runs: Vec<Run>, sample_time_s: f64, spindle_hz: Option<f64>) -> Result<Bench, LtiError> {
         let form = LinearForm::new(given, sample_time_s);
         let fit_runs: Vec<usize> = (0..runs.len()).filter(|&i| runs[i].role == Role::Fit).collect();
         let stack = Stack::grouped(&runs, &fit_runs);
-        let means = stack.segments.iter().map(|s| mean_run(&runs, &s.runs)).collect();
-        let extremes = |of: &dyn Fn(&Run) -> &[f64]| {
-            fit_runs
-                .iter()
-                .flat_map(|&r| of(&runs[r]).iter().copied())
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
-        };
-        let (low, high) = extremes(&|r| &r.position);
-        let (least, most) = extremes(&|r| &r.input);
-        let step =
-            fit_runs.iter().flat_map(|&r| runs[r].input.windows(2).map(|w| (w[1] - w[0]).abs())).fold(0.0f64, f64::max);
-        let scene = Scene {
-            plant: given.clone(),
-            sample_time_s,
-            spindle_hz,
-            travel: low.abs().max(high.abs()).max(1e-12),
-            centre: 0.5 * (low + high),
-            speed: 1.0,
-            command: least.abs().max(most.abs()).max(1e-12),
-            command_step: step.max(1e-15),
-            noise: 0.0,
-            duration_s: fit_runs.iter().map(|&r| runs[r].len()).max().unwrap_or(0) as f64 * sample_time_s,
-            indexed: fit_runs.iter().any(|&r| runs[r].spindle_rad.is_some()),
-            warm: fit_runs.iter().any(|&r| runs[r].temperature.is_some()),
-        };
-        let levels = NoiseLevels { sensor_rms: 1.0, torque_rms: 0.0, torque_corner_hz: 60.0, from_repeats: false };
-        let whitener = Whitener::new(&levels, &given.body, sample_time_s);
+        let scene = scene(given, &runs, sample_time_s, spindle_hz);
         let p = vec![0.0; form.knobs.len()];
+        let carrier = form.carrier(&p);
+        let sampled = Sampled::of(&carrier.plant, sample_time_s)?;
+        // Repeats differ by noise only, so that the linear answer to the difference of their commands is all that counts.
+        let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
+        let still = Trajectory { samples: Vec::new(), unexplained: Vec::new() };
+        let free = |n: usize| free_motions(&given.body, sample_time_s, n).to_vec();
+        let mut errors: Vec<(usize, Vec<f64>)> = (fit_runs.iter())
+            .map(|&r| (r, simulation_error(&sampled, &plain, &[], &scene, &runs[r], &still, 0)))
+            .collect();
+        let body = &carrier.plant.body;
+        let mut white = |errors: &[(usize, Vec<f64>)]| {
+            let without = without_start(errors, &free);
+            let series = noise_series(&without, &runs);
+            let levels = NoiseLevels::fit(&values(&series), body, sample_time_s, true);
+            let whitener = Whitener::new(&levels, body, sample_time_s);
+            (whitener.applied(&values(&series)), series.iter().map(|s| runs[s.0].group).collect())
+        };
+        let recorded = errors.clone();
+        let lines = take_lines(&mut errors, &runs, &free, sample_time_s, spindle_hz, &mut white);
+        let mut cleaned = runs.clone();
+        for ((r, before), (_, after)) in recorded.iter().zip(&errors) {
+            let position = &mut cleaned[*r].position;
+            position.iter_mut().zip(before).zip(after).for_each(|((y, b), a)| *y -= b - a);
+        }
+        let means: Vec<Run> = stack.segments.iter().map(|s| mean_run(&cleaned, &s.runs)).collect();
+        let without = without_start(&errors, &free);
+        let repeats = noise_series(&without, &runs);
+        let from_repeats = !repeats.is_empty();
+        let (owners, series): (Vec<usize>, Vec<Vec<f64>>) =
+            if from_repeats { repeats.into_iter().unzip() } else { without.into_iter().unzip() };
+        let (levels, whitener) = noise_of(&series, body, sample_time_s, from_repeats);
+        let repeats = if from_repeats { owners.into_iter().zip(whitener.applied(&series)).collect() } else { Vec::new() };
         let mut bench = Bench {
             form,
             runs,
             fit_runs,
             levels,
             whitener,
+            lines,
             means,
             trajectories: Vec::new(),
             stack,
             scene,
-            repeats: Vec::new(),
-            p,
+            repeats,
         };
-        bench.renew()?;
+        bench.scene.noise = bench.levels.sensor_rms;
+        bench.smooth(&carrier, &sampled, &bench.means.clone(), &vec![Vec::new(); bench.means.len()]);
+        let speeds = bench.trajectories.iter().flat_map(|t| t.samples.iter().map(|s| s.v.abs()));
+        bench.scene.speed = speeds.fold(0.0f64, f64::max).max(1e-12);
         Ok(bench)
     }
 
-    /// Noise, filter and motion anew, for the linear parameters as they are now.
-    pub fn renew(&mut self) -> Result<(), LtiError> {
-        let carrier = self.form.carrier(&self.p);
+    /// Without repeats there is only what a model leaves: noise and filter anew from the errors of the best one so far.
+    /// Verdicts are weaker for it.
+    pub fn renew(&mut self, p: &[f64], chosen: &[Chosen]) {
         let t = self.scene.sample_time_s;
-        let sampled = Sampled::of(&carrier.plant, t)?;
-        // Repeats differ by noise only, so that the linear answer to the difference of their commands is all that counts.
-        let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
-        let still = Trajectory { samples: Vec::new(), unexplained: Vec::new() };
-        let error = |r: usize| simulation_error(&sampled, &plain, &[], &self.scene, &self.runs[r], &still, 0);
-        let errors: Vec<(usize, Vec<f64>)> = self.fit_runs.iter().map(|&r| (r, error(r))).collect();
-        let repeats = noise_series(&errors, &self.runs);
-        let from_repeats = !repeats.is_empty();
-        let owners: Vec<usize> = repeats.iter().map(|r| r.0).collect();
-        let series = if from_repeats {
-            repeats.into_iter().map(|r| r.1).collect()
-        } else {
-            self.residual_series(&sampled, &carrier)
-        };
-        let weight = vec![1.0; series.len()];
-        self.levels = NoiseLevels::fit(&series, &weight, &carrier.plant.body, t, from_repeats);
-        self.whitener = Whitener::new(&self.levels, &carrier.plant.body, t);
-        let filtered: Vec<Vec<f64>> = series
-            .into_iter()
-            .map(|mut s| {
-                self.whitener.apply(&mut s);
-                s
-            })
-            .collect();
-        self.whitener.refine(&filtered, &weight);
-        self.repeats = owners.into_iter().zip(filtered).collect();
+        let left: Vec<(usize, Vec<f64>)> = self.fit(chosen.to_vec()).errors(p).into_iter().enumerate().collect();
+        let body = self.form.carrier(p).plant.body;
+        let without = without_start(&left, &|n| free_motions(&body, t, n).to_vec());
+        (self.levels, self.whitener) = noise_of(&values(&without), &body, t, false);
         self.scene.noise = self.levels.sensor_rms;
-        self.scene.plant = carrier.plant.clone();
-        self.smooth(&carrier, &sampled, &self.means.clone(), &vec![Vec::new(); self.means.len()]);
-        let speeds = self.trajectories.iter().flat_map(|t| t.samples.iter().map(|s| s.v.abs()));
-        self.scene.speed = speeds.fold(0.0f64, f64::max).max(1e-12);
-        Ok(())
     }
 
     /// The motion behind each mean run, with a known torque beside the carrier.
@@ -182,13 +215,9 @@ impl Bench {
                     continue;
                 }
                 let raw = raw_columns(c.effect, &c.setting.inner, &self.scene, motion);
-                let own = match facts.per_record {
-                    true => c.setting.strengths.get(i * facts.columns..).unwrap_or(&[]),
-                    false => &c.setting.strengths[..],
-                };
-                for (column, s) in raw.iter().zip(own) {
+                for (column, s) in raw.iter().zip(c.own(i)) {
                     // A command reaches the arm late, like the one it is added to.
-                    let late = (facts.entry == Entry::Command).then(|| acting(&sampled.delayed, column));
+                    let late = (facts.entry == Entry::Command).then(|| acting(&sampled.delayed, column, 0.0));
                     let column = late.as_ref().unwrap_or(column);
                     if sensed {
                         run.position.iter_mut().zip(column).for_each(|(y, v)| *y -= s * v);
@@ -202,25 +231,6 @@ impl Bench {
         self.smooth(&carrier, &sampled, &means, &known);
     }
 
-    /// Without repeats there is only what the model leaves: the error of the carrier along the recorded motion, which holds
-    /// what the model lacks as well as the noise. Verdicts are weaker for it.
-    fn residual_series(&self, sampled: &Sampled, carrier: &Carrier) -> Vec<Vec<f64>> {
-        let still = Trajectory { samples: Vec::new(), unexplained: Vec::new() };
-        let moved = self.trajectories.len() == self.means.len();
-        self.means
-            .iter()
-            .enumerate()
-            .map(|(i, run)| {
-                if moved {
-                    simulation_error(sampled, carrier, &[], &self.scene, run, &self.trajectories[i], i)
-                } else {
-                    let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
-                    simulation_error(sampled, &plain, &[], &self.scene, run, &still, i)
-                }
-            })
-            .collect()
-    }
-
     /// A fit on the stack with these effects.
     pub fn fit(&self, chosen: Vec<Chosen>) -> Fit<'_> {
         Fit {
@@ -229,6 +239,7 @@ impl Bench {
             trajectories: &self.trajectories,
             whitener: &self.whitener,
             stack: &self.stack,
+            lines: &self.lines,
             scene: &self.scene,
             chosen,
         }

@@ -1,14 +1,15 @@
 //! The diagnosis of a case, step by step: logs, noise, linear refit, search, judgement on hold-out records, verdict.
 
-use super::bench::Bench;
+use super::bench::{Bench, scene};
 use super::corrected::{Corrected, corrected};
 use super::finding::*;
 use super::hygiene::{Replay, SampleFault, replay_records, sample_faults, slip};
-use super::judge::{Judged, Loop, Simulation, errors, floor, rms};
+use super::judge::{Judged, Simulation, error, errors, floor, rms};
+use super::line_finding::line_findings;
 use super::name::{finding, linear_story};
 use super::run::{Run, runs};
 use super::select::{SelectSettings, Selection, select};
-use crate::controller::{Controller, ControllerError};
+use crate::controller::{Controller, ControllerError, Law};
 use crate::lti::{LtiError, Plant};
 use crate::physics::{Effect, Scene, Setting, library};
 use crate::recording::{Case, Role};
@@ -60,8 +61,6 @@ pub struct Diagnosed {
     pub errors: [Vec<Vec<f64>>; 3],
 }
 
-/// Error of the controller's replay above which the law is not the documented one; logs round their numbers.
-const REPLAY: f64 = 5e-3;
 /// Share of the error in excess of noise that findings must explain to be named.
 pub(super) const NAMED_SHARE: f64 = 0.955;
 /// Whitened error per sample that counts as clean, whatever the share.
@@ -77,49 +76,59 @@ struct Hygiene {
     closed: bool,
 }
 
-fn check(
-    case: &Case,
-    runs: &mut [Run],
-    controller: Option<&Controller>,
-    sample_time_s: f64,
-) -> Result<Hygiene, DiagnoseError> {
+/// What the logs say; positions that turn out to be shifted are moved back.
+fn check(case: &Case, runs: &mut [Run], given: &Plant, law: Option<&Law>, sample_time_s: f64) -> Result<Hygiene, LtiError> {
     let mut faults: Vec<SampleFault> = case
         .records
         .iter()
         .zip(runs.iter())
         .flat_map(|((_, record), run)| sample_faults(run, &record.gaps, sample_time_s))
         .collect();
-    let fit: Vec<&Run> = runs.iter().filter(|r| r.role == Role::Fit).collect();
-    let replay = controller.map(|c| replay_records(c, &fit)).transpose()?.flatten();
-    let mut closed = controller.is_some() && fit.iter().all(|r| r.reference.is_some());
-    let mut found = None;
-    if let (Some(r), Some(c)) = (&replay, controller)
-        && r.error > REPLAY
+    let mut hygiene = Hygiene { replay: None, faults: Vec::new(), finding: None, closed: false };
+    if let Some(law) = law {
+        let smooth = smooth(given, runs, sample_time_s)?;
+        let all: Vec<&Run> = runs.iter().collect();
+        hygiene.closed = all.iter().all(|r| r.reference.is_some());
+        hygiene.replay = replay_records(law, &all, &smooth);
+    }
+    if let (Some(r), Some(law)) = (&hygiene.replay, law)
+        && !r.failing.is_empty()
     {
-        for run in &fit {
-            faults.extend(slip(c, run)?);
-        }
-        if faults.is_empty() {
-            let helps = |e: f64| e < 0.3 * r.error;
+        let failing: Vec<usize> = (0..runs.len()).filter(|&i| r.failing.contains(&runs[i].name)).collect();
+        let slips: Vec<SampleFault> = failing.iter().filter_map(|&i| slip(law, &runs[i], sample_time_s)).collect();
+        let named: Vec<&Run> = failing.iter().map(|&i| &runs[i]).collect();
+        let helps = |e: f64| e < 0.3 * r.error;
+        if !slips.is_empty() {
+            faults.extend(slips);
+            hygiene.closed = false;
+        } else if faults.is_empty() {
             if helps(r.error_shifted) && r.shift_samples.abs() > 0.05 && r.error_shifted <= 1.1 * r.error_scaled {
-                found = Some(super::log_finding::misalignment(r, sample_time_s, &fit));
-                for run in runs.iter_mut() {
-                    shift(run, r.shift_samples);
-                }
+                hygiene.finding = Some(super::log_finding::misalignment(r, sample_time_s, &named));
+                let by = r.shift_samples;
+                failing.iter().for_each(|&i| shift(&mut runs[i], by));
             } else if helps(r.error_scaled) {
-                found = Some(super::log_finding::scale(r, &fit));
-                closed = false;
+                hygiene.finding = Some(super::log_finding::scale(r, &named));
+                hygiene.closed = false;
             } else {
-                found = Some(super::log_finding::controller_mismatch(r, &fit));
-                closed = false;
+                hygiene.finding = Some(super::log_finding::controller_mismatch(r, &named));
+                hygiene.closed = false;
             }
         }
     }
     if !faults.is_empty() {
-        found = Some(super::log_finding::samples(&faults));
-        closed = closed && replay.as_ref().is_some_and(|r| r.error <= REPLAY);
+        hygiene.finding = Some(super::log_finding::samples(&faults));
+        hygiene.closed = hygiene.closed && hygiene.replay.as_ref().is_some_and(|r| r.failing.is_empty());
     }
-    Ok(Hygiene { replay, faults, finding: found, closed })
+    hygiene.faults = faults;
+    Ok(hygiene)
+}
+
+/// The given plant's answer to each record's command, its free motions fitted to the position: the motion without the noise.
+fn smooth(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Vec<Vec<f64>>, LtiError> {
+    let scene = scene(given, runs, sample_time_s, None);
+    let model = Judged { plant: given, effects: Vec::new(), own: Vec::new(), lines: &[], scene: &scene };
+    let smooth = |run: &Run| Ok(run.position.iter().zip(error(&model, run, None)?).map(|(y, e)| y - e).collect());
+    runs.iter().map(smooth).collect()
 }
 
 /// Moves the position log against the others by a real number of samples.
@@ -159,18 +168,16 @@ pub fn diagnose(
     // Digits of the printed clock do not matter once a controller says what the sample time is.
     let sample_time_s = controller.map_or(sample_time_s, |c| c.sample_time_s);
     progress("checking the logs");
-    let hygiene = check(case, &mut all, controller, sample_time_s)?;
+    let law = controller.map(Law::new).transpose()?;
+    let hygiene = check(case, &mut all, given, law.as_ref(), sample_time_s)?;
     let mut bench = Bench::new(given, all, sample_time_s, case.spindle_hz)?;
     // Records whose samples slipped hold nothing that a model could be fitted to.
     let selection = select(&mut bench, library(), &settings.select, &mut progress);
     progress("simulating all records");
     let fixed = corrected(&bench.form, &selection.model.refitted.p, &selection.model.chosen, &bench.scene);
     let refitted = corrected(&bench.form, &selection.baseline.refitted.p, &[], &bench.scene);
-    let closed = match controller {
-        Some(c) if hygiene.closed => Some(Loop { controller: c, chain: c.sections()?.chain }),
-        _ => None,
-    };
-    let (figures, errors) = fit_report(&bench, given, &refitted, &fixed, closed.as_ref());
+    let closed = law.as_ref().filter(|_| hygiene.closed);
+    let (figures, errors) = fit_report(&bench, &selection, given, &refitted, &fixed, closed);
     let sse = bench.stack.total as f64;
     let whitened = [selection.given / sse, selection.baseline.cost / sse, selection.model.cost / sse];
     let mut diagnosis = Diagnosis {
@@ -225,8 +232,8 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
     if !model.chosen.is_empty() {
         if (explained >= NAMED_SHARE || clean) && holds {
             let mut found: Vec<Finding> = Vec::new();
-            for (i, step) in selection.steps.iter().enumerate().filter(|(_, s)| s.taken.is_some()) {
-                let f = finding(bench, selection, step, i);
+            for step in selection.steps.iter().filter(|s| s.taken.is_some()) {
+                let f = finding(bench, selection, step);
                 if found.iter().all(|g| g.effect != f.effect) {
                     found.push(f);
                 }
@@ -246,6 +253,17 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
         d.verdict = Verdict::LocatedUnexplained;
         d.findings.push(super::name::unexplained(bench, selection, 0.0));
     }
+    if d.verdict != Verdict::DataFault {
+        let lines = line_findings(bench, selection);
+        if d.findings.is_empty()
+            && let Some(f) = lines.first()
+        {
+            d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
+        }
+        if d.verdict != Verdict::LocatedUnexplained {
+            d.findings.extend(lines);
+        }
+    }
     linear_story(d, bench, selection);
     if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)
         && let Some(f) = super::name::noise_story(bench)
@@ -258,27 +276,24 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
 /// Errors of all runs under a model, as the report shows them.
 fn fit_report(
     bench: &Bench,
+    selection: &Selection,
     given: &Plant,
     refitted: &Corrected,
     fixed: &Corrected,
-    closed: Option<&Loop>,
+    closed: Option<&Law>,
 ) -> (FitReport, [Vec<Vec<f64>>; 3]) {
     let every: Vec<&Run> = bench.runs.iter().collect();
     let scene = Scene { plant: given.clone(), ..bench.scene.clone() };
     let none: Vec<(&'static dyn Effect, Setting)> = Vec::new();
-    let under = |plant: &Plant, effects: &[(&'static dyn Effect, Setting)], closed: Option<&Loop>| {
-        let model = Judged {
-            plant,
-            effects: effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect(),
-            scene: if effects.is_empty() { &scene } else { &bench.scene },
-        };
-        errors(&model, &every, closed)
+    let under = |plant: &Plant, effects: &[(&'static dyn Effect, Setting)], closed: Option<&Law>| {
+        let effects = effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
+        errors(&Judged { plant, effects, own: Vec::new(), lines: &[], scene: &scene }, &every, closed)
     };
-    let three = |closed: Option<&Loop>| {
+    let three = |closed: Option<&Law>| {
         [
             under(given, &none, closed),
             under(&refitted.plant, &refitted.effects, closed),
-            under(&fixed.plant, &fixed.effects, closed),
+            errors(&fixed.judged(bench, selection), &every, closed),
         ]
     };
     let open = three(None);

@@ -62,7 +62,7 @@ fn difference(bench: &Bench, run: &Run, a: &super::select::Model, b: &super::sel
         let fixed = super::corrected::corrected(&bench.form, &m.refitted.p, &m.chosen, &bench.scene);
         let effects: Vec<(&dyn Effect, _)> = fixed.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
         let scene: &Scene = &bench.scene;
-        error(&Judged { plant: &fixed.plant, effects, scene }, run, None).ok()
+        error(&Judged { plant: &fixed.plant, effects, own: Vec::new(), lines: &[], scene }, run, None).ok()
     };
     let (Some(x), Some(y)) = (simulate(a), simulate(b)) else { return 0.0 };
     let mut off: Vec<f64> = x.iter().zip(&y).map(|(x, y)| x - y).collect();

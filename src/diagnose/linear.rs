@@ -2,7 +2,7 @@
 //!
 //! Parameters are relative to the plant that the case came with: 0 everywhere is that plant.
 
-use crate::lti::{Body, DiscretePlant, LtiError, Plant, PlantState};
+use crate::lti::{Body, DiscretePlant, LtiError, Plant};
 
 /// One parameter of the linear plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,16 +154,6 @@ impl Sampled {
         let delayed = DiscretePlant::of(plant, sample_time_s)?;
         let direct = DiscretePlant::of(&Plant { delay_s: 0.0, ..plant.clone() }, sample_time_s)?;
         Ok(Sampled { delayed, direct })
-    }
-}
-
-/// The plant's answer from rest to an input held over each sample; `out` is added to.
-pub fn add_response(plant: &DiscretePlant, input: &[f64], out: &mut [f64]) {
-    let mut state = PlantState::at_rest(plant);
-    for (u, y) in input.iter().zip(out) {
-        *y += state.position();
-        state.command(*u);
-        state.advance(plant);
     }
 }
 

@@ -13,6 +13,8 @@ mod finding;
 mod hygiene;
 mod judge;
 mod linear;
+mod line_finding;
+mod lines;
 mod log_finding;
 mod name;
 mod place;

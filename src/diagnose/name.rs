@@ -38,15 +38,14 @@ pub(super) fn everywhere(runs: &[&Run]) -> Where {
 }
 
 /// The finding of one accepted step.
-pub(super) fn finding(bench: &Bench, selection: &Selection, step: &Step, index: usize) -> Finding {
+pub(super) fn finding(bench: &Bench, selection: &Selection, step: &Step) -> Finding {
     let taken = step.taken.unwrap_or(0);
     let (candidate, model) = &step.tried[taken];
     let c = &step.candidates[*candidate];
     let at = model.chosen.len() - 1;
     let last = &selection.model;
     let chosen = &last.chosen[at.min(last.chosen.len() - 1)];
-    let before = if index == 0 { selection.baseline.cost } else { cost_before(selection, index) };
-    let gain = before - model.cost;
+    let gain = step.before - model.cost;
     let spindle =
         |hz: f64| bench.scene.spindle_hz.is_some_and(|s| ((hz / s).round() - hz / s).abs() < 0.004 && hz > 0.9 * s);
     let own = c.effect.facts().name;
@@ -90,28 +89,17 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, step: &Step, index: 
     }
 }
 
-fn cost_before(selection: &Selection, index: usize) -> f64 {
-    let step = &selection.steps[index - 1];
-    step.taken.map_or(selection.baseline.cost, |t| step.tried[t].1.cost)
-}
-
 /// What the effect adds, whitened and stacked.
 fn effect_signal(bench: &Bench, selection: &Selection, at: usize) -> Vec<f64> {
     let model = &selection.model;
     let chosen = &model.chosen[at];
     let plant = bench.form.carrier(&model.refitted.p).plant;
     let Ok(sampled) = Sampled::of(&plant, bench.scene.sample_time_s) else { return vec![0.0; bench.stack.total] };
-    let facts = chosen.effect.facts();
     let mut signal = bench.stack.series(|i| {
         let columns =
             position_columns(chosen.effect, &chosen.setting.inner, &bench.scene, &bench.trajectories[i], &sampled);
-        let own = if facts.per_record {
-            &chosen.setting.strengths[i * facts.columns..]
-        } else {
-            &chosen.setting.strengths[..]
-        };
         let mut y = vec![0.0; bench.means[i].len()];
-        for (c, s) in columns.iter().zip(own) {
+        for (c, s) in columns.iter().zip(chosen.own(i)) {
             y.iter_mut().zip(c).for_each(|(y, c)| *y += s * c);
         }
         bench.whitener.apply(&mut y);

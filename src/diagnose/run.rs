@@ -21,6 +21,10 @@ pub struct Run {
     pub input: Vec<f64>,
     /// Position as recorded.
     pub position: Vec<f64>,
+    /// The command that is taken to have stood before the record began (command_unit).
+    pub before: f64,
+    /// The position at which it stood then.
+    pub origin: f64,
     /// PES where recorded; NaN between servo samples.
     pub pes: Option<Vec<f64>>,
     /// Spindle angle (rad), where recorded.
@@ -41,6 +45,17 @@ impl Run {
     }
 }
 
+/// Samples at the start over which a command at rest is averaged.
+const AT_REST: usize = 16;
+
+/// A signal before its record began: its mean as long as the reference stands still, what the controller held against springs
+/// and cables for instance; otherwise the first sample.
+fn first(signal: &[f64], reference: Option<&[f64]>) -> f64 {
+    let still = reference.map_or(0, |r| r.iter().take(AT_REST).take_while(|v| **v == r[0]).count());
+    let n = still.max(1).min(signal.len());
+    signal[..n].iter().sum::<f64>() / n as f64
+}
+
 /// The records of a case as runs, groups numbered in the order of their first record.
 pub fn runs(case: &Case) -> Vec<Run> {
     let mut groups: Vec<String> = Vec::new();
@@ -53,11 +68,13 @@ pub fn runs(case: &Case) -> Vec<Run> {
                 groups.push(key);
                 groups.len() - 1
             });
-            let input = record.command.iter().zip(&record.excitation).map(|(c, e)| c + e).collect();
+            let input: Vec<f64> = record.command.iter().zip(&record.excitation).map(|(c, e)| c + e).collect();
             Run {
                 name: entry.name(),
                 role: entry.role,
                 group,
+                before: first(&record.command, record.reference.as_deref()),
+                origin: first(&record.position, record.reference.as_deref()),
                 reference: record.reference.clone(),
                 command: record.command.clone(),
                 excitation: record.excitation.clone(),
@@ -82,5 +99,7 @@ pub fn mean_run(runs: &[Run], repeats: &[usize]) -> Run {
     let (command, excitation, input, position) =
         (average(|r| &r.command), average(|r| &r.excitation), average(|r| &r.input), average(|r| &r.position));
     (mean.command, mean.excitation, mean.input, mean.position) = (command, excitation, input, position);
+    mean.before = scale * repeats.iter().map(|&r| runs[r].before).sum::<f64>();
+    mean.origin = scale * repeats.iter().map(|&r| runs[r].origin).sum::<f64>();
     mean
 }
