@@ -333,6 +333,8 @@ pub(super) enum StudyName {
     Mirror,
     /// Diagnoses of the cases in the folder --data, beside their answers
     Mismatch,
+    /// Real recordings: EMPS, Silverbox, motor bench, mirror, diagnosed from a linear model
+    Recordings,
     /// The motor bench with flexible coupling, measured
     Motor,
     /// The nine cases of the public HDD benchmark plant

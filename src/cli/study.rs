@@ -21,6 +21,7 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::Plants => study::plants()?,
         StudyName::Mirror => study::mirror(&a.data)?,
         StudyName::Mismatch => study::mismatch(&a.data)?,
+        StudyName::Recordings => study::recordings(&a.data)?,
         StudyName::Motor => study::motor(&a.data)?,
         StudyName::Hdd => study::hdd(&a.data)?,
     };

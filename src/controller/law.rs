@@ -102,7 +102,8 @@ mod tests {
             feedforward: None,
         };
         let law = Law::new(&controller).unwrap();
-        let error: Vec<f64> = (0..3000).map(|k| 0.4 * (k as f64 * 0.01).sin() + 0.2 * (k as f64 * 0.37).cos()).collect();
+        let error: Vec<f64> =
+            (0..3000).map(|k| 0.4 * (k as f64 * 0.01).sin() + 0.2 * (k as f64 * 0.37).cos()).collect();
         let reference = vec![0.0; 3000];
         let mut memory = law.rest();
         let whole: Vec<f64> =

@@ -1,14 +1,16 @@
 //! Everything that a diagnosis works on, made in order: given plant, noise, filter, refit, motion.
 
-use super::columns::raw_columns;
-use super::linear::{Carrier, LinearForm, Sampled, free_motions};
+use super::columns::{Drive, drive, raw_columns};
+use super::linear::{Carrier, LinearForm, Sampled, body_numbers, free_motions, free_scales};
 use super::lines::{Line, take_lines};
 use super::refit::{Chosen, Fit, simulation_error};
 use super::run::{Run, mean_run};
+use super::select::Model;
 use super::stack::{Basis, Stack};
 use super::trajectory::{Smoother, Trajectory, acting};
 use super::whiten::{NoiseLevels, Whitener};
 use crate::lti::{Body, LtiError, Plant};
+use crate::numeric::least_squares::Qr;
 use crate::physics::{Entry, Port, Scene};
 use crate::recording::Role;
 
@@ -70,24 +72,63 @@ fn values(series: &[(usize, Vec<f64>)]) -> Vec<Vec<f64>> {
     series.iter().map(|s| s.1.clone()).collect()
 }
 
-/// Errors with each record's own start and constant torque taken out.
-fn without_start(errors: &[(usize, Vec<f64>)], free: &dyn Fn(usize) -> Vec<Vec<f64>>) -> Vec<(usize, Vec<f64>)> {
-    let mut out = errors.to_vec();
+/// Series with each record's own start and constant torque taken out, all of it seen through a filter.
+fn without_start(
+    series: &[(usize, Vec<f64>)],
+    free: &dyn Fn(usize) -> Vec<Vec<f64>>,
+    filter: &dyn Fn(&mut Vec<f64>),
+) -> Vec<(usize, Vec<f64>)> {
+    let mut out = series.to_vec();
     for (_, e) in &mut out {
         let mut basis = Basis::default();
-        free(e.len()).into_iter().for_each(|c| basis.add_local(0, c));
+        for mut c in free(e.len()) {
+            filter(&mut c);
+            basis.add_local(0, c);
+        }
+        filter(e);
         basis.project(e);
     }
     out
 }
 
-/// Levels and filter of series that hold noise only.
-fn noise_of(series: &[Vec<f64>], body: &Body, sample_time_s: f64, from_repeats: bool) -> (NoiseLevels, Whitener) {
-    let levels = NoiseLevels::fit(series, body, sample_time_s, from_repeats);
+/// Errors of records that were not repeated but whose drive repeats inside, lap by lap, as if the laps were repeats.
+fn in_laps(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<(usize, Vec<f64>)> {
+    let mut out = Vec::new();
+    for (r, e) in errors {
+        let alone = errors.iter().filter(|(o, _)| runs[*o].group == runs[*r].group).count() == 1;
+        match runs[*r].period().filter(|_| alone) {
+            Some(n) => out.extend(e.chunks_exact(n).map(|lap| (*r, lap.to_vec()))),
+            None => out.push((*r, e.clone())),
+        }
+    }
+    out
+}
+
+/// Levels and filter of series that hold noise only, but for each record's own start; and the series, filtered.
+fn noise_of(
+    series: &[(usize, Vec<f64>)],
+    free: &dyn Fn(usize) -> Vec<Vec<f64>>,
+    body: &Body,
+    sample_time_s: f64,
+    from_repeats: bool,
+) -> (NoiseLevels, Whitener, Vec<(usize, Vec<f64>)>) {
+    let levels = NoiseLevels::fit(&values(&without_start(series, free, &|_| {})), body, sample_time_s, from_repeats);
     let mut whitener = Whitener::new(&levels, body, sample_time_s);
-    let filtered = whitener.applied(series);
-    whitener.refine(&filtered);
-    (levels, whitener)
+    let filtered = without_start(series, free, &|x| whitener.apply(x));
+    whitener.refine(&values(&filtered));
+    let filtered = without_start(series, free, &|x| whitener.apply(x));
+    (levels, whitener, filtered)
+}
+
+/// Weights for the noise of each segment as its own repeats show it: a fast move may be noisier than a slow one.
+fn weigh(stack: &mut Stack, repeats: &[(usize, Vec<f64>)]) {
+    for s in &mut stack.segments {
+        let own = repeats.iter().filter(|(r, _)| s.runs.contains(r));
+        let (sum, n) = own.fold((0.0, 0), |(sum, n), (_, e)| (sum + e.iter().map(|v| v * v).sum::<f64>(), n + e.len()));
+        if n > 0 && sum > 0.0 {
+            s.weight /= (sum / n as f64).sqrt();
+        }
+    }
 }
 
 /// Machine and size of its motion in the fit records; speed and noise come later.
@@ -121,7 +162,7 @@ impl Bench {
     pub fn new(given: &Plant, runs: Vec<Run>, sample_time_s: f64, spindle_hz: Option<f64>) -> Result<Bench, LtiError> {
         let form = LinearForm::new(given, sample_time_s);
         let fit_runs: Vec<usize> = (0..runs.len()).filter(|&i| runs[i].role == Role::Fit).collect();
-        let stack = Stack::grouped(&runs, &fit_runs);
+        let mut stack = Stack::grouped(&runs, &fit_runs);
         let scene = scene(given, &runs, sample_time_s, spindle_hz);
         let p = vec![0.0; form.knobs.len()];
         let carrier = form.carrier(&p);
@@ -130,16 +171,15 @@ impl Bench {
         let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
         let still = Trajectory { samples: Vec::new(), unexplained: Vec::new() };
         let free = |n: usize| free_motions(&given.body, sample_time_s, n).to_vec();
-        let mut errors: Vec<(usize, Vec<f64>)> = (fit_runs.iter())
-            .map(|&r| (r, simulation_error(&sampled, &plain, &[], &scene, &runs[r], &still, 0)))
-            .collect();
+        let mut errors: Vec<(usize, Vec<f64>)> =
+            (fit_runs.iter()).map(|&r| (r, simulation_error(&sampled, &plain, &[], &runs[r], &still, 0))).collect();
         let body = &carrier.plant.body;
         let mut white = |errors: &[(usize, Vec<f64>)]| {
-            let without = without_start(errors, &free);
-            let series = noise_series(&without, &runs);
-            let levels = NoiseLevels::fit(&values(&series), body, sample_time_s, true);
+            let series = noise_series(&in_laps(errors, &runs), &runs);
+            let levels = NoiseLevels::fit(&values(&without_start(&series, &free, &|_| {})), body, sample_time_s, true);
             let whitener = Whitener::new(&levels, body, sample_time_s);
-            (whitener.applied(&values(&series)), series.iter().map(|s| runs[s.0].group).collect())
+            let filtered = without_start(&series, &free, &|x| whitener.apply(x));
+            (values(&filtered), series.iter().map(|s| runs[s.0].group).collect())
         };
         let recorded = errors.clone();
         let lines = take_lines(&mut errors, &runs, &free, sample_time_s, spindle_hz, &mut white);
@@ -149,13 +189,12 @@ impl Bench {
             position.iter_mut().zip(before).zip(after).for_each(|((y, b), a)| *y -= b - a);
         }
         let means: Vec<Run> = stack.segments.iter().map(|s| mean_run(&cleaned, &s.runs)).collect();
-        let without = without_start(&errors, &free);
-        let repeats = noise_series(&without, &runs);
+        let repeats = noise_series(&in_laps(&errors, &runs), &runs);
         let from_repeats = !repeats.is_empty();
-        let (owners, series): (Vec<usize>, Vec<Vec<f64>>) =
-            if from_repeats { repeats.into_iter().unzip() } else { without.into_iter().unzip() };
-        let (levels, whitener) = noise_of(&series, body, sample_time_s, from_repeats);
-        let repeats = if from_repeats { owners.into_iter().zip(whitener.applied(&series)).collect() } else { Vec::new() };
+        let series = if from_repeats { &repeats } else { &errors };
+        let (levels, whitener, filtered) = noise_of(series, &free, body, sample_time_s, from_repeats);
+        let repeats = if from_repeats { filtered } else { Vec::new() };
+        weigh(&mut stack, &repeats);
         let mut bench = Bench {
             form,
             runs,
@@ -182,8 +221,7 @@ impl Bench {
         let t = self.scene.sample_time_s;
         let left: Vec<(usize, Vec<f64>)> = self.fit(chosen.to_vec()).errors(p).into_iter().enumerate().collect();
         let body = self.form.carrier(p).plant.body;
-        let without = without_start(&left, &|n| free_motions(&body, t, n).to_vec());
-        (self.levels, self.whitener) = noise_of(&values(&without), &body, t, false);
+        (self.levels, self.whitener, _) = noise_of(&left, &|n| free_motions(&body, t, n).to_vec(), &body, t, false);
         self.scene.noise = self.levels.sensor_rms;
     }
 
@@ -201,7 +239,7 @@ impl Bench {
     pub fn correct(&mut self, p: &[f64], chosen: &[Chosen]) {
         let carrier = self.form.carrier(p);
         let Ok(sampled) = Sampled::of(&carrier.plant, self.scene.sample_time_s) else { return };
-        let arm = self.scene.arm_over_record();
+        let arm = carrier.arm_over_record();
         let mut means = self.means.clone();
         let mut known: Vec<Vec<f64>> = Vec::with_capacity(means.len());
         for (i, run) in means.iter_mut().enumerate() {
@@ -229,6 +267,49 @@ impl Bench {
             known.push(torque);
         }
         self.smooth(&carrier, &sampled, &means, &known);
+    }
+
+    /// The error of a model on any run along its recorded motion, effects of each record's own left out.
+    fn raw_along(&self, run: &Run, model: &Model) -> Result<(Carrier, Vec<f64>), LtiError> {
+        let carrier = self.form.carrier(&model.refitted.p);
+        let sampled = Sampled::of(&carrier.plant, self.scene.sample_time_s)?;
+        let alone = std::slice::from_ref(run);
+        let smoother = Smoother::of(&carrier.plant, &sampled.delayed, self.levels.sensor_rms, alone, &[Vec::new()]);
+        let motion = [smoother.smooth(run, &[], &sampled.delayed, self.scene.spindle_hz.unwrap_or(0.0))];
+        let lasting: Vec<&Chosen> = model.chosen.iter().filter(|c| !c.effect.facts().per_record).collect();
+        let drives: Vec<Drive> =
+            lasting.iter().map(|c| drive(c.effect, &c.setting.inner, &self.scene, &motion)).collect();
+        let parts: Vec<(&Drive, &[f64])> =
+            drives.iter().zip(lasting.iter().map(|c| &c.setting.strengths[..])).collect();
+        let e = simulation_error(&sampled, &carrier, &parts, run, &motion[0], 0);
+        Ok((carrier, e))
+    }
+
+    /// The whitened error of a model on any run along its recorded motion, with `own` columns of the record taken out.
+    pub fn along(&self, run: &Run, model: &Model, own: &[Vec<f64>]) -> Result<Vec<f64>, LtiError> {
+        let (_, mut e) = self.raw_along(run, model)?;
+        let mut basis = Basis::default();
+        for mut c in own.iter().cloned() {
+            self.whitener.apply(&mut c);
+            basis.add_local(0, c);
+        }
+        self.whitener.apply(&mut e);
+        basis.project(&mut e);
+        Ok(e)
+    }
+
+    /// The constant torque on a run beside command and laws (command_unit): what the error along the recorded motion asks for.
+    pub fn constant_torque(&self, run: &Run, model: &Model) -> Result<f64, LtiError> {
+        let (carrier, mut e) = self.raw_along(run, model)?;
+        let (t, n, body) = (self.scene.sample_time_s, run.len(), self.form.given.body);
+        self.whitener.apply(&mut e);
+        let mut free = free_motions(&body, t, n);
+        free.iter_mut().for_each(|c| self.whitener.apply(c));
+        let mut qr = Qr::default();
+        qr.factor(n, 3, |a| a.chunks_exact_mut(n).zip(&free).for_each(|(a, c)| a.copy_from_slice(c)));
+        let acceleration = qr.solve(&mut e)[2] * free_scales(&body, t, n)[2];
+        let gain = body_numbers(&carrier.plant.body).0 * carrier.plant.resonance_gain;
+        Ok(acceleration * carrier.arm_over_record() / gain - run.before)
     }
 
     /// A fit on the stack with these effects.

@@ -29,6 +29,7 @@ impl Corrected {
             effects: self.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect(),
             own: own.map(|c| (c.effect as &dyn Effect, &c.setting.inner[..])).collect(),
             lines: &bench.lines,
+            fit: Some((bench, &selection.model)),
             scene: &bench.scene,
         }
     }

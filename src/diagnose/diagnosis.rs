@@ -6,11 +6,12 @@ use super::finding::*;
 use super::hygiene::{Replay, SampleFault, replay_records, sample_faults, slip};
 use super::judge::{Judged, Simulation, error, errors, floor, rms};
 use super::line_finding::line_findings;
-use super::name::{finding, linear_story};
+use super::name::{finding, linear_story, same_drag};
 use super::run::{Run, runs};
 use super::select::{SelectSettings, Selection, select};
 use crate::controller::{Controller, ControllerError, Law};
 use crate::lti::{LtiError, Plant};
+use crate::numeric::least_squares::dot;
 use crate::physics::{Effect, Scene, Setting, library};
 use crate::recording::{Case, Role};
 use thiserror::Error;
@@ -61,6 +62,8 @@ pub struct Diagnosed {
     pub errors: [Vec<Vec<f64>>; 3],
 }
 
+/// Whitened error per sample of records that were not used, up to which a model holds whatever the refit leaves.
+const HELD_OUT: f64 = 1.2;
 /// Share of the error in excess of noise that findings must explain to be named.
 pub(super) const NAMED_SHARE: f64 = 0.955;
 /// Whitened error per sample that counts as clean, whatever the share.
@@ -77,7 +80,13 @@ struct Hygiene {
 }
 
 /// What the logs say; positions that turn out to be shifted are moved back.
-fn check(case: &Case, runs: &mut [Run], given: &Plant, law: Option<&Law>, sample_time_s: f64) -> Result<Hygiene, LtiError> {
+fn check(
+    case: &Case,
+    runs: &mut [Run],
+    given: &Plant,
+    law: Option<&Law>,
+    sample_time_s: f64,
+) -> Result<Hygiene, LtiError> {
     let mut faults: Vec<SampleFault> = case
         .records
         .iter()
@@ -126,7 +135,7 @@ fn check(case: &Case, runs: &mut [Run], given: &Plant, law: Option<&Law>, sample
 /// The given plant's answer to each record's command, its free motions fitted to the position: the motion without the noise.
 fn smooth(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Vec<Vec<f64>>, LtiError> {
     let scene = scene(given, runs, sample_time_s, None);
-    let model = Judged { plant: given, effects: Vec::new(), own: Vec::new(), lines: &[], scene: &scene };
+    let model = Judged { plant: given, effects: Vec::new(), own: Vec::new(), lines: &[], fit: None, scene: &scene };
     let smooth = |run: &Run| Ok(run.position.iter().zip(error(&model, run, None)?).map(|(y, e)| y - e).collect());
     runs.iter().map(smooth).collect()
 }
@@ -192,12 +201,28 @@ pub fn diagnose(
         replay: hygiene.replay.clone(),
         sample_faults: hygiene.faults.clone(),
         whitened,
+        holdout_whitened: held_out(&bench, &selection, &fixed)?,
         remarks: Vec::new(),
         search: search(&selection),
     };
     judge(&mut diagnosis, &bench, &selection, hygiene.finding);
     super::experiment::propose(&mut diagnosis, &bench, &selection);
     Ok(Diagnosed { diagnosis, bench, selection, corrected: fixed, refitted: refitted.plant, errors })
+}
+
+/// Whitened error per sample on the records that were not used, along their recorded motion: linear refit and final model. It
+/// does not hide behind the controller.
+fn held_out(bench: &Bench, selection: &Selection, fixed: &Corrected) -> Result<Option<[f64; 2]>, LtiError> {
+    let (mut sums, mut n) = ([0.0; 2], 0);
+    for run in bench.runs.iter().filter(|r| r.role == Role::Holdout) {
+        let own = fixed.judged(bench, selection).columns(run)?;
+        for (sum, model) in sums.iter_mut().zip([&selection.baseline, &selection.model]) {
+            let e = bench.along(run, model, &own)?;
+            *sum += dot(&e, &e);
+        }
+        n += run.len();
+    }
+    Ok((n > 0).then(|| sums.map(|s| s / n as f64)))
 }
 
 fn search(selection: &Selection) -> Vec<Tried> {
@@ -223,22 +248,30 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
     let (base, model) = (&selection.baseline, &selection.model);
     let explained = if base.excess() > 0.0 { 1.0 - model.excess().max(0.0) / base.excess() } else { 1.0 };
     let clean = model.cost / model.freedom < CLEAN || model.excess_sigma() < 6.0;
-    let holds =
-        d.fit.holdout.is_none_or(|h| h.rms_after <= h.rms_refit_linear * 1.05 || h.rms_after <= 1.2 * h.noise_floor);
+    let holds = match d.holdout_whitened {
+        Some([refit, after]) => after <= 1.05 * refit || after <= HELD_OUT,
+        None => true,
+    };
     if let Some(f) = logs {
         d.verdict = if f.port == crate::physics::Port::Controller { Verdict::Named } else { Verdict::DataFault };
         d.findings.push(f);
     }
     if !model.chosen.is_empty() {
-        if (explained >= NAMED_SHARE || clean) && holds {
+        let decisive = explained >= MOST && rival_share(selection) < RIVAL;
+        if (explained >= NAMED_SHARE || clean || decisive) && holds {
+            if !clean && explained < NAMED_SHARE {
+                d.remarks.push(format!(
+                    "no other law of the library comes near, but {:.1} % of the error in excess of noise stays unexplained",
+                    100.0 * (1.0 - explained)
+                ));
+            }
             let mut found: Vec<Finding> = Vec::new();
-            for step in selection.steps.iter().filter(|s| s.taken.is_some()) {
-                let f = finding(bench, selection, step);
+            for f in (0..model.chosen.len()).filter_map(|at| finding(bench, selection, at)) {
                 if found.iter().all(|g| g.effect != f.effect) {
                     found.push(f);
                 }
             }
-            if d.findings.is_empty() {
+            if d.findings.is_empty() && !found.is_empty() {
                 d.verdict = if found[0].family.len() > 1 { Verdict::Family } else { Verdict::Named };
             }
             // A log that slipped explains what comes after it better than any physics does.
@@ -249,7 +282,7 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
             d.verdict = Verdict::LocatedUnexplained;
             d.findings.push(super::name::unexplained(bench, selection, explained));
         }
-    } else if !clean && d.findings.is_empty() {
+    } else if (!clean || unaccounted(selection)) && d.findings.is_empty() {
         d.verdict = Verdict::LocatedUnexplained;
         d.findings.push(super::name::unexplained(bench, selection, 0.0));
     }
@@ -271,7 +304,44 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
         d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
         d.findings.push(f);
     }
+    // Without repeats, what the refit leaves beyond the sensor's white noise may be noise of torque or missing physics.
+    if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)
+        && !bench.levels.from_repeats
+        && d.fit.open_loop.is_some_and(|o| o.rms_after > COLOURED * bench.levels.sensor_rms)
+    {
+        d.verdict = Verdict::Undecidable;
+        d.remarks.push(
+            "no record was repeated: the error that the refit leaves is coloured, and cannot be told from noise of torque".into(),
+        );
+    }
 }
+
+/// What the best rival of the first finding explains, as a share of what that finding does.
+fn rival_share(selection: &Selection) -> f64 {
+    let Some((step, taken)) = selection.steps.first().and_then(|s| s.taken.map(|t| (s, &s.tried[t]))) else {
+        return 1.0;
+    };
+    let name = |i: usize| step.candidates[i].effect.facts().name;
+    let gain = step.before - taken.1.cost;
+    let others = step.tried.iter().filter(|t| name(t.0) != name(taken.0) && !same_drag(name(t.0), name(taken.0)));
+    others.map(|t| (step.before - t.1.cost) / gain).fold(0.0, f64::max)
+}
+
+/// Share of the error in excess of noise from which a name may be given though more is left than noise, and the share of its
+/// gain that the best rival may reach then: what the library lacks is usually near to several of its laws.
+const MOST: f64 = 0.75;
+const RIVAL: f64 = 0.8;
+
+/// Whether a scan saw far more than noise shows, though no law explains enough of it.
+fn unaccounted(selection: &Selection) -> bool {
+    let best = selection.steps.first().and_then(|s| s.candidates.first());
+    best.is_some_and(|c| c.log_p_value(library().len()) < SEEN.ln())
+}
+
+/// Chance of a scan's best gain under noise below which something is there.
+const SEEN: f64 = 1e-9;
+/// Open-loop error over the sensor's white noise above which it counts as coloured.
+const COLOURED: f64 = 1.25;
 
 /// Errors of all runs under a model, as the report shows them.
 fn fit_report(
@@ -287,7 +357,7 @@ fn fit_report(
     let none: Vec<(&'static dyn Effect, Setting)> = Vec::new();
     let under = |plant: &Plant, effects: &[(&'static dyn Effect, Setting)], closed: Option<&Law>| {
         let effects = effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
-        errors(&Judged { plant, effects, own: Vec::new(), lines: &[], scene: &scene }, &every, closed)
+        errors(&Judged { plant, effects, own: Vec::new(), lines: &[], fit: None, scene: &scene }, &every, closed)
     };
     let three = |closed: Option<&Law>| {
         [

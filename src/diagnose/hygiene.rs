@@ -59,11 +59,19 @@ fn between(y: &[f64], at: f64) -> f64 {
     b + 0.5 * f * (c - a + f * (2.0 * a - 5.0 * b + 4.0 * c - d + f * (3.0 * (b - c) + d - a)))
 }
 
+/// Samples at each end of a record that a replay leaves out.
+const END: usize = 16;
+
 /// Squares of recorded less replayed commands off the limit, and of the recorded ones.
+///
+/// The ends are left out: a shifted log lacks samples there.
 fn misfit(law: &Law, run: &Run, reference: &[f64], position: &dyn Fn(usize) -> f64) -> (f64, f64) {
-    let error: Vec<f64> = reference.iter().enumerate().map(|(k, r)| r - position(k)).collect();
-    let replayed = law.replay(reference, &error, &run.command);
-    let free = run.command.iter().zip(&replayed).filter(|(u, _)| u.abs() < 0.999 * law.limit);
+    let n = run.len();
+    let inside = if n > 20 * END { END..n - END } else { 0..n };
+    let error: Vec<f64> = inside.clone().map(|k| reference[k] - position(k)).collect();
+    let command = &run.command[inside.clone()];
+    let replayed = law.replay(&reference[inside], &error, command);
+    let free = command.iter().zip(&replayed).filter(|(u, _)| u.abs() < 0.999 * law.limit);
     free.fold((0.0, 0.0), |(off, all), (u, p)| (off + (u - p).powi(2), all + u * u))
 }
 
@@ -104,13 +112,9 @@ pub fn replay_records(law: &Law, runs: &[&Run], smooth: &[Vec<f64>]) -> Option<R
             let sums: Vec<(f64, f64)> = (failing.par_iter())
                 .map(|&i| {
                     let (run, reference, smooth) = with[i];
-                    let position = |k: usize| {
-                        let at = k as f64 + shift;
-                        if noise_too {
-                            between(&run.position, at)
-                        } else {
-                            run.position[k] + between(smooth, at) - smooth[k]
-                        }
+                    let position = |k: usize| match noise_too {
+                        true => between(&run.position, k as f64 + shift),
+                        false => run.position[k] + smooth[k] - between(smooth, k as f64 - shift),
                     };
                     misfit(law, run, reference, &position)
                 })
@@ -214,6 +218,9 @@ pub fn sample_faults(run: &Run, gaps: &[ClockGap], sample_time_s: f64) -> Vec<Sa
     all
 }
 
+/// Most samples that a log is taken to jump by.
+const SLIP: i32 = 40;
+
 /// A jump of the position log against the command log inside a record: where the replay starts to fail, and the shift behind
 /// that place that makes it right again.
 pub fn slip(law: &Law, run: &Run, sample_time_s: f64) -> Option<SampleFault> {
@@ -230,27 +237,25 @@ pub fn slip(law: &Law, run: &Run, sample_time_s: f64) -> Option<SampleFault> {
     start.sort_by(f64::total_cmp);
     let size = (dot(&run.command, &run.command) / n as f64).sqrt();
     let quiet = start[head * 9 / 10].max(1e-6 * size);
-    let Some(first) = plain.iter().position(|e| *e > 20.0 * quiet && *e > 1e-3 * size) else { return None };
-    // The start itself fails: not a slip inside the record.
-    if first < head {
+    let first = plain.iter().position(|e| *e > 20.0 * quiet && *e > 1e-3 * size)?;
+    // The start itself fails: not a slip inside the record. Too little behind it: no proof.
+    let tail = first + SLIP as usize;
+    if first < head || n < tail + head {
         return None;
     }
+    // Behind the slip the law goes on from a memory of its own.
     let rest = |d: f64| -> f64 {
-        let p = predicted(&|k| if k < first { run.position[k] } else { between(&run.position, k as f64 + d) });
-        off(&p)[first..].iter().map(|e| e * e).sum()
+        let error: Vec<f64> = (tail..n).map(|k| reference[k] - between(&run.position, k as f64 + d)).collect();
+        let replayed = law.replay(&reference[tail..], &error, &run.command[tail..]);
+        replayed.iter().zip(&run.command[tail..]).map(|(p, u)| (u - p).powi(2)).sum()
     };
-    let before: f64 = plain[first..].iter().map(|e| e * e).sum();
-    let mut best = (0.0, before);
-    for d in (-20..=20).filter(|d| *d != 0) {
-        let e = rest(f64::from(d));
-        if e < best.1 {
-            best = (f64::from(d), e);
-        }
-    }
-    (best.1 < 0.05 * before).then(|| SampleFault {
+    let before = rest(0.0);
+    let all = (1 - SLIP..SLIP).filter(|d| *d != 0).map(|d| (d, rest(f64::from(d))));
+    let (d, left) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (left < 0.05 * before).then(|| SampleFault {
         record: run.name.clone(),
         time_s: first as f64 * sample_time_s,
-        samples: -best.0,
+        samples: -f64::from(d),
         stuck: false,
     })
 }

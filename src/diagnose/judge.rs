@@ -3,14 +3,16 @@
 //! Closed loop from reference and excitation where a controller is known and its law holds; open loop from the recorded
 //! command otherwise. The start of each record is estimated.
 
+use super::bench::Bench;
 use super::columns::raw_columns;
 use super::linear::{Sampled, free_motions};
 use super::lines::Line;
 use super::run::Run;
+use super::select::Model;
 use super::stack::Basis;
 use super::trajectory::Trajectory;
 use crate::controller::Law;
-use crate::lti::{DiscretePlant, LtiError, Plant, PlantState, step_chain};
+use crate::lti::{Body, DiscretePlant, LtiError, Plant, PlantState, step_chain};
 use crate::physics::{Effect, Entry, Machine, Sample, Scene, Setting};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -36,14 +38,27 @@ pub struct Judged<'a> {
     pub own: Vec<(&'a dyn Effect, &'a [f64])>,
     /// Lines whose phase is each record's own.
     pub lines: &'a [Line],
+    /// The bench and the fit that the model comes from, for records that do not begin at rest: the constant torque on them is
+    /// then found along the recorded motion.
+    pub fit: Option<(&'a Bench, &'a Model)>,
     /// Machine and size of its motion.
     pub scene: &'a Scene,
 }
 
 impl Judged<'_> {
+    /// Position per constant command (position_unit per command_unit), infinite for a free inertia.
+    fn gain_at_rest(&self) -> f64 {
+        let modes: f64 = self.plant.modes.iter().map(|m| (m.zero_rad_s / m.pole_rad_s).powi(2)).product();
+        match self.plant.body {
+            Body::SecondOrder { dc_gain, .. } => dc_gain * self.plant.resonance_gain * modes,
+            Body::FreeInertia { .. } => f64::INFINITY,
+        }
+    }
+
     /// What is each record's own, in the position: the start, lines, and effects of a strength of their own.
-    fn columns(&self, run: &Run, direct: &DiscretePlant) -> Vec<Vec<f64>> {
+    pub fn columns(&self, run: &Run) -> Result<Vec<Vec<f64>>, LtiError> {
         let t = self.scene.sample_time_s;
+        let direct = Sampled::of(self.plant, t)?.direct;
         let mut all = free_motions(&self.plant.body, t, run.len()).to_vec();
         all.extend(self.lines.iter().flat_map(|l| l.columns(run, t)));
         let spindle = self.scene.spindle_hz.unwrap_or(0.0) * TAU;
@@ -66,7 +81,7 @@ impl Judged<'_> {
                 all.push(y);
             }
         }
-        all
+        Ok(all)
     }
 }
 
@@ -76,6 +91,9 @@ impl Judged<'_> {
 /// what is left of the start is taken out as free motions of body or loop, by least squares.
 pub fn error(model: &Judged, run: &Run, closed: Option<&Law>) -> Result<Vec<f64>, LtiError> {
     let mut machine = Machine::new(model.plant, &model.effects, model.scene)?.started_at(run.origin, run.before);
+    if let Some((bench, fit)) = model.fit.filter(|_| !run.rested && !model.effects.is_empty()) {
+        machine = machine.held_by(bench.constant_torque(run, fit)?, model.gain_at_rest());
+    }
     let t = model.scene.sample_time_s;
     let spindle = model.scene.spindle_hz.unwrap_or(0.0) * TAU;
     let n = run.len();
@@ -97,10 +115,10 @@ pub fn error(model: &Judged, run: &Run, closed: Option<&Law>) -> Result<Vec<f64>
         };
         machine.command(u);
     }
-    let sampled = Sampled::of(model.plant, t)?;
-    let mut own = model.columns(run, &sampled.direct);
+    let mut own = model.columns(run)?;
     if let Some((law, ..)) = &loops {
-        own = own.iter().map(|d| in_loop(&sampled.delayed, law, d)).collect();
+        let plant = DiscretePlant::of(model.plant, t)?;
+        own = own.iter().map(|d| in_loop(&plant, law, d)).collect();
     }
     take_out(own, &mut out);
     Ok(out)
@@ -152,9 +170,10 @@ pub fn rms(series: &[Vec<f64>]) -> f64 {
     (sum / f64::max(n, 1.0)).sqrt()
 }
 
-/// The noise of one record as repeats show it: the spread of a series about its group's mean; none without repeats.
+/// The noise of one record as repeats show it: the spread of a series about its group's mean, the median over the groups; none
+/// without repeats.
 pub fn floor(series: &[Vec<f64>], runs: &[&Run]) -> Option<f64> {
-    let (mut sum, mut n) = (0.0, 0.0);
+    let mut each = Vec::new();
     for (i, run) in runs.iter().enumerate() {
         let group: Vec<usize> =
             (0..runs.len()).filter(|&j| runs[j].group == run.group && runs[j].len() == run.len()).collect();
@@ -167,8 +186,15 @@ pub fn floor(series: &[Vec<f64>], runs: &[&Run]) -> Option<f64> {
             let mean = members.iter().map(|m| m[k]).sum::<f64>() / r;
             members.iter().map(|m| (m[k] - mean).powi(2)).sum::<f64>()
         };
-        sum += (0..run.len()).map(spread).sum::<f64>();
-        n += run.len() as f64 * (r - 1.0);
+        each.push((0..run.len()).map(spread).sum::<f64>() / (run.len() as f64 * (r - 1.0)));
     }
-    (n > 0.0 && f64::is_finite(sum)).then(|| (sum / n).sqrt())
+    each.retain(|v| v.is_finite());
+    each.sort_by(f64::total_cmp);
+    let middle = each.len() / 2;
+    let median = if each.len() % 2 == 1 {
+        each[middle]
+    } else {
+        0.5 * (each.get(middle)? + each.get(middle.wrapping_sub(1))?)
+    };
+    Some(median.sqrt())
 }

@@ -2,8 +2,8 @@
 
 use super::bench::Bench;
 use super::finding::{Estimate, Finding, Where};
-use super::lines::Line;
 use super::linear::{Sampled, free_motions};
+use super::lines::Line;
 use super::name::{everywhere, plain, text_of};
 use super::run::Run;
 use super::select::Selection;
@@ -49,8 +49,7 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> Vec<Finding
     let make = |effect: &str, family: &[&str], lines: &[&Line], parameters: BTreeMap<String, Estimate>| {
         let (says, port) = text_of(effect);
         let strongest = lines.iter().map(|l| l.log_p).fold(0.0, f64::min);
-        let place =
-            Where { frequency_hz: lines.iter().map(|l| [l.hz, l.hz]).collect(), ..everywhere(&runs) };
+        let place = Where { frequency_hz: lines.iter().map(|l| [l.hz, l.hz]).collect(), ..everywhere(&runs) };
         let at: Vec<String> = lines.iter().map(|l| format!("{:.3}", l.hz)).collect();
         Finding {
             effect: effect.into(),

@@ -119,7 +119,8 @@ pub fn strongest(series: &[Vec<f64>], groups: &[usize], sample_time_s: f64, spin
             .sum::<f64>()
     };
     let hz = golden_section(strength, at - 0.5 * width, at + 0.5 * width, 1e-3 * width).x;
-    let order = spindle_hz.map(|s| ((hz / s).round(), s)).filter(|(n, s)| *n >= 1.0 && (hz - n * s).abs() < SNAP * width);
+    let order =
+        spindle_hz.map(|s| ((hz / s).round(), s)).filter(|(n, s)| *n >= 1.0 && (hz - n * s).abs() < SNAP * width);
     Some(match order {
         Some((n, s)) => Line { hz: n * s, order: Some(n as usize), log_p },
         None => Line { hz, order: None, log_p },

@@ -23,6 +23,8 @@ pub struct Chosen {
     pub setting: Setting,
     /// Which inner parameters may be refined.
     pub continuous: Vec<bool>,
+    /// The step of the search that found it.
+    pub step: usize,
 }
 
 impl Chosen {
@@ -127,9 +129,8 @@ impl Problem<'_, '_> {
             .collect();
         let parts: Vec<(&Drive, &[f64])> =
             drives.iter().map(|d| &**d).zip(settings.iter().map(|s| &s.strengths[..])).collect();
-        let error = |(i, run): (usize, &Run)| {
-            simulation_error(&sampled, &carrier, &parts, fit.scene, run, &fit.trajectories[i], i)
-        };
+        let error =
+            |(i, run): (usize, &Run)| simulation_error(&sampled, &carrier, &parts, run, &fit.trajectories[i], i);
         runs.iter().enumerate().map(error).collect()
     }
 
@@ -153,7 +154,6 @@ pub fn simulation_error(
     sampled: &Sampled,
     carrier: &Carrier,
     effects: &[(&Drive, &[f64])],
-    scene: &Scene,
     run: &Run,
     trajectory: &Trajectory,
     segment: usize,
@@ -162,7 +162,7 @@ pub fn simulation_error(
     let mut command: Vec<f64> = run.input.iter().map(|u| u - run.before).collect();
     let mut torque: Option<Vec<f64>> = (carrier.spring != 0.0 || carrier.damper != 0.0).then(|| {
         // The mean over each interval, by the trapezium.
-        let by = scene.arm_over_record();
+        let by = carrier.arm_over_record();
         let at = |s: &Sample| by * (carrier.spring * s.x + carrier.damper * s.v);
         let samples = &trajectory.samples;
         (0..run.len()).map(|k| 0.5 * (at(&samples[k]) + at(&samples[(k + 1).min(run.len() - 1)]))).collect()

@@ -25,6 +25,8 @@ pub struct Run {
     pub before: f64,
     /// The position at which it stood then.
     pub origin: f64,
+    /// Whether it stood at rest as the record began: the forces on it were in balance then.
+    pub rested: bool,
     /// PES where recorded; NaN between servo samples.
     pub pes: Option<Vec<f64>>,
     /// Spindle angle (rad), where recorded.
@@ -39,20 +41,48 @@ impl Run {
         self.position.len()
     }
 
+    /// The period of what drives the record, where that repeats at least once: of reference and excitation, or of the command
+    /// where nothing else is known.
+    pub fn period(&self) -> Option<usize> {
+        let drives: Vec<&[f64]> = match &self.reference {
+            Some(r) => vec![r, &self.excitation],
+            None => vec![&self.input],
+        };
+        let still = |x: &[f64]| x.iter().all(|v| *v == x[0]);
+        if drives.iter().all(|x| still(x)) {
+            return None;
+        }
+        let size = |x: &[f64]| x.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let repeats = |x: &&[f64], n: usize| {
+            let close = PRINTED * size(x);
+            x.iter().zip(&x[n..]).all(|(a, b)| (a - b).abs() <= close)
+        };
+        (SHORTEST_LAP..=self.len() / 2).find(|&n| drives.iter().all(|x| repeats(x, n)))
+    }
+
     /// Whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.position.is_empty()
     }
 }
 
+/// Shortest lap (samples): below it there is no spectrum of noise to speak of.
+const SHORTEST_LAP: usize = 256;
+/// Relative difference that printed digits leave between two laps of one drive.
+const PRINTED: f64 = 1e-7;
+
 /// Samples at the start over which a command at rest is averaged.
 const AT_REST: usize = 16;
+
+/// Samples for which a reference stands still at the start, up to [`AT_REST`].
+fn still(reference: Option<&[f64]>) -> usize {
+    reference.map_or(0, |r| r.iter().take(AT_REST).take_while(|v| **v == r[0]).count())
+}
 
 /// A signal before its record began: its mean as long as the reference stands still, what the controller held against springs
 /// and cables for instance; otherwise the first sample.
 fn first(signal: &[f64], reference: Option<&[f64]>) -> f64 {
-    let still = reference.map_or(0, |r| r.iter().take(AT_REST).take_while(|v| **v == r[0]).count());
-    let n = still.max(1).min(signal.len());
+    let n = still(reference).max(1).min(signal.len());
     signal[..n].iter().sum::<f64>() / n as f64
 }
 
@@ -73,6 +103,7 @@ pub fn runs(case: &Case) -> Vec<Run> {
                 name: entry.name(),
                 role: entry.role,
                 group,
+                rested: still(record.reference.as_deref()) >= AT_REST.min(record.position.len()),
                 before: first(&record.command, record.reference.as_deref()),
                 origin: first(&record.position, record.reference.as_deref()),
                 reference: record.reference.clone(),

@@ -76,9 +76,7 @@ fn range(grid: &[Vec<f64>]) -> Vec<[f64; 2]> {
 fn classes(grid: &[Vec<f64>]) -> Vec<Vec<usize>> {
     let free = swept(grid);
     let mut all: Vec<Vec<usize>> = Vec::new();
-    let same = |a: &[f64], b: &[f64]| {
-        (0..a.len()).all(|i| a[i] == b[i] || (free[i] && (a[i] < 0.0) == (b[i] < 0.0)))
-    };
+    let same = |a: &[f64], b: &[f64]| (0..a.len()).all(|i| a[i] == b[i] || (free[i] && (a[i] < 0.0) == (b[i] < 0.0)));
     for (i, point) in grid.iter().enumerate() {
         match all.iter_mut().find(|c| same(&grid[c[0]], point)) {
             Some(c) => c.push(i),
@@ -137,7 +135,8 @@ impl<'a, 'f> Ground<'a, 'f> {
         let fit = self.fit;
         let segments = &fit.stack.segments;
         let whole = |i: usize| {
-            let mut columns = white_columns(effect, inner, fit.scene, &fit.trajectories[i], &self.sampled, fit.whitener);
+            let mut columns =
+                white_columns(effect, inner, fit.scene, &fit.trajectories[i], &self.sampled, fit.whitener);
             let weight = segments[i].weight;
             columns.iter_mut().flatten().for_each(|v| *v *= weight);
             columns

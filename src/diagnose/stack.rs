@@ -16,7 +16,7 @@ pub struct Segment {
     pub start: usize,
     /// Samples.
     pub len: usize,
-    /// Root of the number of repeats.
+    /// Root of the number of repeats, over the noise of this stretch relative to the filter's.
     pub weight: f64,
 }
 

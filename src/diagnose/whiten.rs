@@ -218,13 +218,6 @@ impl Whitener {
         }
     }
 
-    /// Filters copies of series, each from rest.
-    pub fn applied(&self, series: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let mut out = series.to_vec();
-        out.iter_mut().for_each(|x| self.apply(x));
-        out
-    }
-
     /// Adds the autoregression and the scale that pure-noise series, already filtered, still ask for; the order by the
     /// Bayesian information criterion.
     pub fn refine(&mut self, filtered: &[Vec<f64>]) {

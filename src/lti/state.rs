@@ -107,9 +107,8 @@ impl DiscretePlant {
         let delayed = |k: usize, back: usize| if k >= back { input[k - back] } else { 0.0 };
         let whole = self.whole;
         for from in (0..self.lambda_re.len()).step_by(LANES) {
-            let pick = |all: &[f64]| -> [f64; LANES] {
-                std::array::from_fn(|j| all.get(from + j).copied().unwrap_or(0.0))
-            };
+            let pick =
+                |all: &[f64]| -> [f64; LANES] { std::array::from_fn(|j| all.get(from + j).copied().unwrap_or(0.0)) };
             let (lr, li) = (pick(&self.lambda_re), pick(&self.lambda_im));
             let (nr, ni) = (pick(&self.now_re), pick(&self.now_im));
             let (br, bi) = (pick(&self.before_re), pick(&self.before_im));

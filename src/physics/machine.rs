@@ -75,6 +75,14 @@ impl Machine {
         self
     }
 
+    /// The same machine, started at rest but not in balance: beside command and laws a constant torque acts (command_unit).
+    pub fn held_by(mut self, torque: f64, gain_at_rest: f64) -> Machine {
+        let spring = if gain_at_rest.is_finite() && gain_at_rest != 0.0 { self.origin / gain_at_rest } else { 0.0 };
+        self.standing = [spring - torque, 0.0];
+        self.w = 0.0;
+        self
+    }
+
     /// A machine with these effects; `scene` says what the laws need to know of it.
     pub fn new(plant: &Plant, effects: &[(&dyn Effect, &Setting)], scene: &Scene) -> Result<Machine, LtiError> {
         let t = scene.sample_time_s;

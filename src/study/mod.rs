@@ -15,6 +15,7 @@ mod mirror;
 mod mismatch;
 mod motor;
 mod plants;
+mod recordings;
 
 pub use classes::classes;
 pub use error::StudyError;
@@ -27,6 +28,7 @@ pub use mirror::mirror;
 pub use mismatch::mismatch;
 pub use motor::motor;
 pub use plants::plants;
+pub use recordings::recordings;
 
 /// What a study hands over: files by name, relative to the results' folder.
 #[derive(Clone, Debug, Default, PartialEq)]
