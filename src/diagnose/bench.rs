@@ -269,6 +269,12 @@ impl Bench {
         self.smooth(&carrier, &sampled, &means, &known);
     }
 
+    /// Errors of the mean runs with each one's own start taken out.
+    pub fn without_starts(&self, errors: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let free = |n: usize| free_motions(&self.form.given.body, self.scene.sample_time_s, n).to_vec();
+        values(&without_start(&errors.into_iter().enumerate().collect::<Vec<_>>(), &free, &|_| {}))
+    }
+
     /// The error of a model on any run along its recorded motion, effects of each record's own left out.
     fn raw_along(&self, run: &Run, model: &Model) -> Result<(Carrier, Vec<f64>), LtiError> {
         let carrier = self.form.carrier(&model.refitted.p);

@@ -1,18 +1,19 @@
 //! The diagnosis of a case, step by step: logs, noise, linear refit, search, judgement on hold-out records, verdict.
 
-use super::bench::{Bench, scene};
+use super::bench::Bench;
 use super::corrected::{Corrected, corrected};
 use super::finding::*;
-use super::hygiene::{Replay, SampleFault, replay_records, sample_faults, slip};
-use super::judge::{Judged, Simulation, error, errors, floor, rms};
+use super::fit_report::fit_report;
+use super::judge::rms;
 use super::line_finding::line_findings;
+use super::logs::check;
 use super::name::{finding, linear_story, same_drag};
 use super::run::{Run, runs};
-use super::select::{SelectSettings, Selection, select};
+use super::select::{self, SelectSettings, Selection};
 use crate::controller::{Controller, ControllerError, Law};
 use crate::lti::{LtiError, Plant};
 use crate::numeric::least_squares::dot;
-use crate::physics::{Effect, Scene, Setting, library};
+use crate::physics::library;
 use crate::recording::{Case, Role};
 use thiserror::Error;
 
@@ -62,94 +63,14 @@ pub struct Diagnosed {
     pub errors: [Vec<Vec<f64>>; 3],
 }
 
+/// Share of the error of a held command below which a command counts as measured.
+const MEASURED: f64 = 0.9;
 /// Whitened error per sample of records that were not used, up to which a model holds whatever the refit leaves.
 const HELD_OUT: f64 = 1.2;
 /// Share of the error in excess of noise that findings must explain to be named.
 pub(super) const NAMED_SHARE: f64 = 0.955;
 /// Whitened error per sample that counts as clean, whatever the share.
 pub(super) const CLEAN: f64 = 1.06;
-
-/// What the logs are worth.
-struct Hygiene {
-    replay: Option<Replay>,
-    faults: Vec<SampleFault>,
-    /// Verdict on the logs, where it is not "sound".
-    finding: Option<Finding>,
-    /// Whether the controller's law holds, so that the loop can be closed in simulation.
-    closed: bool,
-}
-
-/// What the logs say; positions that turn out to be shifted are moved back.
-fn check(
-    case: &Case,
-    runs: &mut [Run],
-    given: &Plant,
-    law: Option<&Law>,
-    sample_time_s: f64,
-) -> Result<Hygiene, LtiError> {
-    let mut faults: Vec<SampleFault> = case
-        .records
-        .iter()
-        .zip(runs.iter())
-        .flat_map(|((_, record), run)| sample_faults(run, &record.gaps, sample_time_s))
-        .collect();
-    let mut hygiene = Hygiene { replay: None, faults: Vec::new(), finding: None, closed: false };
-    if let Some(law) = law {
-        let smooth = smooth(given, runs, sample_time_s)?;
-        let all: Vec<&Run> = runs.iter().collect();
-        hygiene.closed = all.iter().all(|r| r.reference.is_some());
-        hygiene.replay = replay_records(law, &all, &smooth);
-    }
-    if let (Some(r), Some(law)) = (&hygiene.replay, law)
-        && !r.failing.is_empty()
-    {
-        let failing: Vec<usize> = (0..runs.len()).filter(|&i| r.failing.contains(&runs[i].name)).collect();
-        let slips: Vec<SampleFault> = failing.iter().filter_map(|&i| slip(law, &runs[i], sample_time_s)).collect();
-        let named: Vec<&Run> = failing.iter().map(|&i| &runs[i]).collect();
-        let helps = |e: f64| e < 0.3 * r.error;
-        if !slips.is_empty() {
-            faults.extend(slips);
-            hygiene.closed = false;
-        } else if faults.is_empty() {
-            if helps(r.error_shifted) && r.shift_samples.abs() > 0.05 && r.error_shifted <= 1.1 * r.error_scaled {
-                hygiene.finding = Some(super::log_finding::misalignment(r, sample_time_s, &named));
-                let by = r.shift_samples;
-                failing.iter().for_each(|&i| shift(&mut runs[i], by));
-            } else if helps(r.error_scaled) {
-                hygiene.finding = Some(super::log_finding::scale(r, &named));
-                hygiene.closed = false;
-            } else {
-                hygiene.finding = Some(super::log_finding::controller_mismatch(r, &named));
-                hygiene.closed = false;
-            }
-        }
-    }
-    if !faults.is_empty() {
-        hygiene.finding = Some(super::log_finding::samples(&faults));
-        hygiene.closed = hygiene.closed && hygiene.replay.as_ref().is_some_and(|r| r.failing.is_empty());
-    }
-    hygiene.faults = faults;
-    Ok(hygiene)
-}
-
-/// The given plant's answer to each record's command, its free motions fitted to the position: the motion without the noise.
-fn smooth(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Vec<Vec<f64>>, LtiError> {
-    let scene = scene(given, runs, sample_time_s, None);
-    let model = Judged { plant: given, effects: Vec::new(), own: Vec::new(), lines: &[], fit: None, scene: &scene };
-    let smooth = |run: &Run| Ok(run.position.iter().zip(error(&model, run, None)?).map(|(y, e)| y - e).collect());
-    runs.iter().map(smooth).collect()
-}
-
-/// Moves the position log against the others by a real number of samples.
-fn shift(run: &mut Run, samples: f64) {
-    let y = run.position.clone();
-    let last = y.len() - 1;
-    for (k, p) in run.position.iter_mut().enumerate() {
-        let at = (k as f64 + samples).clamp(0.0, last as f64);
-        let (i, f) = (at.floor() as usize, at.fract());
-        *p = if f == 0.0 { y[i] } else { y[i] + f * (y[(i + 1).min(last)] - y[i]) };
-    }
-}
 
 /// Diagnoses a case.
 pub fn diagnose(
@@ -180,8 +101,27 @@ pub fn diagnose(
     let law = controller.map(Law::new).transpose()?;
     let hygiene = check(case, &mut all, given, law.as_ref(), sample_time_s)?;
     let mut bench = Bench::new(given, all, sample_time_s, case.spindle_hz)?;
+    let mut remarks = Vec::new();
+    if controller.is_none() {
+        progress("is the command held between samples, or measured");
+        let measured: Vec<Run> = bench.runs.iter().map(Run::measured).collect();
+        let other = Bench::new(given, measured, sample_time_s, case.spindle_hz)?;
+        let left = |b: &Bench| {
+            let mut b = b.clone();
+            let p = select::refit(&mut b, settings.select.iterations).refitted.p;
+            rms(&b.without_starts(b.fit(vec![]).errors(&p)))
+        };
+        let (held, moving) = (left(&bench), left(&other));
+        if moving < MEASURED * held {
+            remarks.push(format!(
+                "the command is taken as measured at the samples, not as held between them: the linear refit then leaves {:.3} of the error",
+                moving / held
+            ));
+            bench = other;
+        }
+    }
     // Records whose samples slipped hold nothing that a model could be fitted to.
-    let selection = select(&mut bench, library(), &settings.select, &mut progress);
+    let selection = select::select(&mut bench, library(), &settings.select, &mut progress);
     progress("simulating all records");
     let fixed = corrected(&bench.form, &selection.model.refitted.p, &selection.model.chosen, &bench.scene);
     let refitted = corrected(&bench.form, &selection.baseline.refitted.p, &[], &bench.scene);
@@ -202,7 +142,7 @@ pub fn diagnose(
         sample_faults: hygiene.faults.clone(),
         whitened,
         holdout_whitened: held_out(&bench, &selection, &fixed)?,
-        remarks: Vec::new(),
+        remarks,
         search: search(&selection),
     };
     judge(&mut diagnosis, &bench, &selection, hygiene.finding);
@@ -342,83 +282,3 @@ fn unaccounted(selection: &Selection) -> bool {
 const SEEN: f64 = 1e-9;
 /// Open-loop error over the sensor's white noise above which it counts as coloured.
 const COLOURED: f64 = 1.25;
-
-/// Errors of all runs under a model, as the report shows them.
-fn fit_report(
-    bench: &Bench,
-    selection: &Selection,
-    given: &Plant,
-    refitted: &Corrected,
-    fixed: &Corrected,
-    closed: Option<&Law>,
-) -> (FitReport, [Vec<Vec<f64>>; 3]) {
-    let every: Vec<&Run> = bench.runs.iter().collect();
-    let scene = Scene { plant: given.clone(), ..bench.scene.clone() };
-    let none: Vec<(&'static dyn Effect, Setting)> = Vec::new();
-    let under = |plant: &Plant, effects: &[(&'static dyn Effect, Setting)], closed: Option<&Law>| {
-        let effects = effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
-        errors(&Judged { plant, effects, own: Vec::new(), lines: &[], fit: None, scene: &scene }, &every, closed)
-    };
-    let three = |closed: Option<&Law>| {
-        [
-            under(given, &none, closed),
-            under(&refitted.plant, &refitted.effects, closed),
-            errors(&fixed.judged(bench, selection), &every, closed),
-        ]
-    };
-    let open = three(None);
-    let chosen = if closed.is_some() { three(closed) } else { open.clone() };
-    let of_role = |e: &[Vec<Vec<f64>>; 3], role: Role| -> Option<FitFigures> {
-        let which: Vec<usize> = (0..every.len()).filter(|&i| every[i].role == role).collect();
-        if which.is_empty() {
-            return None;
-        }
-        let pick = |m: usize| -> Vec<Vec<f64>> { which.iter().map(|&i| e[m][i].clone()).collect() };
-        let [before, refit, after] = [rms(&pick(0)), rms(&pick(1)), rms(&pick(2))];
-        // The floor from repeats of the fit records, under the model that fits best; it is the same for every record.
-        let noise = floor(&e[2], &every).unwrap_or_else(|| fallback_floor(bench, after));
-        let room = before * before - noise * noise;
-        let explained_share =
-            if room > 0.0 { (1.0 - (after * after - noise * noise).max(0.0) / room).clamp(-1.0, 1.0) } else { 1.0 };
-        Some(FitFigures {
-            rms_before: before,
-            rms_refit_linear: refit,
-            rms_after: after,
-            noise_floor: noise,
-            explained_share,
-        })
-    };
-    let records = every
-        .iter()
-        .enumerate()
-        .map(|(i, run)| {
-            let single = |m: usize| rms(std::slice::from_ref(&chosen[m][i]));
-            RecordFigures {
-                record: run.name.clone(),
-                role: if run.role == Role::Fit { "fit" } else { "holdout" },
-                amplitude: run.position.iter().map(|y| (y - run.position[0]).abs()).fold(0.0, f64::max),
-                rms_before: single(0),
-                rms_refit_linear: single(1),
-                rms_after: single(2),
-            }
-        })
-        .collect();
-    let zero =
-        FitFigures { rms_before: 0.0, rms_refit_linear: 0.0, rms_after: 0.0, noise_floor: 0.0, explained_share: 0.0 };
-    let report = FitReport {
-        simulation: if closed.is_some() { Simulation::ClosedLoop } else { Simulation::OpenLoop },
-        holdout: of_role(&chosen, Role::Holdout),
-        fit: of_role(&chosen, Role::Fit).unwrap_or(zero),
-        // A loop can hold a model that runs away on its own; its open-loop figures then say nothing.
-        open_loop: of_role(&open, Role::Holdout)
-            .or_else(|| of_role(&open, Role::Fit))
-            .filter(|f| f.rms_after.is_finite() && f.rms_after < 10.0 * f.rms_before),
-        records,
-    };
-    (report, chosen)
-}
-
-/// Without repeats the floor is the sensor's noise as the spectrum shows it, never more than what the best model leaves.
-fn fallback_floor(bench: &Bench, after: f64) -> f64 {
-    bench.levels.sensor_rms.min(after)
-}

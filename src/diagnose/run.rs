@@ -36,6 +36,15 @@ pub struct Run {
 }
 
 impl Run {
+    /// The same run with a command that was measured at the samples and moves between them, instead of being held: its mean over
+    /// each interval, from the cubic through four samples.
+    pub fn measured(&self) -> Run {
+        let u = &self.input;
+        let at = |k: isize| u[k.clamp(0, u.len() as isize - 1) as usize];
+        let mean = |k: isize| (13.0 * (at(k) + at(k + 1)) - at(k - 1) - at(k + 2)) / 24.0;
+        Run { input: (0..u.len() as isize).map(mean).collect(), ..self.clone() }
+    }
+
     /// Samples.
     pub fn len(&self) -> usize {
         self.position.len()

@@ -114,6 +114,25 @@ fn fitted_from_both(bench: &Bench, chosen: &[Chosen], p: &[f64], iterations: usi
     if there.cost < here.cost { there } else { here }
 }
 
+/// The linear refit. A refit moves the motion that it was made along: once more, from there. Without repeats it moves the noise
+/// too.
+pub fn refit(bench: &mut Bench, iterations: usize) -> Model {
+    let mut baseline = fitted(bench, vec![], &vec![0.0; bench.form.knobs.len()], iterations);
+    for _ in 0..if bench.levels.from_repeats { 1 } else { SETTLING } {
+        bench.correct(&baseline.refitted.p, &[]);
+        if !bench.levels.from_repeats {
+            bench.renew(&baseline.refitted.p, &[]);
+        }
+        let before = baseline.refitted.p.clone();
+        baseline = fitted(bench, vec![], &before, iterations);
+        let moved = before.iter().zip(&baseline.refitted.p).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        if moved < SETTLED {
+            break;
+        }
+    }
+    baseline
+}
+
 /// Searches the library for what the linear model lacks.
 pub fn select(
     bench: &mut Bench,
@@ -124,20 +143,7 @@ pub fn select(
     let zero = vec![0.0; bench.form.knobs.len()];
     let mut given = bench.fit(vec![]).cost(&zero);
     progress("refit of the linear parameters");
-    let mut baseline = fitted(bench, vec![], &zero, settings.iterations);
-    // A refit moves the motion that it was made along; once more, from there. Without repeats it moves the noise too.
-    for _ in 0..if bench.levels.from_repeats { 1 } else { SETTLING } {
-        bench.correct(&baseline.refitted.p, &[]);
-        if !bench.levels.from_repeats {
-            bench.renew(&baseline.refitted.p, &[]);
-        }
-        let before = baseline.refitted.p.clone();
-        baseline = fitted(bench, vec![], &before, settings.iterations);
-        let moved = before.iter().zip(&baseline.refitted.p).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        if moved < SETTLED {
-            break;
-        }
-    }
+    let mut baseline = refit(bench, settings.iterations);
     let mut model = baseline.clone();
     let mut steps = Vec::new();
     let limit = settings.false_alarm.ln();
