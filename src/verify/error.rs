@@ -1,0 +1,46 @@
+//! Why nothing can be proved at all: refusals, not verdicts.
+
+use crate::document::DocumentError;
+use crate::lti::LtiError;
+use crate::tune::{GainTableError, SpecError};
+use thiserror::Error;
+
+/// Every way a proof can end before it begins.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "each field is named in the message")]
+pub enum VerifyError {
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    #[error(transparent)]
+    Table(#[from] GainTableError),
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    #[error(transparent)]
+    Plant(#[from] LtiError),
+    /// A coefficient is no number.
+    #[error("[[section]] {section}: a coefficient is {found}; expected finite numbers")]
+    Coefficient { section: usize, found: f64 },
+    /// A pole of the controller on the unit circle away from z = 1.
+    #[error(
+        "[[section]] {section}: a pole at {re} {im:+} j lies on the unit circle: nothing can be proved of a controller that rings for ever"
+    )]
+    OnCircle { section: usize, re: f64, im: f64 },
+    /// The loop near z = 1 is not what its integrators say.
+    #[error(
+        "near rest, at {angle:e} rad per sample, the loop lies {off:.2e} off the real axis that its integrators give it: a pole very near z = 1?"
+    )]
+    Rest { angle: f64, off: f64 },
+    /// A word length that holds no coefficient.
+    #[error(
+        "word length of {bits} bits with {fraction} of fraction: expected 2 to 53 bits, at most all but one of fraction"
+    )]
+    Word { bits: u32, fraction: u32 },
+    /// A coefficient does not fit into the word.
+    #[error(
+        "[[section]] {section}: {key} = {found} does not fit {bits} bits with {fraction} of fraction, which hold up to {largest}"
+    )]
+    Overflow { section: usize, key: &'static str, found: f64, bits: u32, fraction: u32, largest: f64 },
+    /// A share of uncertainty that is none.
+    #[error("uncertainty of {key} = {found}: expected at least 0 and below 1")]
+    Uncertainty { key: &'static str, found: f64 },
+}

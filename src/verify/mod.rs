@@ -1,0 +1,40 @@
+//! The second opinion: proves a gain table again from the raw files, by algorithms that the search and the margins do not use.
+//!
+//! In: a gain table, plants or a sweep, a spec, what is uncertain. Out: a certificate of bounds that hold at every frequency, or
+//! a refusal that says what to measure again. Shared with the rest are the readers of files and the seeded generator only.
+//! Convention: L = P C, negative feedback; spec: `specs/certificate.md`.
+
+mod bounds;
+mod chain;
+mod clusters;
+mod error;
+mod expansion;
+mod model;
+mod patch;
+mod plant;
+mod prove;
+mod range;
+mod settings;
+mod uncertain;
+
+pub use bounds::{Bounded, Bounds, ProvenCrossing, Stability};
+pub use error::VerifyError;
+pub use range::Range;
+pub use settings::VerifySettings;
+pub use uncertain::Uncertainty;
+
+use crate::lti::{Plant, Section};
+use model::Sampled;
+use patch::Patch;
+
+/// Proves the loop of a plant model under the firmware's sections, over a box of parameters.
+pub fn prove_loop(
+    plant: &Plant,
+    sections: &[Section],
+    sample_time_s: f64,
+    uncertainty: &Uncertainty,
+    settings: &VerifySettings,
+) -> Result<Bounds, VerifyError> {
+    plant.check()?;
+    prove::prove(&Sampled::new(plant, sections, sample_time_s, uncertainty)?, settings)
+}
