@@ -3,6 +3,9 @@
 //! In: built-in machines, seeds, and where a study needs them measured records. Out: a [`Study`], pages and pictures as text.
 //! Nothing is written here; the command line does that.
 
+mod certificate;
+mod certificate_loops;
+mod certificate_mutations;
 mod classes;
 mod error;
 mod gate;
@@ -16,6 +19,7 @@ mod mismatch;
 mod motor;
 mod plants;
 
+pub use certificate::certificate;
 pub use classes::classes;
 pub use error::StudyError;
 pub use gate::gate;

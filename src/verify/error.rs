@@ -3,6 +3,7 @@
 use crate::document::DocumentError;
 use crate::lti::LtiError;
 use crate::tune::{GainTableError, SpecError};
+use std::path::PathBuf;
 use thiserror::Error;
 
 /// Every way a proof can end before it begins.
@@ -17,6 +18,17 @@ pub enum VerifyError {
     Spec(#[from] SpecError),
     #[error(transparent)]
     Plant(#[from] LtiError),
+    #[error("{}: {source}", file.display())]
+    PlantFile { file: PathBuf, source: LtiError },
+    /// A plant beyond linear.
+    #[error("{}: [[plant.physics]] {effect}: bounds are proved of linear plants; give an equivalent linear plant for each amplitude", file.display())]
+    Physics { file: PathBuf, effect: String },
+    /// A certificate that is no JSON, or none of ours.
+    #[error("{}: no certificate: {source}", file.display())]
+    CertificateText { file: PathBuf, source: serde_json::Error },
+    /// The certificate cannot be put into text.
+    #[error("the certificate cannot be written as JSON: {0}")]
+    Json(#[from] serde_json::Error),
     /// A coefficient is no number.
     #[error("[[section]] {section}: a coefficient is {found}; expected finite numbers")]
     Coefficient { section: usize, found: f64 },

@@ -5,6 +5,7 @@
 //! Convention: L = P C, negative feedback; spec: `specs/certificate.md`.
 
 mod bounds;
+mod certificate;
 mod chain;
 mod clusters;
 mod error;
@@ -15,13 +16,20 @@ mod plant;
 mod prove;
 mod range;
 mod settings;
+mod table;
 mod uncertain;
+mod word;
+mod write;
 
 pub use bounds::{Bounded, Bounds, ProvenCrossing, Stability};
+pub use certificate::{CaseProof, Certificate, Inputs, ProvenLimit, SCHEMA, Source, Verdict, certify, choices};
 pub use error::VerifyError;
 pub use range::Range;
 pub use settings::VerifySettings;
+pub use table::Finding;
 pub use uncertain::Uncertainty;
+pub use word::Word;
+pub use write::WriteFigures;
 
 use crate::lti::{Plant, Section};
 use model::Sampled;

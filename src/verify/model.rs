@@ -71,8 +71,7 @@ impl Sampled {
         let main = common.times(self.product.alias(angle, half, 0)).term(half);
         let (mut centre, mut slope, mut radius) = (main.value, main.first, main.remainder);
         let mut others = 0.0;
-        let n = self.product.aliases(angle);
-        for k in 1..=n as i64 {
+        for k in 1..=self.product.whole as i64 {
             for k in [k, -k] {
                 let e = common.times(self.product.alias(angle, half, k)).times(Product::share(angle, half, k));
                 let e = e.term(half);
@@ -82,9 +81,14 @@ impl Sampled {
                 others += e.most;
             }
         }
-        let rest = common.term(half).most * self.product.rest(angle + half, n);
-        let patch = Patch { centre, half: slope * half, radius: radius + rest, gain: Range::ZERO, turn: Range::ZERO };
-        (patch, others + rest)
+        let (far, error) = self.product.far(angle, half);
+        let far = common.times(far).term(half);
+        let error = error * common.term(half).most;
+        centre += far.value;
+        slope += far.first;
+        radius += far.remainder + error;
+        let patch = Patch { centre, half: slope * half, radius, floor: error, gain: Range::ZERO, turn: Range::ZERO };
+        (patch, others + far.most + error)
     }
 }
 

@@ -16,12 +16,18 @@ pub(super) struct Patch {
     pub half: Complex<f64>,
     /// Bound of everything left out: curvature, far aliases, rounding.
     pub radius: f64,
+    /// The part of the radius that no smaller cell takes away.
+    pub floor: f64,
     /// Natural logarithm of what uncertainty may multiply by.
     pub gain: Range,
     /// Angle (rad) by which uncertainty may turn.
     pub turn: Range,
 }
 
+/// A set this much wider than its certain part gains nothing from smaller cells.
+const SPREAD_SHARE: f64 = 0.15;
+/// The same beside the floor.
+const FLOOR_SHARE: f64 = 0.5;
 /// Steps of the bisection for the disk margin: to the last bit of a ratio below 1.
 const BISECTIONS: usize = 54;
 
@@ -39,14 +45,12 @@ impl Patch {
         self.gain.width() == 0.0 && self.turn.width() == 0.0
     }
 
-    /// Width of what uncertainty adds, relative to |L|.
-    pub fn spread(&self) -> f64 {
-        self.gain.width().max(self.turn.width())
-    }
-
-    /// Width of the segment and its rim, relative to |L|.
-    pub fn own(&self) -> f64 {
-        (self.half.norm() + self.radius) / self.centre.norm()
+    /// Whether a smaller cell would have a markedly smaller patch: the certain part is neither dwarfed by what uncertainty adds nor by
+    /// what no cell takes away.
+    pub fn coarse(&self) -> bool {
+        let own = self.half.norm() + self.radius - self.floor;
+        let spread = self.gain.width().max(self.turn.width()) * self.centre.norm();
+        own > SPREAD_SHARE * spread && own > FLOOR_SHARE * self.floor
     }
 
     /// |L|.
@@ -170,7 +174,7 @@ mod tests {
         let mut c = |s: f64| Complex::new(r.between(-s, s), r.between(-s, s));
         let (centre, half) = (c(3.0), c(0.4));
         let (gain, turn) = (Range::between(-spread, 0.5 * spread), Range::between(-0.3 * spread, spread));
-        Patch { centre, half, radius: r.between(0.0, 0.2), gain, turn }
+        Patch { centre, half, radius: r.between(0.0, 0.2), floor: 0.0, gain, turn }
     }
 
     /// Every member of the set obeys every bound; members are drawn, the bounds are not.
@@ -202,7 +206,14 @@ mod tests {
     fn a_point_has_its_own_disk_margin() {
         // L = 1/2 exp(-j 2): the ratio itself.
         let l = Complex::from_polar(0.5, -2.0);
-        let p = Patch { centre: l, half: Complex::new(0.0, 0.0), radius: 0.0, gain: Range::ZERO, turn: Range::ZERO };
+        let p = Patch {
+            centre: l,
+            half: Complex::new(0.0, 0.0),
+            radius: 0.0,
+            floor: 0.0,
+            gain: Range::ZERO,
+            turn: Range::ZERO,
+        };
         assert!((p.balance() - ((1.0 + l) / (1.0 - l)).norm()).abs() < 1e-12);
         assert!((p.distance() - (1.0 + l).norm()).abs() < 1e-15);
     }

@@ -15,8 +15,6 @@ use std::f64::consts::{PI, TAU};
 const NARROWEST: f64 = 1e-12;
 /// First cells: this factor apart.
 const FIRST: f64 = 1.6;
-/// A set that is this much wider than its certain part gains nothing from halving.
-const SPREAD_SHARE: f64 = 0.15;
 
 /// The least value met so far with where, from below (what the proof rests on) and from above (what the nominal loop has).
 #[derive(Clone, Copy, Debug)]
@@ -159,7 +157,7 @@ impl Tally {
             Seen { split: all[0].clear() <= 0.0, distance: f64::INFINITY, balance: 1.0, one: None, axis: None };
         let keep = 1.0 - s.relative;
         for p in all {
-            let coarse = p.own() > SPREAD_SHARE * p.spread();
+            let coarse = p.coarse();
             let distance = p.distance();
             seen.distance = seen.distance.min(distance);
             seen.split |= coarse && distance < self.modulus.high * keep;
@@ -184,7 +182,7 @@ impl Tally {
                 continue;
             };
             if holds {
-                let wide = coarse && angle.width() > s.angle_rad;
+                let wide = coarse && (angle.width() > s.angle_rad || b - a > 0.5 * s.relative * a);
                 seen.split |= wide && least_turn(angle) < self.phase.high;
                 seen.split |= wide && least_lag(angle) / b < self.delay.high * keep;
                 let sure = p.surely_crosses_one();

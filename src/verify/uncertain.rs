@@ -113,6 +113,7 @@ impl Spread {
             let rim = others * (1.0 + self.alias_most * (-gain.low).exp());
             into.push(Patch {
                 radius: nominal.radius + rim,
+                floor: nominal.floor + rim,
                 gain: gain.plus(self.gain),
                 turn: turn.plus(t),
                 ..*nominal
