@@ -1,11 +1,12 @@
 //! `servotune verify`: a gain table proved again.
 
 use super::verify_arguments::VerifyArguments;
-use super::{Ending, Failure, Screen};
+use super::{Ending, Failure, Screen, load};
 use crate::document::{read_text, write_text};
+use crate::frf::Sweep;
 use crate::report::certificate::certificate_text;
 use crate::tune::Spec;
-use crate::verify::{Inputs, Source, VerifyError, VerifySettings, certify, choices};
+use crate::verify::{Inputs, Source, SweepAssumption, VerifyError, VerifySettings, certify, choices};
 use std::path::{Path, PathBuf};
 
 /// The certificate that `tune` writes beside a table.
@@ -24,10 +25,13 @@ pub(super) fn run(a: &VerifyArguments, screen: &mut Screen) -> Result<Ending, Fa
         None => Default::default(),
     };
     let plants = a.plant.iter().map(|p| Source::read(p)).collect::<Result<Vec<Source>, VerifyError>>()?;
+    let sweeps = a.frf.iter().map(|f| load::sweep(f, &a.reading, screen)).collect::<Result<Vec<Sweep>, Failure>>()?;
     let profile = Spec::profile_path(&a.spec).map_err(VerifyError::from)?;
     let inputs = Inputs {
         gains: &Source::read(&a.gains)?,
         plants: &plants,
+        sweeps: &sweeps,
+        assumption: SweepAssumption { least_damping: a.min_damping, hold_included: a.hold_included },
         spec: &Source::read(&a.spec)?,
         profile: &Source::read(&profile)?,
         word: a.word().unwrap_or(word),

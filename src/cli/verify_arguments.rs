@@ -1,5 +1,6 @@
 //! The words of `servotune verify`.
 
+use super::sweep_arguments::ReadingArguments;
 use crate::verify::{Uncertainty, Word};
 use clap::Args;
 use std::path::PathBuf;
@@ -9,6 +10,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   servotune verify gains.toml --plant plant.toml --spec spec.toml
   servotune verify gains.toml --plant room.toml --plant cold.toml --plant hot.toml --spec spec.toml --uncertainty gain=5%,frequency=2%,damping=20%,delay=5%
+  servotune verify gains.toml --frf slot07.bod --min-damping 0.01 --spec spec.toml
   servotune verify gains.toml --plant plant.toml --spec spec.toml --word-length 24 --fraction-bits 20 --out gains.certificate.json
   servotune verify gains.toml --plant plant.toml --spec spec.toml --certificate gains.certificate.json
 
@@ -19,8 +21,19 @@ pub(super) struct VerifyArguments {
     #[arg(value_name = "GAINS")]
     pub gains: PathBuf,
     /// Plant model; given several times, each is a case that must pass
-    #[arg(long, value_name = "PLANT", required = true)]
+    #[arg(long, value_name = "PLANT", required_unless_present = "frf")]
     pub plant: Vec<PathBuf>,
+    /// Swept-sine file; given several times, each is a case that must pass. Of a sweep the margins are proved, not the write
+    #[arg(long, value_name = "FRF")]
+    pub frf: Vec<PathBuf>,
+    /// No mode has less damping: what may hide between the points of a sweep follows from it
+    #[arg(long, value_name = "RATIO", default_value_t = 0.005, requires = "frf")]
+    pub min_damping: f64,
+    /// The sweep was taken through the controller's own hold, which is then not applied again
+    #[arg(long, requires = "frf")]
+    pub hold_included: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
     /// Limits and write (spec.toml)
     #[arg(long, value_name = "SPEC")]
     pub spec: PathBuf,

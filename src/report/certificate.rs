@@ -69,6 +69,12 @@ pub fn certificate_text(c: &Certificate) -> Result<String, ReportError> {
             ])?;
         }
         text += &table.text();
+        for s in &case.sweep_again {
+            text += &format!(
+                "Too coarse to promise: sweep {:.1} to {:.1} Hz again, points at most {:.3} Hz apart.\n",
+                s.low_hz, s.high_hz, s.spacing_hz
+            );
+        }
         text.push('\n');
     }
     for f in &c.findings {

@@ -2,9 +2,11 @@
 
 use super::certificate_loops::{LoopCase, loops, rows};
 use super::certificate_mutations::{BOX, Certified, machines, mutations};
+use super::certificate_sweeps::{benchmark, sweeps};
 use super::{Study, StudyError};
 use crate::report::certificate::certificate_text;
 use crate::verify::Verdict;
+use std::path::Path;
 
 /// Loops of the trial.
 const LOOPS: u64 = 100_000;
@@ -13,15 +15,15 @@ const ROWS: u64 = 1000;
 /// Changes of each kind and machine.
 const CHANGES: u64 = 250;
 
-/// Makes the study; everything it needs is built in.
-pub fn certificate() -> Result<Study, StudyError> {
+/// Makes the study; `data` is the folder with the benchmark plant.
+pub fn certificate(data: &Path) -> Result<Study, StudyError> {
     let cases = loops(LOOPS)?;
     let certified = machines()?;
     let changed = mutations(&certified, CHANGES)?;
     let mut study = Study::default();
     let mut text = format!(
         "# Certificate\n\n\
-         Made by `servotune study certificate --out results`; spec: `specs/certificate.md`. Peers on the same loops: \
+         Made by `servotune study certificate --data DATA --out results`, DATA being the folder with `hdd_benchmark_model/`; spec: `specs/certificate.md`. Peers on the same loops: \
          [certificate_peers.md](certificate_peers.md).\n\n\
          ## {LOOPS} random loops of known truth\n\n\
          Body, 2 to 9 resonance pairs, every second loop one or two more of damping 1e-4 to 3e-3 (a mode at 2 kHz is then 0.4 to 12 Hz wide; a 300-point sweep has \
@@ -34,6 +36,10 @@ pub fn certificate() -> Result<Study, StudyError> {
     for m in &certified {
         text += &format!("\n### {}\n\n```text\n{}```\n", m.class.name(), certificate_text(&m.certificate)?);
     }
+    text += "\n## The nine cases of the HDD benchmark plant\n\n";
+    text += &benchmark(data)?;
+    text += "\n## Sweeps with modes between their points\n\n";
+    text += &sweeps()?;
     text += "\n## Changed tables and certificates\n\n\
              | change | tried | caught by the proof alone | caught with the certificate beside the table |\n|---|---|---|---|\n";
     for (kind, c) in changed {

@@ -14,7 +14,7 @@ use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
 /// Controller's sample time (s).
-const T: f64 = 39.6e-6;
+pub(super) const T: f64 = 39.6e-6;
 /// Limits are drawn this far around the truth (share).
 const AROUND: f64 = 0.03;
 /// The refinement of the truth: a limit met or missed by less says nothing.
@@ -69,7 +69,7 @@ pub(super) fn rows(count: u64) -> Result<Vec<LoopRow>, StudyError> {
 }
 
 /// A loop near its limits; every second one has one or two modes of damping 1e-4 to 3e-3 besides.
-fn draw(seed: u64) -> Result<(Plant, Controller, bool), StudyError> {
+pub(super) fn draw(seed: u64) -> Result<(Plant, Controller, bool), StudyError> {
     let mut r = Random::stream(seed, 71);
     let ordinary = 2 + (r.bits() % 8) as usize;
     let mut plant = random_plant(&mut r, ordinary);

@@ -6,7 +6,9 @@ use crate::lti::{Plant, PlantFile};
 use crate::numeric::random::Random;
 use crate::tune::{GainTable, InputDigest, Machine, Outcome, Spec, TuneSettings, tune};
 use crate::twin::{MachineClass, nominal_controller};
-use crate::verify::{Certificate, Inputs, Source, Uncertainty, VerifyError, VerifySettings, Word, certify};
+use crate::verify::{
+    Certificate, Inputs, Source, SweepAssumption, Uncertainty, VerifyError, VerifySettings, Word, certify,
+};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -49,7 +51,9 @@ fn spec() -> (Source, Source) {
 fn prove(plant: &Source, gains: &Source, word: Word, uncertainty: Uncertainty) -> Result<Certificate, VerifyError> {
     let (spec, profile) = spec();
     let plants = [plant.clone()];
-    let i = Inputs { gains, plants: &plants, spec: &spec, profile: &profile, word, uncertainty };
+    let assumption = SweepAssumption { least_damping: 0.005, hold_included: false };
+    let sweeps = &[];
+    let i = Inputs { gains, plants: &plants, sweeps, assumption, spec: &spec, profile: &profile, word, uncertainty };
     certify(&i, &VerifySettings::default())
 }
 

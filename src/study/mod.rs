@@ -6,6 +6,7 @@
 mod certificate;
 mod certificate_loops;
 mod certificate_mutations;
+mod certificate_sweeps;
 mod classes;
 mod error;
 mod gate;

@@ -3,12 +3,16 @@
 use super::bounds::{Bounded, Bounds, Stability};
 use super::table::{self, Finding};
 use super::write::{WriteFigures, write};
-use super::{Uncertainty, VerifyError, VerifySettings, Word, prove_loop};
+use super::{SweepAgain, SweepAssumption, Uncertainty, VerifyError, VerifySettings, Word, prove_loop, prove_sweep};
 use crate::document::{parse_toml, read_text, sha256_hex};
+use crate::frf::Sweep;
 use crate::lti::{Plant, PlantFile};
 use crate::tune::{GainTable, Requirement, Side, Spec, What};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+
+/// Ms taken for the search for bands where the spec names none.
+const MS_UNSAID: f64 = 2.5;
 
 /// Name of the document's form.
 pub const SCHEMA: &str = "servotune.certificate/1";
@@ -51,10 +55,14 @@ pub struct CaseProof {
     pub sha256: String,
     /// Margins.
     pub bounds: Bounds,
-    /// The write, of the plant as it stands: uncertainty is not in it.
-    pub write: WriteFigures,
+    /// The write, of the plant as it stands: uncertainty is not in it. A sweep alone tells too little of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub write: Option<WriteFigures>,
     /// Requirements.
     pub limits: Vec<ProvenLimit>,
+    /// Bands to sweep again before more can be proved.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sweep_again: Vec<SweepAgain>,
 }
 
 /// The document.
@@ -75,6 +83,9 @@ pub struct Certificate {
     pub word: Word,
     /// What was uncertain.
     pub uncertainty: Uncertainty,
+    /// How sweeps were taken; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sweep: Option<SweepAssumption>,
     /// What the proof takes for granted.
     pub assumptions: Vec<String>,
     /// Every machine.
@@ -112,6 +123,10 @@ pub struct Inputs<'a> {
     pub gains: &'a Source,
     /// Plants: the machine itself, and its temperature or other cases.
     pub plants: &'a [Source],
+    /// Sweeps, each a case like a plant.
+    pub sweeps: &'a [Sweep],
+    /// How the sweeps are taken.
+    pub assumption: SweepAssumption,
     /// The spec, and the profile that it names.
     pub spec: &'a Source,
     /// See above.
@@ -144,6 +159,9 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
     let held = i.word.hold(table.sections())?;
     let wanted = Requirement::list(&spec.margins, &spec.limits);
     let (mut cases, mut unfit) = (Vec::new(), Vec::new());
+    let t = c.sample_time_s;
+    let none = Uncertainty::default();
+    let plain = i.word == Word::Double && !i.uncertainty.any();
     for source in i.plants {
         let file = &source.file;
         let plant = Plant::try_from(parse_toml::<PlantFile>(file, &source.text)?)
@@ -151,19 +169,28 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
         if let Some(p) = plant.physics.first() {
             return Err(VerifyError::Physics { file: file.clone(), effect: p.effect.clone() });
         }
-        let t = c.sample_time_s;
         let bounds = prove_loop(&plant, &held, t, &i.uncertainty, settings)?;
         let figures = write(&plant, &held, &c, &spec.profile);
-        let limits = limits(&wanted, &bounds, &figures);
         // The table states figures of its own coefficients on the plant as it stands.
-        unfit.push(if i.word == Word::Double && !i.uncertainty.any() {
+        unfit.push(if plain {
             table::figures(&table.after, &bounds, Some(&figures))
         } else {
-            let plain = prove_loop(&plant, table.sections(), t, &Uncertainty::default(), settings)?;
+            let bounds = prove_loop(&plant, table.sections(), t, &none, settings)?;
             let figures = write(&plant, table.sections(), &c, &spec.profile);
-            table::figures(&table.after, &plain, Some(&figures))
+            table::figures(&table.after, &bounds, Some(&figures))
         });
-        cases.push(CaseProof { sha256: source.sha256(), bounds, write: figures, limits });
+        let limits = limits(&wanted, &bounds, Some(&figures));
+        cases.push(CaseProof { sha256: source.sha256(), bounds, write: Some(figures), limits, sweep_again: vec![] });
+    }
+    // Without a limit on Ms, a hidden mode that brings L this near to -1 is one to look for.
+    let away = 1.0 / spec.margins.max_sensitivity.unwrap_or(MS_UNSAID);
+    for sweep in i.sweeps {
+        let prove = |sections, u| prove_sweep(&sweep.frf, sections, t, i.assumption, u, away, settings);
+        let (bounds, sweep_again) = prove(&held[..], &i.uncertainty)?;
+        let of_table = if plain { bounds.clone() } else { prove(table.sections(), &none)?.0 };
+        unfit.push(table::figures(&table.after, &of_table, None));
+        let limits = limits(&wanted, &bounds, None);
+        cases.push(CaseProof { sha256: sweep.source_digest.clone(), bounds, write: None, limits, sweep_again });
     }
     // The figures must be those of one of the machines.
     findings.extend(unfit.into_iter().min_by_key(Vec::len).unwrap_or_default());
@@ -180,6 +207,7 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
         profile_sha256: i.profile.sha256(),
         word: i.word,
         uncertainty: i.uncertainty,
+        sweep: (!i.sweeps.is_empty()).then_some(i.assumption),
         assumptions: assumptions(i),
         proved: all && findings.is_empty(),
         cases,
@@ -195,13 +223,19 @@ fn assumptions(i: &Inputs<'_>) -> Vec<String> {
         "the firmware computes its sections without overflow; rounding inside a section is not in the bounds"
             .to_owned(),
     ];
+    if !i.sweeps.is_empty() {
+        all.push(format!(
+            "each sweep is of a stable plant: around every interval a cubic in ln w and at most one mode, of damping at least {}; |L| > 1 below the sweep and < 1 above it, no crossing there",
+            i.assumption.least_damping
+        ));
+    }
     if i.uncertainty.any() {
         all.push("no parameter moves further than its share; every mode and the body may move on their own".to_owned());
     }
     all
 }
 
-fn limits(wanted: &[Requirement], b: &Bounds, w: &WriteFigures) -> Vec<ProvenLimit> {
+fn limits(wanted: &[Requirement], b: &Bounds, w: Option<&WriteFigures>) -> Vec<ProvenLimit> {
     let around = |x: f64, e: f64| Bounded { low: Some(x - e), high: Some(x + e), hz: None };
     wanted
         .iter()
@@ -211,10 +245,12 @@ fn limits(wanted: &[Requirement], b: &Bounds, w: &WriteFigures) -> Vec<ProvenLim
                 What::GainMargin => b.gain_margin_db,
                 What::MaxSensitivity => b.max_sensitivity,
                 What::GainCrossover => b.gain_crossover_hz,
-                What::DftLow => around(w.dft_low, w.error),
-                What::DftHigh => around(w.dft_high, w.error),
-                What::Harmonic { k } => w.harmonics.get(k - 1).map_or(Bounded::default(), |a| around(*a, w.error)),
-                What::CommandPeak => around(w.command_peak, 1e-7 * w.command_peak),
+                what => w.map_or(Bounded::default(), |w| match what {
+                    What::DftLow => around(w.dft_low, w.error),
+                    What::DftHigh => around(w.dft_high, w.error),
+                    What::Harmonic { k } => w.harmonics.get(k - 1).map_or(Bounded::default(), |a| around(*a, w.error)),
+                    _ => around(w.command_peak, 1e-7 * w.command_peak),
+                }),
             };
             let unlimited = matches!(r.what, What::PhaseMargin | What::GainMargin) && proven.low.is_none();
             let (good, bad) = match r.side {

@@ -78,6 +78,19 @@ impl Chain {
             .sum()
     }
 
+    /// Phase of C at an angle (rad), each section followed from rest, where it is real without its integrators.
+    pub fn phase_from_rest(&self, angle: f64) -> f64 {
+        let back = Complex::from_polar(1.0, -angle);
+        let step = 1.0 - back;
+        let one = |r: &Rooted| {
+            let s = &r.section;
+            let m = r.poles.iter().filter(|z| (*z - 1.0).norm() < ON_CIRCLE).count() as i32;
+            let value = quadratic([s.b0, s.b1, s.b2], back).0 / quadratic([1.0, s.a1, s.a2], back).0;
+            (value * step.powi(m)).arg() - f64::from(m) * step.arg()
+        };
+        self.sections.iter().map(one).sum()
+    }
+
     /// Angles at which a root lies near the circle.
     pub fn angles(&self) -> impl Iterator<Item = f64> + '_ {
         self.sections.iter().flat_map(|s| s.zeros.iter().chain(&s.poles)).map(|z| z.arg()).filter(|a| *a > 0.0)

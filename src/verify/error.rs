@@ -52,6 +52,22 @@ pub enum VerifyError {
         "[[section]] {section}: {key} = {found} does not fit {bits} bits with {fraction} of fraction, which hold up to {largest}"
     )]
     Overflow { section: usize, key: &'static str, found: f64, bits: u32, fraction: u32, largest: f64 },
+    /// A sweep of too few points.
+    #[error("the sweep has {found} points below half the sample rate: expected at least {expected}")]
+    Points { found: usize, expected: usize },
+    /// A sweep that ends where crossings may lie.
+    #[error(
+        "|L| = {found:.3} at {hz:.2} Hz, where the sweep ends: nothing is known beyond; sweep on until |L| is at least {low} below all crossings and at most {high} above them"
+    )]
+    Ends { hz: f64, found: f64, low: f64, high: f64 },
+    /// A least damping that is none.
+    #[error("least damping ratio {found}: expected above 0 and below 1")]
+    LeastDamping { found: f64 },
+    /// A kind of uncertainty that no sweep can carry.
+    #[error(
+        "uncertainty of {key} with a sweep: a response has no parameter to move; expected gain alone, or a plant model"
+    )]
+    SweepBox { key: &'static str },
     /// A share of uncertainty that is none.
     #[error("uncertainty of {key} = {found}: expected at least 0 and below 1")]
     Uncertainty { key: &'static str, found: f64 },

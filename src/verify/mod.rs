@@ -10,12 +10,14 @@ mod chain;
 mod clusters;
 mod error;
 mod expansion;
+mod hidden;
 mod model;
 mod patch;
 mod plant;
 mod prove;
 mod range;
 mod settings;
+mod swept;
 mod table;
 mod uncertain;
 mod word;
@@ -26,14 +28,17 @@ pub use certificate::{CaseProof, Certificate, Inputs, ProvenLimit, SCHEMA, Sourc
 pub use error::VerifyError;
 pub use range::Range;
 pub use settings::VerifySettings;
+pub use swept::{SweepAgain, SweepAssumption};
 pub use table::Finding;
 pub use uncertain::Uncertainty;
 pub use word::Word;
 pub use write::WriteFigures;
 
+use crate::frf::Frf;
 use crate::lti::{Plant, Section};
 use model::Sampled;
 use patch::Patch;
+use swept::Swept;
 
 /// Proves the loop of a plant model under the firmware's sections, over a box of parameters.
 pub fn prove_loop(
@@ -45,4 +50,31 @@ pub fn prove_loop(
 ) -> Result<Bounds, VerifyError> {
     plant.check()?;
     prove::prove(&Sampled::new(plant, sections, sample_time_s, uncertainty)?, settings)
+}
+
+/// Proves the loop of a sweep, as far as its points allow: bounds, and the bands to sweep again where what may hide between them
+/// could bring L closer to -1 than `away`.
+pub fn prove_sweep(
+    frf: &Frf,
+    sections: &[Section],
+    sample_time_s: f64,
+    assumption: SweepAssumption,
+    uncertainty: &Uncertainty,
+    away: f64,
+    settings: &VerifySettings,
+) -> Result<(Bounds, Vec<SweepAgain>), VerifyError> {
+    let found = assumption.least_damping;
+    if !(found > 0.0 && found < 1.0) {
+        return Err(VerifyError::LeastDamping { found });
+    }
+    for (key, x) in
+        [("frequency", uncertainty.frequency), ("damping", uncertainty.damping), ("delay", uncertainty.delay)]
+    {
+        if x > 0.0 {
+            return Err(VerifyError::SweepBox { key });
+        }
+    }
+    let swept = Swept::new(frf, sections, sample_time_s, assumption, uncertainty)?;
+    let bounds = prove::prove(&swept, settings)?;
+    Ok((bounds, swept.again(away)))
 }

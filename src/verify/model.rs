@@ -35,6 +35,8 @@ pub(super) struct Start {
     pub integrators: usize,
     /// Whether L times those is positive there.
     pub positive: bool,
+    /// arg(1 + L) at the first angle (rad) where a sweep begins above rest and it is known otherwise.
+    pub expected: Option<f64>,
 }
 
 /// A sampled model under the firmware's sections.
@@ -115,7 +117,7 @@ impl Enclosed for Sampled {
                 if !(off < 10.0 * STILL) {
                     return Err(VerifyError::Rest { angle, off });
                 }
-                return Ok(Start { angle, integrators: m, positive: lifted.re > 0.0 });
+                return Ok(Start { angle, integrators: m, positive: lifted.re > 0.0, expected: None });
             }
             angle *= 0.25;
             if angle < LOWEST {

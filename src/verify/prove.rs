@@ -71,9 +71,9 @@ pub(super) fn prove(l: &impl Enclosed, settings: &VerifySettings) -> Result<Boun
         edges.push(x);
         x *= FIRST;
     }
-    edges.extend(l.places().into_iter().filter(|a| *a > start.angle * 1.01 && *a < end * 0.999));
+    edges.extend(l.places().into_iter().filter(|a| *a > start.angle && *a < end));
     edges.sort_by(f64::total_cmp);
-    edges.dedup_by(|b, a| *b - *a < 1e-6 * *a);
+    edges.dedup_by(|b, a| *b - *a < 1e-9 * *a);
     let mut buffer = Vec::new();
     let mut tally = Tally::begin(l, start, &mut buffer);
     // A first look at points, so that few cells are halved in vain.
@@ -106,7 +106,7 @@ impl Tally {
         let one = buffer[0].centre + 1.0;
         let m = start.integrators as f64;
         let real = if start.integrators == 0 { one.re > 0.0 } else { start.positive };
-        let from = if real { 0.0 } else { PI } - 0.5 * PI * m;
+        let from = start.expected.unwrap_or(if real { 0.0 } else { PI } - 0.5 * PI * m);
         let argument = from + wrapped(one.arg() - from);
         let mut t = Tally {
             modulus: Least::NONE,
@@ -122,7 +122,7 @@ impl Tally {
             touched: false,
         };
         // Below the first cell: L is large, or it has hardly moved from its value at rest.
-        for p in buffer.iter() {
+        for p in buffer.iter().filter(|_| start.expected.is_none()) {
             let size = p.size();
             if start.integrators == 0 {
                 let still = Patch { half: Complex::new(0.0, 0.0), radius: p.radius + 0.02 * p.centre.norm(), ..*p };
@@ -246,7 +246,7 @@ impl Tally {
     fn bounds(mut self, l: &impl Enclosed, start: Start, cells: usize) -> Bounds {
         let t = l.sample_time_s();
         let hz = |angle: f64| angle / (TAU * t);
-        let real = if start.integrators == 0 { self.from_rest(l) } else { start.positive };
+        let real = if start.integrators == 0 && start.expected.is_none() { self.from_rest(l) } else { start.positive };
         let from = if real { 0.0 } else { PI };
         let turned = if l.ends_at_half_rate() {
             ((self.argument - from) / PI).round()
