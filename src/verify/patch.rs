@@ -50,7 +50,12 @@ impl Patch {
     pub fn coarse(&self) -> bool {
         let own = self.half.norm() + self.radius - self.floor;
         let spread = self.gain.width().max(self.turn.width()) * self.centre.norm();
-        own > SPREAD_SHARE * spread && own > FLOOR_SHARE * self.floor
+        own > SPREAD_SHARE * spread && self.shrinks()
+    }
+
+    /// Whether a smaller cell would have a smaller certain part.
+    pub fn shrinks(&self) -> bool {
+        self.half.norm() + self.radius - self.floor > FLOOR_SHARE * self.floor
     }
 
     /// |L|.

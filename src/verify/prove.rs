@@ -153,8 +153,13 @@ impl Tally {
     }
 
     fn look(&mut self, all: &[Patch], a: f64, b: f64, s: &VerifySettings) -> Seen {
-        let mut seen =
-            Seen { split: all[0].clear() <= 0.0, distance: f64::INFINITY, balance: 1.0, one: None, axis: None };
+        let mut seen = Seen {
+            split: all[0].clear() <= 0.0 && all[0].shrinks(),
+            distance: f64::INFINITY,
+            balance: 1.0,
+            one: None,
+            axis: None,
+        };
         let keep = 1.0 - s.relative;
         for p in all {
             let coarse = p.coarse();
@@ -171,7 +176,7 @@ impl Tally {
             let Some(angle) = angle else {
                 // L may be 0 here; only a set that also reaches 1 has to be cut.
                 if size.high >= 1.0 {
-                    seen.split = true;
+                    seen.split |= p.shrinks();
                     if holds {
                         merge(&mut seen.one, Range { low: -PI, high: PI }, false);
                     }
