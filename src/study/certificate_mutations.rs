@@ -115,9 +115,12 @@ fn digit(text: &str, r: &mut Random) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
+/// One change of one machine: whether the proof alone sees it, and whether it does with the certificate.
+type Change = dyn Fn(&Certified, u64) -> Result<[bool; 2], StudyError> + Sync;
+
 /// Digits of the table, digits of its coefficients alone, digits of the certificate, other plants: `count` of each a machine.
 pub(super) fn mutations(all: &[Certified], count: u64) -> Result<[(&'static str, Caught); 4], StudyError> {
-    let sum = |kind: &'static str, one: &(dyn Fn(&Certified, u64) -> Result<[bool; 2], StudyError> + Sync)| {
+    let sum = |kind: &'static str, one: &Change| {
         let jobs: Vec<(usize, u64)> = (0..all.len()).flat_map(|m| (0..count).map(move |i| (m, i))).collect();
         let found: Vec<[bool; 2]> =
             jobs.par_iter().map(|&(m, i)| one(&all[m], i)).collect::<Result<_, StudyError>>()?;

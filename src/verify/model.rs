@@ -114,7 +114,7 @@ impl Enclosed for Sampled {
             let lifted = l.centre * Complex::new(0.0, angle).powi(m as i32);
             let off = (lifted.im / lifted.re).abs();
             if m == 0 || l.size().low > LARGE {
-                if !(off < 10.0 * STILL) {
+                if off.is_nan() || off >= 10.0 * STILL {
                     return Err(VerifyError::Rest { angle, off });
                 }
                 return Ok(Start { angle, integrators: m, positive: lifted.re > 0.0, expected: None });

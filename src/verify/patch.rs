@@ -33,7 +33,7 @@ const BISECTIONS: usize = 54;
 
 impl Patch {
     /// Distance of `point` from the segment.
-    fn from_segment(&self, point: Complex<f64>) -> f64 {
+    fn to_segment(&self, point: Complex<f64>) -> f64 {
         let to = point - self.centre;
         let size = self.half.norm_sqr();
         let t = if size > 0.0 { ((to.re * self.half.re + to.im * self.half.im) / size).clamp(-1.0, 1.0) } else { 0.0 };
@@ -60,14 +60,14 @@ impl Patch {
 
     /// |L|.
     pub fn size(&self) -> Range {
-        let low = (self.from_segment(Complex::new(0.0, 0.0)) - self.radius).max(0.0);
+        let low = (self.to_segment(Complex::new(0.0, 0.0)) - self.radius).max(0.0);
         let high = (self.centre - self.half).norm().max((self.centre + self.half).norm()) + self.radius;
         Range { low: low * self.gain.low.exp(), high: high * self.gain.high.exp() }
     }
 
     /// Angle from -180 deg to L (rad), on the branch of the centre in (-pi, pi]; none where L may be 0.
     pub fn angle(&self) -> Option<Range> {
-        let nearest = self.from_segment(Complex::new(0.0, 0.0));
+        let nearest = self.to_segment(Complex::new(0.0, 0.0));
         if self.radius >= nearest {
             return None;
         }
@@ -80,7 +80,7 @@ impl Patch {
 
     /// Distance from -1 of the certain part; at most 0 where it may touch -1.
     pub fn clear(&self) -> f64 {
-        self.from_segment(Complex::new(-1.0, 0.0)) - self.radius
+        self.to_segment(Complex::new(-1.0, 0.0)) - self.radius
     }
 
     /// The least |1 + L|, at least 0.
@@ -91,7 +91,7 @@ impl Patch {
     /// How far the set stays from a disc on the negative real axis, at least 0: distance from -centre, less the radius.
     fn away(&self, centre: f64, radius: f64) -> f64 {
         let near = if self.exact() {
-            self.from_segment(Complex::new(-centre, 0.0)) - self.radius
+            self.to_segment(Complex::new(-centre, 0.0)) - self.radius
         } else {
             self.box_distance(centre)
         };

@@ -251,7 +251,8 @@ impl Tally {
     fn bounds(mut self, l: &impl Enclosed, start: Start, cells: usize) -> Bounds {
         let t = l.sample_time_s();
         let hz = |angle: f64| angle / (TAU * t);
-        let real = if start.integrators == 0 && start.expected.is_none() { self.from_rest(l) } else { start.positive };
+        let real =
+            if start.integrators == 0 && start.expected.is_none() { self.positive_at_rest(l) } else { start.positive };
         let from = if real { 0.0 } else { PI };
         let turned = if l.ends_at_half_rate() {
             ((self.argument - from) / PI).round()
@@ -315,7 +316,7 @@ impl Tally {
     }
 
     /// Whether 1 + L is positive at rest where no integrator lifts it.
-    fn from_rest(&self, l: &impl Enclosed) -> bool {
+    fn positive_at_rest(&self, l: &impl Enclosed) -> bool {
         let mut buffer = Vec::new();
         l.start().map(|s| l.patches(s.angle, s.angle, &mut buffer)).is_ok_and(|()| buffer[0].centre.re > -1.0)
     }
