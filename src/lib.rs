@@ -56,6 +56,7 @@ pub mod diagnose;
 pub mod tune;
 
 pub mod twin;
+pub mod verify;
 
 pub mod report;
 

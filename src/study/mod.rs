@@ -3,6 +3,10 @@
 //! In: built-in machines, seeds, and where a study needs them measured records. Out: a [`Study`], pages and pictures as text.
 //! Nothing is written here; the command line does that.
 
+mod certificate;
+mod certificate_loops;
+mod certificate_mutations;
+mod certificate_sweeps;
 mod classes;
 mod error;
 mod gate;
@@ -17,6 +21,7 @@ mod motor;
 mod plants;
 mod recordings;
 
+pub use certificate::certificate;
 pub use classes::classes;
 pub use error::StudyError;
 pub use gate::gate;
