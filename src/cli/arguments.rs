@@ -2,6 +2,7 @@
 
 pub(super) use super::diagnose_arguments::DiagnoseArguments;
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
+pub(super) use super::limit_arguments::LimitArguments;
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
 use crate::twin::line::UnknownKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -27,6 +28,7 @@ pub(super) enum Command {
     Diagnose(Box<DiagnoseArguments>),
     Features(FeaturesArguments),
     Identify(Box<IdentifyArguments>),
+    Limit(LimitArguments),
     Margins(Box<MarginsArguments>),
     Response(ResponseArguments),
     Simulate(SimulateArguments),

@@ -14,6 +14,8 @@ mod features;
 mod gate_arguments;
 mod gated;
 mod identify;
+mod limit;
+mod limit_arguments;
 mod load;
 mod margins;
 mod physics;
@@ -59,6 +61,7 @@ pub fn main() -> ExitCode {
         Command::Diagnose(a) => diagnose::run(&a, &mut screen),
         Command::Features(a) => features::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
+        Command::Limit(a) => limit::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),
         Command::Response(a) => response::run(&a, &mut screen),
         Command::Simulate(a) => simulate::run(&a, &mut screen),

@@ -17,6 +17,7 @@ mod spectral;
 pub use dft::{Harmonic, WindowDft};
 pub use expected::{ExpectedNoise, NoiseWork};
 pub use figures::{HIGH_BAND_HZ, LOW_BAND_HZ, PesFigures, figures};
+pub use noise::runout;
 pub use physical::{context, simulate_physical};
 pub use profile::{Noise, PesClock, Profile, ProfileError, Runout, Spiral};
 pub use quick::{QuickScene, QuickWork};

@@ -25,6 +25,7 @@ pub mod diagnosis;
 pub mod figure;
 pub mod histogram;
 pub mod identified;
+pub mod limit;
 pub mod margins;
 pub mod number;
 pub mod nyquist;
