@@ -2,7 +2,7 @@
 
 pub(super) use super::diagnose_arguments::DiagnoseArguments;
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
-pub(super) use super::limit_arguments::LimitArguments;
+pub(super) use super::limit_arguments::{BudgetArguments, LimitArguments, NextSweepArguments, ParetoArguments};
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
 use crate::twin::line::UnknownKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -29,6 +29,9 @@ pub(super) enum Command {
     Features(FeaturesArguments),
     Identify(Box<IdentifyArguments>),
     Limit(LimitArguments),
+    Pareto(ParetoArguments),
+    Budget(BudgetArguments),
+    NextSweep(Box<NextSweepArguments>),
     Margins(Box<MarginsArguments>),
     Response(ResponseArguments),
     Simulate(SimulateArguments),
@@ -329,6 +332,10 @@ pub(super) enum StudyName {
     Ladder,
     /// The production line in features (figures 24-34)
     Line,
+    /// How far tuned gains are from the best possible: four classes, nine cases of the HDD benchmark plant
+    Limits,
+    /// The DFT under gains never run, predicted and recorded
+    Prediction,
     /// 200 random plants of order 22: response, frequency and margin errors
     Plants,
     /// The nine measured responses of a fast steering mirror

@@ -19,6 +19,7 @@ mod words;
 
 pub mod bode;
 pub mod boxplot;
+pub mod budget;
 pub mod confusion;
 pub mod curve;
 pub mod diagnosis;
@@ -30,6 +31,7 @@ pub mod margins;
 pub mod number;
 pub mod nyquist;
 pub mod page;
+pub mod pareto;
 pub mod pes;
 pub mod physical;
 pub mod routes;

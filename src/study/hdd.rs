@@ -7,7 +7,7 @@ use super::{Study, StudyError};
 use crate::controller::Controller;
 use crate::feedback::{MeasuredLoop, measured_margins};
 use crate::frf::Frf;
-use crate::lti::{DiscretePlant, FrequencyResponse, ModalForm, ModalTerm};
+use crate::lti::{DiscretePlant, FrequencyResponse, ModalForm, ModalTerm, PlantState};
 use crate::recording::read_columns;
 use crate::report::bode::{BodeCurve, BodeMarks, bode};
 use crate::report::number::NumberFormat;
@@ -19,7 +19,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 /// Controller rate: 420 sectors at 7200 rpm (Hz).
-const RATE_HZ: f64 = 50_400.0;
+pub(super) const RATE_HZ: f64 = 50_400.0;
 /// Gain of the main actuator in the benchmark.
 const VCM_GAIN: f64 = 3.7976e7;
 /// The fixed lag of the second actuator's loop: gain at rest (ratio) and corner (Hz).
@@ -33,10 +33,20 @@ struct Case {
     name: String,
     /// The main actuator with the second one's loop closed, at the controller's rate, hold included.
     frf: Frf,
+    /// The same plant's position after one sample of a command of 1.
+    pulse: Vec<f64>,
 }
 
-/// Makes the study from the folder of published parameters.
-pub fn hdd(data: &Path) -> Result<Study, StudyError> {
+/// Samples of a pulse response: 100 ms, longer than any window.
+const PULSE: usize = 5040;
+
+/// Name, response and pulse response of every case.
+pub(super) fn benchmark(data: &Path) -> Result<Vec<(String, Frf, Vec<f64>)>, StudyError> {
+    Ok(cases(data)?.into_iter().map(|c| (c.name, c.frf, c.pulse)).collect())
+}
+
+/// The nine cases from the folder of published parameters.
+fn cases(data: &Path) -> Result<Vec<Case>, StudyError> {
     let read = |name: &str| -> Result<Vec<ModeRow>, StudyError> {
         let file = data.join("hdd_benchmark_model").join(name);
         if !file.exists() {
@@ -55,9 +65,16 @@ pub fn hdd(data: &Path) -> Result<Study, StudyError> {
             let fine = sampled(&pzt, 1.0, pzt_f, damping)?;
             let at_rest = fine.at(1e-3).norm();
             let name = format!("{temperature} temperature, second actuator {:+.0} %", 100.0 * (gain - 1.0));
-            cases.push(Case { name, frf: response(&main, &fine, gain / at_rest)? });
+            let pulse = pulse(&main, &fine, gain / at_rest);
+            cases.push(Case { name, frf: response(&main, &fine, gain / at_rest)?, pulse });
         }
     }
+    Ok(cases)
+}
+
+/// Makes the study from the folder of published parameters.
+pub fn hdd(data: &Path) -> Result<Study, StudyError> {
+    let cases = cases(data)?;
     let spec = Spec::parse(include_str!("specs/hdd.toml"), include_str!("specs/hdd_profile.toml"))?;
     let settings = TuneSettings { sample_time_s: 1.0 / RATE_HZ, ..TuneSettings::default() };
     let machines: Vec<Machine<'_>> =
@@ -92,6 +109,24 @@ fn sampled(modes: &[ModeRow], gain: f64, frequency: f64, damping: f64) -> Result
             .push(ModalTerm { pole: Complex::new(-z * w, wd), residue: gain * kappa / Complex::new(0.0, 2.0 * wd) });
     }
     Ok(DiscretePlant::of_modal(&form, 1.0 / RATE_HZ)?)
+}
+
+/// The main actuator's position after a pulse, the second loop closed around it as in [`response`].
+fn pulse(main: &DiscretePlant, fine: &DiscretePlant, fine_gain: f64) -> Vec<f64> {
+    let lag_pole = (-TAU * LAG.1 / RATE_HZ).exp();
+    let (mut outer, mut inner) = (PlantState::at_rest(main), PlantState::at_rest(fine));
+    let mut lag = 0.0;
+    (0..PULSE)
+        .map(|k| {
+            let seen = outer.position() - fine_gain * inner.position();
+            outer.command(if k == 0 { 1.0 } else { 0.0 });
+            inner.command(lag);
+            outer.advance(main);
+            inner.advance(fine);
+            lag = lag_pole * lag + LAG.0 * (1.0 - lag_pole) * seen;
+            seen
+        })
+        .collect()
 }
 
 /// The main actuator's response with the second loop closed, on a grid that resolves every mode.

@@ -17,6 +17,10 @@ pub(super) struct Programme {
     pub half_spaces: Vec<Vec<f64>>,
     /// Cones, their bound first.
     pub cones: Vec<Vec<Vec<f64>>>,
+    /// The first so many variables lie in a ball of the radius beside it: it bounds what a residual of the multipliers can do.
+    pub ball: (usize, f64),
+    /// The other variables lie between 0 and this.
+    pub top: f64,
 }
 
 /// What the solver said.
@@ -27,26 +31,22 @@ pub(super) enum Answer {
         x: Vec<f64>,
         /// Objective at the point.
         value: f64,
-        /// No feasible point within the trusted box is below.
+        /// No feasible point in the ball is below.
         bound: f64,
-        /// Multipliers of the half spaces.
-        multiplier: Vec<f64>,
     },
-    /// The multipliers prove that no point within the trusted box meets all rows.
+    /// The multipliers prove that no point in the ball meets all rows.
     Infeasible,
     /// The solver gave up; nothing is known.
     Unknown,
 }
 
-/// Feasible points are trusted to lie within this many times the largest entry of the point found.
-const TRUSTED_BOX: f64 = 100.0;
-
 impl Programme {
     /// Solves the programme; deterministic, one thread.
     pub fn solve(&self) -> Answer {
         let n = self.cost.len();
+        let (inside, radius) = self.ball;
         let rows: Vec<&Vec<f64>> = self.half_spaces.iter().chain(self.cones.iter().flatten()).collect();
-        let m = rows.len();
+        let m = rows.len() + inside + 1;
         // s = b - A x with s = r [x; 1]: A = -r, b the constant.
         let (mut start, mut place, mut value) = (Vec::with_capacity(n + 1), Vec::new(), Vec::new());
         start.push(0);
@@ -57,17 +57,24 @@ impl Programme {
                     value.push(-row[j]);
                 }
             }
+            if j < inside {
+                place.push(rows.len() + 1 + j);
+                value.push(-1.0 / radius);
+            }
             start.push(place.len());
         }
         let a = CscMatrix::new(m, n, start, place, value);
-        let b: Vec<f64> = rows.iter().map(|r| r[n]).collect();
+        let mut b: Vec<f64> = rows.iter().map(|r| r[n]).collect();
+        b.push(1.0);
+        b.resize(m, 0.0);
         let mut kinds: Vec<SupportedConeT<f64>> = Vec::new();
         if !self.half_spaces.is_empty() {
             kinds.push(NonnegativeConeT(self.half_spaces.len()));
         }
         kinds.extend(self.cones.iter().map(|c| SecondOrderConeT(c.len())));
+        kinds.push(SecondOrderConeT(inside + 1));
         let settings = DefaultSettings::<f64> {
-            verbose: std::env::var("LIMIT_TRACE").is_ok(),
+            verbose: false,
             max_threads: 1,
             tol_gap_abs: 1e-8,
             tol_gap_rel: 1e-7,
@@ -80,42 +87,31 @@ impl Programme {
         };
         solver.solve();
         let s = &solver.solution;
-        if std::env::var("LIMIT_TRACE").is_ok() { eprintln!("status {:?} it {} obj {} dual {} n {} m {} maxx {:?}", s.status, s.iterations, s.obj_val, s.obj_val_dual, n, m, s.x.iter().fold(0.0f64,|a,x|a.max(x.abs()))); }
         match s.status {
             SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
-                let z = self.inside(&s.z);
-                // z in the dual cone with A'z = 0 and b'z < 0 leaves no room; the rest of A'z must not outweigh it.
-                let leak: f64 = self.pull(&z).iter().map(|x| x.abs()).sum();
-                let gap: f64 = -b.iter().zip(&z).map(|(b, z)| b * z).sum::<f64>();
-                if gap > INFEASIBLE_BOX * leak { Answer::Infeasible } else { Answer::Unknown }
+                // With no cost the multipliers bound 0 from below by something above 0: there is no point.
+                if self.bound(&self.inside(&s.z), 0.0) > 0.0 { Answer::Infeasible } else { Answer::Unknown }
             }
             SolverStatus::Solved
             | SolverStatus::AlmostSolved
             | SolverStatus::InsufficientProgress
             | SolverStatus::MaxIterations => {
                 let z = self.inside(&s.z);
-                let largest = s.x.iter().fold(0.0f64, |a, x| a.max(x.abs()));
-                if !largest.is_finite() || z.iter().any(|z| !z.is_finite()) {
+                if s.x.iter().chain(&z).any(|z| !z.is_finite()) {
                     return Answer::Unknown;
                 }
-                // c'x >= -b'z + (c + A'z)'x for every feasible x, since z'(b - A x) >= 0.
-                let leak: f64 = self.pull(&z).iter().zip(&self.cost).map(|(a, c)| (a + c).abs()).sum();
-                let dual: f64 = -b.iter().zip(&z).map(|(b, z)| b * z).sum::<f64>();
-                Answer::Found {
-                    value: s.x.iter().zip(&self.cost).map(|(x, c)| x * c).sum(),
-                    x: s.x.clone(),
-                    bound: dual - TRUSTED_BOX * largest * leak,
-                    multiplier: z[..self.half_spaces.len()].to_vec(),
-                }
+                let value = s.x.iter().zip(&self.cost).map(|(x, c)| x * c).sum();
+                Answer::Found { x: s.x.clone(), value, bound: self.bound(&z, 1.0) }
             }
             _ => Answer::Unknown,
         }
     }
 
-    /// The multipliers moved into the dual cone.
+    /// The multipliers of rows and cones moved into the dual cone; the ball's are left out.
     fn inside(&self, z: &[f64]) -> Vec<f64> {
-        let mut z = z.to_vec();
         let count = self.half_spaces.len();
+        let rows = count + self.cones.iter().map(Vec::len).sum::<usize>();
+        let mut z = z[..rows].to_vec();
         z[..count].iter_mut().for_each(|z| *z = z.max(0.0));
         let mut at = count;
         for c in &self.cones {
@@ -126,21 +122,24 @@ impl Programme {
         z
     }
 
-    /// A'z.
-    fn pull(&self, z: &[f64]) -> Vec<f64> {
+    /// The least of share c'x over the ball and the box that these multipliers leave: z'(row [x; 1]) >= 0 for every feasible x,
+    /// so share c'x >= -z'constant + (share c - row' z)'x.
+    fn bound(&self, z: &[f64], share: f64) -> f64 {
         let n = self.cost.len();
-        let mut sum = vec![0.0; n];
+        let mut left: Vec<f64> = self.cost.iter().map(|c| share * c).collect();
+        let mut constant = 0.0;
         for (row, z) in self.half_spaces.iter().chain(self.cones.iter().flatten()).zip(z) {
-            for (sum, r) in sum.iter_mut().zip(row) {
-                *sum -= r * z;
+            for (left, r) in left.iter_mut().zip(row) {
+                *left -= r * z;
             }
+            constant -= row[n] * z;
         }
-        sum
+        let (inside, radius) = self.ball;
+        let outward: f64 = left[..inside].iter().map(|x| x * x).sum::<f64>().sqrt();
+        let boxed: f64 = left[inside..].iter().map(|x| self.top * x.min(0.0)).sum();
+        constant - radius * outward + boxed
     }
 }
-
-/// Taps (in the programme's own scale, where good ones are near 1) below which infeasibility is proven.
-const INFEASIBLE_BOX: f64 = 1e3;
 
 #[cfg(test)]
 mod tests {
@@ -153,8 +152,10 @@ mod tests {
             cost: vec![0.0, 0.0, 1.0],
             half_spaces: vec![vec![1.0, 1.0, 0.0, -2.0]],
             cones: vec![vec![vec![0.0, 0.0, 1.0, 0.0], vec![1.0, 0.0, 0.0, 0.0], vec![0.0, 1.0, 0.0, 0.0]]],
+            ball: (2, 10.0),
+            top: 20.0,
         };
-        let Answer::Found { x, value, bound, .. } = p.solve() else { panic!("a convex programme has an answer") };
+        let Answer::Found { x, value, bound } = p.solve() else { panic!("a convex programme has an answer") };
         // The solver's tolerance.
         assert!((x[0] - 1.0).abs() < 1e-5 && (value - 2f64.sqrt()).abs() < 1e-6);
         assert!(bound <= 2f64.sqrt() && bound > 2f64.sqrt() - 1e-4);
@@ -166,6 +167,8 @@ mod tests {
             cost: vec![1.0],
             half_spaces: vec![vec![1.0, -2.0], vec![-1.0, 1.0]],
             cones: vec![],
+            ball: (1, 10.0),
+            top: 0.0,
         };
         assert_eq!(p.solve(), Answer::Infeasible);
     }

@@ -1,95 +1,63 @@
-//! Expected energy of the window's bins as a quadratic form of the taps, and as the rows of a cone.
+//! Expected energy of a band as a sum of squares of affine functions of the taps.
 //!
-//! In: a horizon. Out: for a set of bins, sum over them of E|X_k|²/N² = [q; 1]' M [q; 1]; move, encoder noise and windage included.
-//! Noise enters by its innovations from the start of the move on; earlier ones would only add, so the form never says too much.
+//! In: a horizon. Out: rows whose squares add up to the sum over bins of E|X_k|²/N²; the move by two rows a bin, the noise by the
+//! eigenvectors of its form. Noise enters by its innovations from the start of the move on; earlier ones would only add, and
+//! directions left out would too: the sum never says too much.
 
 use super::horizon::{Bin, Horizon};
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
 
-/// The form of a set of bins.
-#[derive(Clone, Debug)]
-pub(super) struct Energy {
-    /// (taps + 1) square, symmetric, the constant last.
-    form: DMatrix<f64>,
+/// An affine function of the taps: row·q + constant.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Affine {
+    pub row: Vec<f64>,
+    pub constant: f64,
 }
 
-/// Share of the largest eigenvalue below which a direction is left out: leaving one out only lowers the form.
+impl Affine {
+    /// Its value.
+    pub fn at(&self, q: &[f64]) -> f64 {
+        self.row.iter().zip(q).map(|(r, q)| r * q).sum::<f64>() + self.constant
+    }
+}
+
+/// Share of the largest eigenvalue below which a direction of the noise is left out.
 const NOTHING: f64 = 1e-13;
 
-impl Energy {
-    /// The form of the bins that `inside` picks.
-    pub fn of(h: &Horizon, inside: impl Fn(&Bin) -> bool) -> Energy {
-        let n = h.taps;
-        let mut form = DMatrix::zeros(n + 1, n + 1);
-        let drift: Vec<f64> = (0..n).map(|i| h.keep.powi(i as i32)).collect();
-        // The taps' part of S times the colour of the windage.
-        let coloured = convolved(&h.plant[..n], &drift);
-        for bin in h.bins.iter().filter(|b| inside(b)) {
-            let command = &bin.command[h.ahead..h.ahead + n];
-            let input = &bin.input[h.ahead..h.ahead + n];
-            let moved: Vec<Complex<f64>> = correlated(command, &h.target).iter().map(|x| -x).collect();
-            add_row(&mut form, &moved, bin.still);
-            if h.encoder > 0.0 {
-                add_hankel(&mut form, command, None, h.encoder * h.encoder);
-            }
-            if h.windage > 0.0 {
-                let pushed = correlated(command, &coloured);
-                let open = correlated(input, &drift);
-                add_hankel(&mut form, &pushed, Some(&open), h.windage * h.windage);
-            }
+/// The rows of the bins that `inside` picks; `unit` is the size of ordinary taps, at which directions of the noise are compared.
+pub(super) fn rows(h: &Horizon, unit: f64, inside: impl Fn(&Bin) -> bool) -> Vec<Affine> {
+    let n = h.taps;
+    let mut noise = DMatrix::zeros(n + 1, n + 1);
+    let drift: Vec<f64> = (0..n).map(|i| h.keep.powi(i as i32)).collect();
+    // The taps' part of S times the colour of the windage.
+    let coloured = convolved(&h.shaped_plant[..n], &drift);
+    let mut rows = Vec::new();
+    for bin in h.bins.iter().filter(|b| inside(b)) {
+        let (command, input) = (&bin.command[h.ahead..], &bin.input[h.ahead..]);
+        let moved = correlated(command, &h.target);
+        rows.push(Affine { row: moved.iter().map(|x| -x.re).collect(), constant: bin.still.re });
+        rows.push(Affine { row: moved.iter().map(|x| -x.im).collect(), constant: bin.still.im });
+        if h.encoder > 0.0 {
+            add_hankel(&mut noise, command, None, h.encoder * h.encoder);
         }
-        for i in 0..=n {
-            for j in 0..i {
-                form[(i, j)] = form[(j, i)];
-            }
-        }
-        Energy { form }
-    }
-
-    /// Root of the form at taps `q`.
-    pub fn norm(&self, q: &[f64]) -> f64 {
-        let n = q.len();
-        let x = |i: usize| if i < n { q[i] } else { 1.0 };
-        let mut sum = 0.0;
-        for j in 0..=n {
-            let column: f64 = (0..=n).map(|i| self.form[(i, j)] * x(i)).sum();
-            sum += column * x(j);
-        }
-        sum.max(0.0).sqrt()
-    }
-
-    /// Rows r, so that the form is at least the sum of (r [q; 1])², and equal to it up to rounding.
-    pub fn rows(&self) -> Vec<Vec<f64>> {
-        let size = self.form.nrows();
-        // Columns of very different sizes: the eigenvalues are taken of the form scaled to a diagonal of 1.
-        let scale: Vec<f64> = (0..size).map(|i| self.form[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
-        let scaled = DMatrix::from_fn(size, size, |i, j| self.form[(i, j)] / (scale[i] * scale[j]));
-        let e = SymmetricEigen::new(scaled);
-        let largest = e.eigenvalues.iter().fold(0.0f64, |a, x| a.max(*x));
-        let mut rows: Vec<(f64, Vec<f64>)> = e
-            .eigenvalues
-            .iter()
-            .enumerate()
-            .filter(|(_, l)| **l > NOTHING * largest)
-            .map(|(i, l)| (*l, (0..size).map(|j| l.sqrt() * e.eigenvectors[(j, i)] * scale[j]).collect()))
-            .collect();
-        rows.sort_by(|a, b| b.0.total_cmp(&a.0));
-        rows.into_iter().map(|(_, r)| r).collect()
-    }
-}
-
-/// Adds |row·q + constant|² to the upper triangle.
-fn add_row(form: &mut DMatrix<f64>, row: &[Complex<f64>], constant: Complex<f64>) {
-    let n = row.len();
-    for j in 0..n {
-        for i in 0..=j {
-            form[(i, j)] += row[i].re * row[j].re + row[i].im * row[j].im;
+        if h.windage > 0.0 {
+            add_hankel(
+                &mut noise,
+                &correlated(input, &coloured),
+                Some(&correlated(input, &drift)),
+                h.windage * h.windage,
+            );
         }
     }
-    for i in 0..n {
-        form[(i, n)] += row[i].re * constant.re + row[i].im * constant.im;
+    let scale = |i: usize| if i < n { unit } else { 1.0 };
+    let whole = DMatrix::from_fn(n + 1, n + 1, |i, j| noise[(i.min(j), i.max(j))] * scale(i) * scale(j));
+    let e = SymmetricEigen::new(whole);
+    let largest = e.eigenvalues.iter().fold(0.0f64, |a, x| a.max(*x));
+    for (i, l) in e.eigenvalues.iter().enumerate().filter(|(_, l)| **l > NOTHING * largest) {
+        let row = (0..n).map(|j| l.sqrt() * e.eigenvectors[(j, i)] / unit).collect();
+        rows.push(Affine { row, constant: l.sqrt() * e.eigenvectors[(n, i)] });
     }
-    form[(n, n)] += constant.norm_sqr();
+    rows
 }
 
 /// Adds power * sum over innovations j of |sum_m q_m z[j + m] - open_j|², to the upper triangle; by its diagonals.

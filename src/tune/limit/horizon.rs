@@ -33,7 +33,7 @@ pub(super) struct Horizon {
     pub taps: usize,
     /// Samples from the start of the record to index 0: noise of that time reaches the window too.
     pub ahead: usize,
-    /// Pulse response of the plant at controller samples, `ahead + taps` long.
+    /// Pulse response of the plant at controller samples, `ahead + 2 taps` long.
     pub plant: Vec<f64>,
     /// The same times the shaping of the taps, squared.
     pub shaped_plant: Vec<f64>,
@@ -87,18 +87,6 @@ impl Shaping {
             }
         }
     }
-
-    /// The inverse of [`Shaping::apply`].
-    pub fn undo(&self, x: &mut [f64]) {
-        for _ in 0..2 * self.order {
-            let (mut before, mut out) = (0.0, 0.0);
-            for x in x.iter_mut() {
-                out += *x - self.pole * before;
-                before = *x;
-                *x = out;
-            }
-        }
-    }
 }
 
 impl Horizon {
@@ -132,7 +120,7 @@ impl Horizon {
             return Err(LimitError::Horizon { taps, limit: MOST_TAPS });
         }
         let length = ahead + taps;
-        let (plant_pulse, readings, integrators) = pulses(plant, t, length, &servo)?;
+        let (plant_pulse, readings, integrators) = pulses(plant, t, [length, length + taps], &servo)?;
         let shaping = Shaping { pole: SHAPING_POLE, order: integrators };
         let mut shaped_plant = plant_pulse.clone();
         shaping.apply(&mut shaped_plant);
@@ -211,32 +199,38 @@ const MOST_TAPS: usize = 1200;
 type Pulses = (Vec<f64>, Vec<Vec<f64>>, usize);
 
 /// Position at controller samples and at every servo sample's offset, after a pulse of the command at sample 0.
-fn pulses(plant: &LimitPlant, t: f64, length: usize, servo: &[(usize, f64)]) -> Result<Pulses, LimitError> {
+fn pulses(
+    plant: &LimitPlant,
+    t: f64,
+    [length, long]: [usize; 2],
+    servo: &[(usize, f64)],
+) -> Result<Pulses, LimitError> {
     match plant {
         LimitPlant::Sampled(p) => {
             let readings: Vec<_> = servo.iter().map(|(_, offset)| p.intersample(*offset)).collect();
             let mut rows = vec![vec![0.0; length]; servo.len()];
-            let mut at_samples = vec![0.0; length];
+            let mut at_samples = Vec::with_capacity(long);
             let mut state = PlantState::at_rest(p);
-            for l in 0..length {
-                at_samples[l] = state.position();
+            for l in 0..long {
+                at_samples.push(state.position());
                 state.command(if l == 0 { 1.0 } else { 0.0 });
-                for (row, reading) in rows.iter_mut().zip(&readings) {
-                    row[l] = state.between(reading);
+                if l < length {
+                    for (row, reading) in rows.iter_mut().zip(&readings) {
+                        row[l] = state.between(reading);
+                    }
                 }
                 state.advance(p);
             }
             Ok((at_samples, rows, p.integrators()))
         }
         LimitPlant::Pulse { response, integrators } => {
-            if response.len() < length {
-                return Err(LimitError::PulseLength { found: response.len(), expected: length });
+            if response.len() < long {
+                return Err(LimitError::PulseLength { found: response.len(), expected: long });
             }
             if let Some((_, offset)) = servo.iter().find(|(_, offset)| *offset > 1e-6 * t) {
                 return Err(LimitError::ServoClock { offset_s: *offset });
             }
-            let response = response[..length].to_vec();
-            Ok((response.clone(), vec![response; servo.len()], *integrators))
+            Ok((response[..long].to_vec(), vec![response[..length].to_vec(); servo.len()], *integrators))
         }
     }
 }

@@ -1,9 +1,10 @@
 //! The limit of performance: how low the DFT of the PES can go under any linear controller.
 //!
-//! In: a plant, a spec, the feed-forward that stays. Out: a lower bound that no linear time-invariant feedback can beat, and how far
-//! given gains are from it. Method: on the finite write only the first taps of the Youla parameter count, so that the convex
-//! programme is exact; |S| <= Ms enters as the norm of a Toeplitz matrix, by cuts. Spec: `specs/performance_limit.md`.
+//! In: a plant, a spec, the feed-forward that stays. Out: a lower bound that no loop of a stated class can beat, and how far given
+//! gains are from it. Method: on the finite write only the first taps of the Youla parameter count, and every demand kept is convex in them;
+//! the solver's multipliers prove the bound. Spec: `specs/performance_limit.md`.
 
+mod basis;
 mod cone;
 mod cuts;
 mod energy;
@@ -12,7 +13,7 @@ mod programme;
 mod taps;
 
 pub use horizon::LimitPlant;
-pub use programme::{Figures, Limit, LimitSettings, Verdict, figures_of, limit};
+pub use programme::{Bound, Figures, Limit, LimitSettings, LimitWork, Standing, Verdict, limit, standing};
 
 use crate::lti::LtiError;
 use crate::pes::PesError;
@@ -45,9 +46,13 @@ pub enum LimitError {
     #[error("no bin of the window lies in 600 to 3000 Hz: nothing is to be made small; lengthen pes.window")]
     NoBins,
     /// A limit of performance speaks of linear plants.
-    #[error("the plant has the effect \"{effect}\": a limit of performance speaks of linear plants; remove [[plant.physics]]")]
+    #[error(
+        "the plant has the effect \"{effect}\": a limit of performance speaks of linear plants; remove [[plant.physics]]"
+    )]
     Physics { effect: String },
     /// The solver gave up in the first round.
-    #[error("the convex programme of {taps} taps was not solved: the plant's gain or the noise is many orders away from the write's size")]
+    #[error(
+        "the convex programme of {taps} taps was not solved: the plant's gain or the noise is many orders away from the write's size"
+    )]
     NotSolved { taps: usize },
 }

@@ -1,30 +1,34 @@
 //! `limit`: the programme of a machine, solved in rounds of cuts; and the figures of given gains beside it.
 
+use super::basis::Basis;
 use super::cone::{Answer, Programme};
-use super::cuts::{Cut, cuts, sensitivity};
-use super::energy::{Energy, correlated};
+use super::cuts::{Cut, Pointwise, sensitivity};
+use super::energy::{Affine, convolved, correlated, rows};
 use super::horizon::{Bin, Horizon};
 use super::taps::{energies, taps};
 use super::{LimitError, LimitPlant};
 use crate::controller::{Controller, Feedforward};
 use crate::pes::{HIGH_BAND_HZ, LOW_BAND_HZ};
 use crate::tune::{Spec, bench};
+use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 
-/// How hard the bound is driven up.
+/// How hard the bound is driven up, and over which loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitSettings {
     /// Rounds of cuts at most; the bound of every round is one.
     pub rounds: usize,
-    /// Cuts added in a round at most.
-    pub cuts: usize,
-    /// Ends where the Toeplitz norm is within this share of Ms.
+    /// Rounds for each band alone; 0 leaves these bounds out.
+    pub alone: usize,
+    /// Ends where no demand on S is missed by more than this.
     pub tolerance: f64,
+    /// Loops of the class forget: sum of |s_k| beyond the horizon at most, s being the impulse response of S.
+    pub tail: f64,
 }
 
 impl Default for LimitSettings {
     fn default() -> Self {
-        LimitSettings { rounds: 12, cuts: 60, tolerance: 2e-3 }
+        LimitSettings { rounds: 12, alone: 4, tolerance: 2e-3, tail: 0.05 }
     }
 }
 
@@ -49,24 +53,35 @@ pub enum Verdict {
     Impossible,
 }
 
+/// A proven bound, and how nearly it is reached.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bound {
+    /// No loop of the class has a smaller weighted sum.
+    pub objective: f64,
+    /// Where the programme's own optimum lies, whose sum is at least the bound.
+    pub at: Figures,
+    /// By how much its last point still missed a demand of the class: 0 where the bound is as high as the programme allows.
+    pub missed: f64,
+}
+
 /// The limit of one machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limit {
-    /// No linear controller that keeps Ms and effort has a smaller weighted sum; 0 where even the relaxation is infeasible.
-    pub objective: f64,
-    /// Where the programme's own optimum lies: the bound is at most this.
-    pub at: Figures,
-    /// No linear controller that keeps Ms and effort has a smaller `dft_low`, whatever its `dft_high`.
-    pub dft_low: f64,
-    /// No linear controller that keeps Ms and effort has a smaller `dft_high`, whatever its `dft_low`.
-    pub dft_high: f64,
-    /// Can the limits of the spec be met at all?
+    /// The weighted sum: every linear controller with |S| <= Ms, all gain crossings inside the spec's range, that forgets within the write.
+    pub sum: Bound,
+    /// No loop of the class has a smaller norm over 600 to 1500 Hz, whatever its other one (position_unit); none where not asked for.
+    pub dft_low: Option<f64>,
+    /// The same over 1500 to 3000 Hz.
+    pub dft_high: Option<f64>,
+    /// Can the limits of the spec be met within the class at all?
     pub verdict: Verdict,
-    /// Ms that was demanded; none where the spec has none.
+    /// The class: Ms at most, none where the spec has none.
     pub max_sensitivity: Option<f64>,
-    /// Toeplitz norm at the last point: how nearly the cuts stand for |S| <= Ms.
-    pub norm_reached: f64,
-    /// Taps, cuts and rounds of the programme for the sum.
+    /// The class: all gain crossings between these (Hz).
+    pub gain_crossover_hz: Option<[f64; 2]>,
+    /// The class: sum of |s_k| beyond the horizon at most.
+    pub tail: f64,
+    /// Size of the programme.
     pub work: LimitWork,
 }
 
@@ -75,23 +90,35 @@ pub struct Limit {
 pub struct LimitWork {
     /// Taps of the Youla parameter that the write can see.
     pub taps: usize,
-    /// Cuts that stand for |S| <= Ms.
+    /// Cuts that stand for the margins.
     pub cuts: usize,
     /// Rounds solved, all programmes together.
     pub rounds: usize,
 }
 
-/// The expected figures of a controller on the same write; [`Limit::objective`] is below its objective if it keeps the margins.
-pub fn figures_of(plant: &LimitPlant, controller: &Controller, spec: &Spec) -> Result<Figures, LimitError> {
+/// Given gains beside a limit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Standing {
+    /// Expected figures of the gains.
+    pub figures: Figures,
+    /// Sum of |s_k| beyond the horizon, as far as twice the record shows it.
+    pub tail: f64,
+}
+
+/// The expected figures of a controller on the same write, and whether its loop forgets soon enough to belong to the class.
+pub fn standing(plant: &LimitPlant, controller: &Controller, spec: &Spec) -> Result<Standing, LimitError> {
     let t = controller.sample_time_s;
     let h = Horizon::of(plant, t, controller.feedforward.as_ref(), &spec.profile, &[])?;
     let chain = controller.sections().map_err(crate::pes::PesError::from)?.chain;
-    let energy = energies(&h, &taps(&h.plant, &chain, h.ahead + h.taps));
+    let g = taps(&h.plant, &chain, h.plant.len());
+    let s = convolved(&h.plant, &g);
+    let energy = energies(&h, &g[..h.ahead + h.taps]);
     let norm = |band: [f64; 2]| {
         let inside = h.bins.iter().zip(&energy).filter(|(b, _)| in_band(b, band));
         inside.map(|(_, e)| e).sum::<f64>().sqrt()
     };
-    Ok(weighted(norm(LOW_BAND_HZ), norm(HIGH_BAND_HZ), spec))
+    let figures = weighted(norm(LOW_BAND_HZ), norm(HIGH_BAND_HZ), spec);
+    Ok(Standing { figures, tail: s[h.taps..].iter().map(|x| x.abs()).sum() })
 }
 
 fn weighted(dft_low: f64, dft_high: f64, spec: &Spec) -> Figures {
@@ -103,7 +130,7 @@ fn in_band(b: &Bin, [low, high]: [f64; 2]) -> bool {
     (low..=high).contains(&b.hz)
 }
 
-/// The limit of a machine under a spec, with the feed-forward as it stands. Margins other than Ms are left out, which only lowers it.
+/// The limit of a machine under a spec, with the feed-forward as it stands. Phase and gain margin are left out, which only lowers it.
 pub fn limit(
     plant: &LimitPlant,
     sample_time_s: f64,
@@ -116,90 +143,93 @@ pub fn limit(
     if !h.bins.iter().any(|b| in_band(b, LOW_BAND_HZ) || in_band(b, HIGH_BAND_HZ)) {
         return Err(LimitError::NoBins);
     }
-    let mut model = Model::new(&h, spec);
+    let mut model = Model::new(&h, spec, sample_time_s, settings);
+    let unsolved = LimitError::NotSolved { taps: h.taps };
     let weights = bench::weights(&spec.limits);
-    let sum = model.lower(weights, false, settings, settings.rounds)?.ok_or(LimitError::NotSolved { taps: h.taps })?;
-    let norm_reached = model.norm;
-    let (cut_count, at) = (model.cuts.len(), sum.figures);
+    let sum = model.lower(weights, settings.rounds).ok_or(unsolved)?;
+    let cuts = model.cuts.len();
     // The cuts of the sum serve the single bands as well; a few more rounds sharpen them.
-    let few = settings.rounds.min(FEW_ROUNDS);
-    let low = model.lower([weights[0], 0.0], false, settings, few)?.map_or(0.0, |l| l.bound / weights[0]);
-    let high = model.lower([0.0, weights[1]], false, settings, few)?.map_or(0.0, |l| l.bound / weights[1]);
+    let mut alone = |b: usize| {
+        let mut one = [0.0; 2];
+        one[b] = weights[b];
+        (settings.alone > 0).then(|| model.lower(one, settings.alone).map_or(0.0, |l| l.objective / weights[b]))
+    };
+    let (dft_low, dft_high) = (alone(0), alone(1));
     let limited = spec.limits.dft_low.is_some() || spec.limits.dft_high.is_some();
     let verdict = if limited && model.impossible() { Verdict::Impossible } else { Verdict::Open };
     Ok(Limit {
-        objective: sum.bound.max(0.0),
-        at,
-        dft_low: low.max(0.0),
-        dft_high: high.max(0.0),
+        sum,
+        dft_low,
+        dft_high,
         verdict,
         max_sensitivity: spec.margins.max_sensitivity,
-        norm_reached,
-        work: LimitWork { taps: h.taps, cuts: cut_count, rounds: model.rounds },
+        gain_crossover_hz: spec.margins.gain_crossover_hz,
+        tail: settings.tail,
+        work: LimitWork { taps: h.taps, cuts, rounds: model.rounds },
     })
 }
 
-/// Rounds spent on each band alone.
-const FEW_ROUNDS: usize = 4;
-
 /// Samples of the plant's pulse response that set the unit of the taps: a quarter of a period at 400 Hz and 25 kHz.
 const UNIT_SAMPLES: usize = 16;
-/// Taps are looked for in a ball of this radius, in their unit; those of a real controller lie near 1 to 10.
-const BALL: f64 = 1e3;
+/// Radius of the ball of coordinates that is searched: energies up to its square times the limits', far beyond any use.
+const BALL: f64 = 1e4;
 
 /// A programme that keeps its cuts between objectives.
 struct Model<'a> {
     h: &'a Horizon,
     spec: &'a Spec,
-    bands: [Energy; 2],
-    rows: [Vec<Vec<f64>>; 2],
-    /// Taps are counted in this unit.
-    unit: f64,
-    cuts: Vec<Cut>,
-    norm: f64,
+    settings: &'a LimitSettings,
+    /// Rows of both bands over the taps, and times their scale over the coordinates.
+    bands: [Vec<Affine>; 2],
+    turned: [Vec<Vec<f64>>; 2],
+    basis: Basis,
+    pointwise: Pointwise,
+    /// Cuts over the coordinates: one row for a half space, three for a disk.
+    cuts: Vec<Vec<Vec<f64>>>,
     rounds: usize,
 }
 
-struct Lowest {
-    bound: f64,
-    figures: Figures,
-}
+/// A cut further than this from a point is left out of the next round; it comes back when it is broken.
+const FAR: f64 = 0.3;
 
 impl<'a> Model<'a> {
-    fn new(h: &'a Horizon, spec: &'a Spec) -> Model<'a> {
-        let bands = [LOW_BAND_HZ, HIGH_BAND_HZ].map(|band| Energy::of(h, |b| in_band(b, band)));
-        let rows = [bands[0].rows(), bands[1].rows()];
+    fn new(h: &'a Horizon, spec: &'a Spec, sample_time_s: f64, settings: &'a LimitSettings) -> Model<'a> {
         let size = h.shaped_plant[..h.taps.min(UNIT_SAMPLES)].iter().map(|x| x * x).sum::<f64>().sqrt();
-        if std::env::var("LIMIT_TRACE").is_ok() { eprintln!("rows {} {} unit {} first {:?}", rows[0].len(), rows[1].len(), 1.0/size, &rows[0][0][..4]); }
-        Model { h, spec, bands, rows, unit: 1.0 / size, cuts: vec![], norm: f64::NAN, rounds: 0 }
+        let unit = 1.0 / size.max(f64::MIN_POSITIVE);
+        let bands = [LOW_BAND_HZ, HIGH_BAND_HZ].map(|band| rows(h, unit, |b| in_band(b, band)));
+        let scale = bench::weights(&spec.limits);
+        let all: Vec<(&Affine, f64)> = (0..2).flat_map(|b| bands[b].iter().map(move |a| (a, scale[b]))).collect();
+        let basis = Basis::of(&all, h.taps, unit);
+        let turned = [0, 1].map(|b: usize| bands[b].iter().map(|a| basis.row(a, scale[b], 2)).collect());
+        let pointwise = Pointwise {
+            sample_time_s,
+            tail: settings.tail,
+            max_sensitivity: spec.margins.max_sensitivity,
+            crossover_hz: spec.margins.gain_crossover_hz,
+        };
+        let mut model = Model { h, spec, settings, bands, turned, basis, pointwise, cuts: vec![], rounds: 0 };
+        model.pointwise.first(h).into_iter().for_each(|c| model.add(c));
+        model
     }
 
-    /// The programme: taps in units, then the two norms over their weights.
+    /// The programme: coordinates of the taps, then the two norms over their weights.
     fn programme(&self, weights: [f64; 2], limited: bool) -> Programme {
         let n = self.h.taps;
         let scale = bench::weights(&self.spec.limits);
-        let mut p = Programme { cost: vec![0.0; n + 2], ..Programme::default() };
+        let mut p = Programme { cost: vec![0.0; n + 2], ball: (n, BALL), top: BALL, ..Programme::default() };
         for b in 0..2 {
             p.cost[n + b] = weights[b] / scale[b];
             let mut cone = vec![vec![0.0; n + 3]];
             cone[0][n + b] = 1.0;
-            cone.extend(self.rows[b].iter().map(|r| self.padded(r, scale[b])));
+            cone.extend(self.turned[b].iter().cloned());
             p.cones.push(cone);
         }
-        // The ball bounds what is left of the multipliers' residual, and with it the proof.
-        let mut ball = vec![vec![0.0; n + 3]; n + 1];
-        ball[0][n + 2] = 1.0;
-        for (j, row) in ball[1..].iter_mut().enumerate() {
-            row[j] = 1.0 / BALL;
+        for cut in &self.cuts {
+            match cut.as_slice() {
+                [half] => p.half_spaces.push(half.clone()),
+                cone => p.cones.push(cone.to_vec()),
+            }
         }
-        p.cones.push(ball);
-        let of_cut = |c: &Cut| {
-            let ms = self.spec.margins.max_sensitivity.unwrap_or(f64::INFINITY);
-            let mut row: Vec<f64> = c.row.iter().map(|x| x * self.unit).collect();
-            row.extend([0.0, 0.0, ms - c.constant]);
-            row
-        };
-        p.half_spaces.extend(self.cuts.iter().map(of_cut));
         if let Some(peak) = self.spec.limits.command_peak {
             self.add_effort(&mut p, peak);
         }
@@ -216,13 +246,6 @@ impl<'a> Model<'a> {
         p
     }
 
-    fn padded(&self, row: &[f64], scale: f64) -> Vec<f64> {
-        let n = self.h.taps;
-        let mut padded: Vec<f64> = row[..n].iter().map(|x| x * scale * self.unit).collect();
-        padded.extend([0.0, 0.0, row[n] * scale]);
-        padded
-    }
-
     /// |command of the move| <= peak at every sample of the horizon; the noise would only add.
     fn add_effort(&self, p: &mut Programme, peak: f64) {
         let n = self.h.taps;
@@ -230,12 +253,9 @@ impl<'a> Model<'a> {
         self.h.shaping.apply(&mut shaped);
         for k in 0..n {
             for sign in [1.0, -1.0] {
-                let mut row = vec![0.0; n + 3];
-                for m in 0..=k {
-                    row[m] = -sign * shaped[k - m] * self.unit / peak;
-                }
-                row[n + 2] = 1.0 - sign * self.h.forward[k] / peak;
-                p.half_spaces.push(row);
+                let row = (0..n).map(|m| if m <= k { -sign * shaped[k - m] } else { 0.0 }).collect();
+                let constant = peak - sign * self.h.forward[k];
+                p.half_spaces.push(self.basis.row(&Affine { row, constant }, 1.0 / peak, 2));
             }
         }
     }
@@ -246,10 +266,9 @@ impl<'a> Model<'a> {
         for limit in &self.spec.limits.harmonics {
             let Some(bin) = self.h.bins.iter().find(|b| b.k == limit.k) else { continue };
             let moved = correlated(&bin.command[self.h.ahead..], &self.h.target);
-            let row = |part: &dyn Fn(nalgebra::Complex<f64>) -> f64| {
-                let mut row: Vec<f64> = moved.iter().map(|x| -part(*x)).collect();
-                row.push(part(bin.still));
-                self.padded(&row, 1.0 / limit.amplitude)
+            let row = |part: &dyn Fn(Complex<f64>) -> f64| {
+                let row = moved.iter().map(|x| -part(*x)).collect();
+                self.basis.row(&Affine { row, constant: part(bin.still) }, 1.0 / limit.amplitude, 2)
             };
             let mut bound = vec![0.0; n + 3];
             bound[n + 2] = 1.0;
@@ -257,35 +276,55 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Rounds of solving and cutting; the highest bound met. None where nothing was solved.
-    fn lower(
-        &mut self,
-        weights: [f64; 2],
-        limited: bool,
-        settings: &LimitSettings,
-        rounds: usize,
-    ) -> Result<Option<Lowest>, LimitError> {
+    fn add(&mut self, cut: Cut) {
         let n = self.h.taps;
-        let ms = self.spec.margins.max_sensitivity;
-        let mut best: Option<Lowest> = None;
+        self.cuts.push(match cut {
+            Cut::Half(a) => vec![self.basis.row(&a, 1.0, 2)],
+            Cut::Disk(bound, [re, im]) => {
+                let mut first = vec![0.0; n + 3];
+                first[n + 2] = bound;
+                vec![first, self.basis.row(&re, 1.0, 2), self.basis.row(&im, 1.0, 2)]
+            }
+        });
+    }
+
+    /// Leaves out the cuts far from a point.
+    fn thin(&mut self, x: &[f64]) {
+        let value = |r: &Vec<f64>| r.iter().zip(x).map(|(r, x)| r * x).sum::<f64>() + r[x.len()];
+        self.cuts.retain(|cut| match cut.as_slice() {
+            [half] => value(half) < FAR,
+            [bound, re, im] => value(bound) - value(re).hypot(value(im)) < FAR,
+            _ => true,
+        });
+    }
+
+    /// Both norms at these taps.
+    fn figures(&self, q: &[f64]) -> Figures {
+        let norm = |rows: &[Affine]| rows.iter().map(|a| a.at(q).powi(2)).sum::<f64>().sqrt();
+        weighted(norm(&self.bands[0]), norm(&self.bands[1]), self.spec)
+    }
+
+    /// Rounds of solving and cutting; the highest bound met. None where nothing was solved.
+    fn lower(&mut self, weights: [f64; 2], rounds: usize) -> Option<Bound> {
+        let n = self.h.taps;
+        let mut best: Option<Bound> = None;
         for _ in 0..rounds.max(1) {
             self.rounds += 1;
-            let Answer::Found { x, bound, .. } = self.programme(weights, limited).solve() else { break };
-            let q: Vec<f64> = x[..n].iter().map(|x| x * self.unit).collect();
-            let figures = weighted(self.bands[0].norm(&q), self.bands[1].norm(&q), self.spec);
-            if best.as_ref().is_none_or(|b| bound > b.bound) {
-                best = Some(Lowest { bound, figures });
+            let Answer::Found { x, bound, .. } = self.programme(weights, false).solve() else { break };
+            let q = self.basis.taps(&x[..n]);
+            let (missed, found) = self.pointwise.cuts(self.h, &sensitivity(self.h, &q));
+            let at = self.figures(&q);
+            // Every round's bound is one; the highest stands, with what its point missed.
+            if best.as_ref().is_none_or(|b| bound > b.objective) {
+                best = Some(Bound { objective: bound, at, missed: missed.max(0.0) });
             }
-            let Some(ms) = ms else { break };
-            let (norm, found) = cuts(self.h, &sensitivity(self.h, &q), ms, settings.cuts);
-            self.norm = norm;
-            if std::env::var("LIMIT_TRACE").is_ok() { eprintln!("bound {bound} norm {norm} cuts {}", self.cuts.len()); }
-            if norm <= ms * (1.0 + settings.tolerance) {
+            if missed <= self.settings.tolerance {
                 break;
             }
-            self.cuts.extend(found);
+            self.thin(&x);
+            found.into_iter().for_each(|c| self.add(c));
         }
-        Ok(best)
+        best.map(|b| Bound { objective: b.objective.max(0.0), ..b })
     }
 
     /// Whether the limits of the spec are proven to exclude each other.
