@@ -30,7 +30,7 @@ pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Fai
     let gains = a.gains.as_ref().map(|file| load::controller(file)).transpose()?;
     let t = gains.as_ref().map_or(a.sample_time_s, |g| g.sample_time_s);
     let seen = LimitPlant::of_model(&plant, t).map_err(LimitError::from)?;
-    let settings = LimitSettings { rounds: a.rounds, tail: a.tail, ..LimitSettings::default() };
+    let settings = LimitSettings { rounds: a.rounds, alone: a.alone, tail: a.tail, ..LimitSettings::default() };
     let forward = gains.as_ref().and_then(|g| g.feedforward.as_ref());
     let found = limit(&seen, t, forward, &spec, &settings)?;
     let figures = gains.as_ref().map(|g| standing(&seen, g, &spec)).transpose()?;

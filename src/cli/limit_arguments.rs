@@ -35,6 +35,9 @@ pub(super) struct LimitArguments {
     /// Rounds of cuts at most; every round's bound is one
     #[arg(long, value_name = "N", default_value_t = 12)]
     pub rounds: usize,
+    /// Rounds for each band alone; 0 leaves these two bounds out
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub alone: usize,
     /// Sample time where no gains give one (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 39.6e-6)]
     pub sample_time_s: f64,
