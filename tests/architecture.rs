@@ -18,7 +18,8 @@ const RANKS: [&[&str]; 10] = [
 ];
 
 /// Outside crates and the places where they may be named.
-const HOMES: [(&str, &[&str]); 9] = [
+const HOMES: [(&str, &[&str]); 10] = [
+    ("clarabel", &["src/tune/limit/cone.rs"]),
     ("argmin", &["src/tune/search.rs"]),
     ("rustfft", &["src/numeric/spectrum.rs"]),
     ("rayon", &["src/tune/search.rs", "src/gate/", "src/twin/", "src/study/", "src/diagnose/"]),

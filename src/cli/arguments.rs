@@ -2,6 +2,7 @@
 
 pub(super) use super::diagnose_arguments::DiagnoseArguments;
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
+pub(super) use super::limit_arguments::{BudgetArguments, LimitArguments, NextSweepArguments, ParetoArguments};
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
 pub(super) use super::verify_arguments::VerifyArguments;
 use crate::twin::line::UnknownKind;
@@ -28,6 +29,10 @@ pub(super) enum Command {
     Diagnose(Box<DiagnoseArguments>),
     Features(FeaturesArguments),
     Identify(Box<IdentifyArguments>),
+    Limit(LimitArguments),
+    Pareto(ParetoArguments),
+    Budget(BudgetArguments),
+    NextSweep(Box<NextSweepArguments>),
     Margins(Box<MarginsArguments>),
     Response(ResponseArguments),
     Simulate(SimulateArguments),
@@ -331,6 +336,10 @@ pub(super) enum StudyName {
     Ladder,
     /// The production line in features (figures 24-34)
     Line,
+    /// How far tuned gains are from the best possible: four classes, nine cases of the HDD benchmark plant
+    Limits,
+    /// The DFT under gains never run, predicted and recorded
+    Prediction,
     /// 200 random plants of order 22: response, frequency and margin errors
     Plants,
     /// The nine measured responses of a fast steering mirror

@@ -14,7 +14,7 @@ use crate::physics::PhysicsError;
 use crate::recording::RecordingError;
 use crate::report::ReportError;
 use crate::study::StudyError;
-use crate::tune::{GainTableError, TuneError};
+use crate::tune::{GainTableError, LimitError, TuneError};
 use crate::twin::TwinError;
 use crate::verify::VerifyError;
 use std::path::PathBuf;
@@ -52,6 +52,8 @@ pub enum Failure {
     Report(#[from] ReportError),
     #[error(transparent)]
     Tune(#[from] TuneError),
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     #[error(transparent)]
     GainTable(#[from] GainTableError),
     #[error("no machine: expected --plant PLANT, --frf FRF or --machines DIR with --gate GATE")]

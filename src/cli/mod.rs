@@ -4,6 +4,7 @@
 //! 1 (done, something was rejected) or 2 (could not do it). Commands: `specs/files.md` and `servotune --help`.
 
 mod arguments;
+mod budget;
 mod classify;
 mod demo;
 mod demo_gate;
@@ -14,8 +15,12 @@ mod features;
 mod gate_arguments;
 mod gated;
 mod identify;
+mod limit;
+mod limit_arguments;
 mod load;
 mod margins;
+mod next_sweep;
+mod pareto;
 mod physics;
 mod response;
 mod screen;
@@ -61,6 +66,10 @@ pub fn main() -> ExitCode {
         Command::Diagnose(a) => diagnose::run(&a, &mut screen),
         Command::Features(a) => features::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
+        Command::Limit(a) => limit::run(&a, &mut screen),
+        Command::Pareto(a) => pareto::run(&a, &mut screen),
+        Command::Budget(a) => budget::run(&a, &mut screen),
+        Command::NextSweep(a) => next_sweep::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),
         Command::Response(a) => response::run(&a, &mut screen),
         Command::Simulate(a) => simulate::run(&a, &mut screen),

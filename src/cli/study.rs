@@ -19,6 +19,8 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::Certificate => study::certificate(&a.data)?,
         StudyName::Ladder => study::ladder()?,
         StudyName::Line => study::line_study()?,
+        StudyName::Limits => study::limits(&a.data)?,
+        StudyName::Prediction => study::prediction()?,
         StudyName::Plants => study::plants()?,
         StudyName::Mirror => study::mirror(&a.data)?,
         StudyName::Mismatch => study::mismatch(&a.data)?,

@@ -23,6 +23,7 @@ mod nyquist;
 mod open_loop;
 mod poles;
 mod sampled;
+mod sweep_plan;
 mod trace;
 
 pub use amplitudes::{AmplitudeRow, Amplitudes, DescribedMargins, LimitCycle, described_margins, linear_crossover_hz};
@@ -38,4 +39,5 @@ pub use nyquist::{NyquistCount, nyquist_count};
 pub use open_loop::{FeedbackError, ModelLoop, OpenLoop, angle_from_rest};
 pub use poles::closed_loop_poles;
 pub use sampled::{LoopOnGrid, SampledPlant};
+pub use sweep_plan::{PlanSettings, SweepPlan, Tone, sweep_plan};
 pub use trace::Trace;

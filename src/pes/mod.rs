@@ -3,6 +3,7 @@
 //! In: a sampled plant, a controller, a profile. Out: PES at the servo clock and its DFT, eqs. (40)-(44).
 //! Convention: PES = reference - position (+ run-out), amplitude |X_k|/N; spec: `specs/pes.md`.
 
+mod budget;
 mod dft;
 mod expected;
 mod figures;
@@ -14,9 +15,11 @@ mod reference;
 mod simulation;
 mod spectral;
 
+pub use budget::{Budget, PredictSettings, Prediction, Range, Source, SourceShare, budget, predict};
 pub use dft::{Harmonic, WindowDft};
 pub use expected::{ExpectedNoise, NoiseWork};
 pub use figures::{HIGH_BAND_HZ, LOW_BAND_HZ, PesFigures, figures};
+pub use noise::runout;
 pub use physical::{context, simulate_physical};
 pub use profile::{Noise, PesClock, Profile, ProfileError, Runout, Spiral};
 pub use quick::{QuickScene, QuickWork};

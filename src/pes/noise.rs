@@ -29,7 +29,7 @@ pub(super) fn windage(noise: &Noise, samples: usize, sample_time_s: f64) -> Vec<
 }
 
 /// Run-out at time `t` (position_unit).
-pub(super) fn runout(noise: &Noise, t: f64) -> f64 {
+pub fn runout(noise: &Noise, t: f64) -> f64 {
     let line = |l: &super::Runout| {
         l.amplitude * (TAU * f64::from(l.order) * noise.spindle_hz * t + l.phase_deg.to_radians()).cos()
     };

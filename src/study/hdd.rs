@@ -7,7 +7,7 @@ use super::{Study, StudyError};
 use crate::controller::Controller;
 use crate::feedback::{MeasuredLoop, measured_margins};
 use crate::frf::Frf;
-use crate::lti::{DiscretePlant, FrequencyResponse, ModalForm, ModalTerm};
+use crate::lti::{DiscretePlant, FrequencyResponse, ModalForm, ModalTerm, PlantState};
 use crate::recording::read_columns;
 use crate::report::bode::{BodeCurve, BodeMarks, bode};
 use crate::report::number::NumberFormat;
@@ -33,6 +33,16 @@ pub(super) struct Case {
     pub name: String,
     /// The main actuator with the second one's loop closed, at the controller's rate, hold included.
     pub frf: Frf,
+    /// The same plant's position after one sample of a command of 1.
+    pulse: Vec<f64>,
+}
+
+/// Samples of a pulse response: 100 ms, longer than any window.
+const PULSE: usize = 5040;
+
+/// Name, response and pulse response of every case.
+pub(super) fn benchmark(data: &Path) -> Result<Vec<(String, Frf, Vec<f64>)>, StudyError> {
+    Ok(cases(data)?.into_iter().map(|c| (c.name, c.frf, c.pulse)).collect())
 }
 
 /// The nine cases from the folder of published parameters.
@@ -55,7 +65,8 @@ pub(super) fn cases(data: &Path) -> Result<Vec<Case>, StudyError> {
             let fine = sampled(&pzt, 1.0, pzt_f, damping)?;
             let at_rest = fine.at(1e-3).norm();
             let name = format!("{temperature} temperature, second actuator {:+.0} %", 100.0 * (gain - 1.0));
-            cases.push(Case { name, frf: response(&main, &fine, gain / at_rest)? });
+            let pulse = pulse(&main, &fine, gain / at_rest);
+            cases.push(Case { name, frf: response(&main, &fine, gain / at_rest)?, pulse });
         }
     }
     Ok(cases)
@@ -106,6 +117,24 @@ fn sampled(modes: &[ModeRow], gain: f64, frequency: f64, damping: f64) -> Result
             .push(ModalTerm { pole: Complex::new(-z * w, wd), residue: gain * kappa / Complex::new(0.0, 2.0 * wd) });
     }
     Ok(DiscretePlant::of_modal(&form, 1.0 / RATE_HZ)?)
+}
+
+/// The main actuator's position after a pulse, the second loop closed around it as in [`response`].
+fn pulse(main: &DiscretePlant, fine: &DiscretePlant, fine_gain: f64) -> Vec<f64> {
+    let lag_pole = (-TAU * LAG.1 / RATE_HZ).exp();
+    let (mut outer, mut inner) = (PlantState::at_rest(main), PlantState::at_rest(fine));
+    let mut lag = 0.0;
+    (0..PULSE)
+        .map(|k| {
+            let seen = outer.position() - fine_gain * inner.position();
+            outer.command(if k == 0 { 1.0 } else { 0.0 });
+            inner.command(lag);
+            outer.advance(main);
+            inner.advance(fine);
+            lag = lag_pole * lag + LAG.0 * (1.0 - lag_pole) * seen;
+            seen
+        })
+        .collect()
 }
 
 /// The main actuator's response with the second loop closed, on a grid that resolves every mode.

@@ -13,12 +13,14 @@ mod gate;
 mod gate_seeds;
 mod hdd;
 mod ladder;
+mod limit;
 mod line;
 mod measured;
 mod mirror;
 mod mismatch;
 mod motor;
 mod plants;
+mod prediction;
 mod recordings;
 
 pub use certificate::certificate;
@@ -28,11 +30,13 @@ pub use gate::gate;
 pub use gate_seeds::gate_seeds;
 pub use hdd::hdd;
 pub use ladder::ladder;
+pub use limit::limits;
 pub use line::line_study;
 pub use mirror::mirror;
 pub use mismatch::mismatch;
 pub use motor::motor;
 pub use plants::plants;
+pub use prediction::prediction;
 pub use recordings::recordings;
 
 /// What a study hands over: files by name, relative to the results' folder.

@@ -217,7 +217,7 @@ pub(super) fn graze_violation(g: &Graze) -> f64 {
 }
 
 /// Each norm is weighed by its own limit; where only one has a limit both are weighed by it; where none has, they are summed.
-fn weights(l: &Limits) -> [f64; 2] {
+pub(super) fn weights(l: &Limits) -> [f64; 2] {
     match (l.dft_low, l.dft_high) {
         (Some(low), Some(high)) => [1.0 / low, 1.0 / high],
         (Some(one), None) | (None, Some(one)) => [1.0 / one, 1.0 / one],

@@ -8,10 +8,12 @@ mod bench;
 mod confidence;
 mod gain_table;
 mod judge;
+mod limit;
 mod linear;
 mod machine;
 mod outcome;
 mod parameters;
+mod pareto;
 mod physical;
 mod polish;
 mod quadratic;
@@ -25,9 +27,13 @@ pub use bench::{Bench, Desk, Score};
 pub use confidence::margin_intervals;
 pub use gain_table::{CrossingRow, GainTable, GainTableError, InputDigest, Provenance, Summary};
 pub use judge::{Proof, judge};
+pub use limit::{
+    Bound, Figures, Limit, LimitError, LimitPlant, LimitSettings, LimitWork, Standing, Verdict, limit, standing,
+};
 pub use machine::{Hold, Machine, Route};
 pub use outcome::{AtBound, Infeasible, Outcome, RelaxedLimit, Tuned, Work};
 pub use parameters::{Parameter, Parameters};
+pub use pareto::{ParetoPoint, ParetoSettings, pareto};
 pub use physical::{
     PhysicalProof, PhysicalTuning, TUNED_AMPLITUDES, equivalent_responses, judge_physical, tune_physical,
 };

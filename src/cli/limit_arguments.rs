@@ -1,0 +1,160 @@
+//! The words of `limit`, `pareto`, `budget` and `next-sweep`.
+
+use super::sweep_arguments::ReadingArguments;
+use clap::Args;
+use std::path::PathBuf;
+
+/// How low the DFT of the PES can go under any linear controller, and how far gains are from it
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  servotune limit --plant specs/machines/healthy.toml --spec specs/limits/paper.toml
+  servotune limit --plant specs/machines/tunable.toml --spec specs/limits/paper.toml --gains gains.toml --out limit.json
+
+The bound holds for every linear time-invariant feedback whose |S| stays within max_sensitivity, whose gain crossings all lie within
+gain_crossover_hz and whose loop forgets within the write (specs/performance_limit.md); phase and gain margin are left out, which only
+lowers it. Ends with 1 where the spec's limits are proven impossible.")]
+pub(super) struct LimitArguments {
+    /// Plant model (plant.toml)
+    #[arg(long, value_name = "PLANT")]
+    pub plant: PathBuf,
+    /// Limits and write (spec.toml)
+    #[arg(long, value_name = "SPEC")]
+    pub spec: PathBuf,
+    /// Gains to be compared (gains.toml or controller.toml)
+    #[arg(long, value_name = "GAINS")]
+    pub gains: Option<PathBuf>,
+    /// Document to write (limit.json)
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Also search the spec's structure from this many starts: the best gains found, no bound
+    #[arg(long, value_name = "STARTS")]
+    pub search: Option<usize>,
+    /// Sum of the sensitivity's impulse response that loops of the class may have left beyond the write
+    #[arg(long, value_name = "SUM", default_value_t = 0.05, value_parser = not_negative)]
+    pub tail: f64,
+    /// Rounds of cuts at most; every round's bound is one
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    pub rounds: usize,
+    /// Rounds for each band alone; 0 leaves these two bounds out
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub alone: usize,
+    /// Sample time where no gains give one (s)
+    #[arg(long, value_name = "SECONDS", default_value_t = 39.6e-6)]
+    pub sample_time_s: f64,
+}
+
+/// The front of margin against DFT over one or several machines, with its picture
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  servotune pareto --plant specs/machines/tunable.toml --spec specs/limits/paper.toml --out front.html
+  servotune pareto --plant cold.toml --plant warm.toml --plant hot.toml --spec specs/limits/paper.toml --out front.json
+
+Several plants get one gain table for all; the worst of them counts at every point.")]
+pub(super) struct ParetoArguments {
+    /// Plant model (plant.toml); may be given several times: slots, temperatures, draws of the uncertainty
+    #[arg(long, value_name = "PLANT", required = true)]
+    pub plant: Vec<PathBuf>,
+    /// Limits, bounds and write (spec.toml); its max_sensitivity is replaced by each point's
+    #[arg(long, value_name = "SPEC")]
+    pub spec: PathBuf,
+    /// Controller to start from and to compare with
+    #[arg(long, value_name = "START")]
+    pub controller: Option<PathBuf>,
+    /// Page (.html) or document (.json) to write
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Points of the front
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    pub points: usize,
+    /// Smallest Ms tried (ratio)
+    #[arg(long, value_name = "MS", default_value_t = 1.3)]
+    pub from: f64,
+    /// Largest Ms tried (ratio)
+    #[arg(long, value_name = "MS", default_value_t = 3.0)]
+    pub to: f64,
+    /// Sample time where no start controller gives one (s)
+    #[arg(long, value_name = "SECONDS", default_value_t = 39.6e-6)]
+    pub sample_time_s: f64,
+}
+
+/// Where the PES comes from, by source, and what it would be under gains never run
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  servotune budget --plant specs/machines/healthy.toml --controller specs/controllers/nominal.toml --profile specs/profiles/spiral.toml
+  servotune budget --plant plant.toml --controller today.toml --profile spiral.toml --predict gains.toml --model-error 0.03")]
+pub(super) struct BudgetArguments {
+    /// Plant model (plant.toml)
+    #[arg(long, value_name = "PLANT")]
+    pub plant: PathBuf,
+    /// Controller that runs (controller.toml or gains.toml)
+    #[arg(long, value_name = "CONTROLLER")]
+    pub controller: PathBuf,
+    /// Spiral write with its noise (profile.toml)
+    #[arg(long, value_name = "PROFILE")]
+    pub profile: PathBuf,
+    /// Controller never run, whose DFT is predicted; may be given several times
+    #[arg(long, value_name = "CONTROLLER")]
+    pub predict: Vec<PathBuf>,
+    /// Share of records that a predicted range is to hold
+    #[arg(long, value_name = "SHARE", default_value_t = 0.9, value_parser = share)]
+    pub level: f64,
+    /// Relative deviation of model and noise levels, beside the draws
+    #[arg(long, value_name = "RATIO", default_value_t = 0.0, value_parser = not_negative)]
+    pub model_error: f64,
+}
+
+/// The few tones that would narrow the intervals of the margins most
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  servotune next-sweep --frf slot07.bod --controller gains.toml
+  servotune next-sweep --frf slot07.bod --controller gains.toml --tones 3 --sweep-amplitude 0.1 --command-limit 0.3")]
+pub(super) struct NextSweepArguments {
+    /// Swept-sine file that is there
+    #[arg(long, value_name = "FRF")]
+    pub frf: PathBuf,
+    /// Controller whose margins are to be known better
+    #[arg(long, value_name = "CONTROLLER")]
+    pub controller: PathBuf,
+    /// The sweep was taken through the controller's own hold, which is then not applied again
+    #[arg(long)]
+    pub hold_included: bool,
+    /// Tones at most
+    #[arg(long, value_name = "N", default_value_t = 6)]
+    pub tones: usize,
+    /// Amplitude of the sweep that is there (command unit)
+    #[arg(long, value_name = "AMPLITUDE", default_value_t = 0.1, value_parser = positive)]
+    pub sweep_amplitude: f64,
+    /// Largest amplitude of a tone (command unit)
+    #[arg(long, value_name = "AMPLITUDE", default_value_t = 0.4, value_parser = positive)]
+    pub command_limit: f64,
+    /// Largest amplitude of the position under a tone (position unit); without one, no limit
+    #[arg(long, value_name = "AMPLITUDE", value_parser = positive)]
+    pub position_limit: Option<f64>,
+    /// Periods averaged for each tone, and for each point of the sweep that is there
+    #[arg(long, value_name = "N", default_value_t = 50.0, value_parser = positive)]
+    pub periods: f64,
+    /// Settling before each tone (s)
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.02, value_parser = not_negative)]
+    pub settle_s: f64,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
+}
+
+fn number(text: &str, good: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() && good(x) => Ok(x),
+        _ => Err(format!("found `{text}`; expected {expected}")),
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text, |x| x > 0.0, "a finite number above 0")
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    number(text, |x| x >= 0.0, "a finite number of at least 0")
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    number(text, |x| 0.0 < x && x < 1.0, "a share between 0 and 1, such as 0.9")
+}

@@ -1,0 +1,32 @@
+//! `servotune next-sweep`: the few tones that would narrow the margins' intervals most.
+
+use super::limit_arguments::NextSweepArguments;
+use super::{Ending, Failure, Screen, load};
+use crate::feedback::{PlanSettings, sweep_plan};
+use crate::report::budget::{narrowing_table, tones_table};
+
+pub(super) fn run(a: &NextSweepArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let sweep = load::sweep(&a.frf, &a.reading, screen)?;
+    let controller = load::controller(&a.controller)?;
+    let sections =
+        controller.sections().map_err(|source| Failure::Controller { file: a.controller.clone(), source })?;
+    let settings = PlanSettings {
+        tones: a.tones,
+        sweep_amplitude: a.sweep_amplitude,
+        command_limit: a.command_limit,
+        position_limit: a.position_limit.unwrap_or(f64::INFINITY),
+        periods: a.periods,
+        settle_s: a.settle_s,
+        hold_included: a.hold_included,
+    };
+    let plan = sweep_plan(&sweep.frf, &sections, &settings)?;
+    let text = format!(
+        "{}\n{}\n{:.2} s of machine time; every point again would take {:.2} s.\n",
+        tones_table(&plan, "command unit")?.text(),
+        narrowing_table(&plan)?.text(),
+        plan.seconds,
+        plan.full_seconds
+    );
+    screen.result(&plan, &text)?;
+    Ok(Ending::Accepted)
+}

@@ -1,0 +1,69 @@
+//! The limit of performance as a table.
+
+use super::ReportError;
+use super::number::NumberFormat;
+use super::table::{Column, Table};
+use crate::tune::{Limit, Standing, Verdict};
+
+/// Limit, given gains and the gap, by band and weighted sum.
+pub fn limit_table(limit: &Limit, gains: Option<&Standing>, unit: &str) -> Result<Table, ReportError> {
+    let digits = NumberFormat::Significant(4);
+    let caption = match limit.max_sensitivity {
+        Some(ms) => format!("No linear controller of the class (Ms <= {ms}) is below"),
+        None => "No linear controller of the class is below (the spec limits no Ms)".to_owned(),
+    };
+    let mut table = Table::new(
+        &caption,
+        vec![
+            Column::words("figure"),
+            Column::words("unit"),
+            Column::numbers("limit", "", digits),
+            Column::numbers("these gains", "", digits),
+            Column::numbers("above the limit", "%", NumberFormat::Significant(3)),
+        ],
+    );
+    let rows = [
+        ("600-1500 Hz", unit, limit.dft_low, gains.map(|g| g.figures.dft_low)),
+        ("1500-3000 Hz", unit, limit.dft_high, gains.map(|g| g.figures.dft_high)),
+        ("weighted sum", "", Some(limit.sum.objective), gains.map(|g| g.figures.objective)),
+    ];
+    for (name, unit, bound, found) in rows {
+        let gap = found.zip(bound.filter(|b| *b > 0.0)).map(|(f, b)| 100.0 * (f / b - 1.0));
+        table.push(vec![name.into(), unit.into(), bound.into(), found.into(), gap.into()])?;
+    }
+    Ok(table)
+}
+
+/// What limit, gains and search say together.
+pub fn limit_sentences(limit: &Limit, gains: Option<&Standing>, searched: Option<&Standing>) -> String {
+    let mut text = String::new();
+    let percent = |a: f64, b: f64| 100.0 * (a / b - 1.0);
+    if limit.verdict == Verdict::Impossible {
+        text += "Proven: no such controller meets Ms, effort and the DFT limits of the spec together.\n";
+    }
+    if let Some(g) = gains {
+        if g.tail > limit.tail {
+            text += &format!(
+                "These gains forget more slowly than the class: {:.3} of the sensitivity is left beyond the write, {} is allowed; \
+                 the bound does not speak of them (--tail widens the class).\n",
+                g.tail, limit.tail
+            );
+        }
+        if let Some(s) = searched.filter(|s| s.figures.objective > 0.0) {
+            text += &format!(
+                "These gains are within {:.2} % of the best found in their structure by a wide search (evidence, no bound).\n",
+                percent(g.figures.objective, s.figures.objective).max(0.0)
+            );
+        }
+        if limit.sum.objective > 0.0 {
+            text += &format!(
+                "These gains are within {:.1} % of the best of all loops of the class (proven bound).\n",
+                percent(g.figures.objective, limit.sum.objective)
+            );
+        }
+    }
+    if limit.sum.missed > 0.01 {
+        text += "The rounds ended before the bound stopped rising: more --rounds may raise it.\n";
+    }
+    text
+}

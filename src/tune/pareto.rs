@@ -1,0 +1,105 @@
+//! The front of margin against DFT: the same machines tuned again and again while one margin is tightened.
+//!
+//! In: machines, a spec, the range of Ms. Out: one point for each Ms, its DFT norms the worst machine's. Every point is tuned as
+//! `tune` does it and judged exactly; a point that another beats in both is left out. Spec: `specs/performance_limit.md`.
+
+use super::{Machine, Outcome, Spec, TuneError, TuneSettings, tune_jointly};
+use crate::controller::Controller;
+use serde::Serialize;
+
+/// Which margins are tried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParetoSettings {
+    /// Ms from, to (ratio, above 1).
+    pub max_sensitivity: [f64; 2],
+    /// Points, spread by ratio; at least 2.
+    pub points: usize,
+}
+
+impl Default for ParetoSettings {
+    fn default() -> Self {
+        ParetoSettings { max_sensitivity: [1.3, 3.0], points: 12 }
+    }
+}
+
+/// One point.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParetoPoint {
+    /// Ms that was allowed (ratio).
+    pub allowed: f64,
+    /// Whether every limit is met with it.
+    pub feasible: bool,
+    /// On the front: no other feasible point has both a smaller Ms and a smaller weighted sum.
+    pub on_front: bool,
+    /// Ms found, worst machine (ratio).
+    pub max_sensitivity: f64,
+    /// Smallest phase margin found (deg).
+    pub phase_margin_deg: Option<f64>,
+    /// Largest norm over 600 to 1500 Hz (position_unit).
+    pub dft_low: f64,
+    /// Largest norm over 1500 to 3000 Hz (position_unit).
+    pub dft_high: f64,
+    /// Largest weighted sum of both, as tuning minimises it.
+    pub objective: f64,
+    /// The gains.
+    pub controller: Controller,
+}
+
+/// Tunes at every point; each starts from the one before as well as afresh, so that the front has no gaps of the search's making.
+pub fn pareto(
+    machines: &[Machine<'_>],
+    spec: &Spec,
+    start: Option<&Controller>,
+    settings: &TuneSettings,
+    front: &ParetoSettings,
+) -> Result<Vec<ParetoPoint>, TuneError> {
+    let [from, to] = front.max_sensitivity;
+    for (key, found) in [("max_sensitivity from", from), ("max_sensitivity to", to)] {
+        if !(found > 1.0 && found.is_finite()) {
+            return Err(TuneError::Setting { key, found, expected: "a finite ratio above 1" });
+        }
+    }
+    let count = front.points.max(2);
+    let mut all = Vec::with_capacity(count);
+    let mut last: Option<Controller> = start.cloned();
+    for i in (0..count).rev() {
+        let allowed = from * (to / from).powf(i as f64 / (count - 1) as f64);
+        let mut asked = spec.clone();
+        asked.margins.max_sensitivity = Some(allowed);
+        // The DFT limits only weigh here: a front that stopped at them would hide what lies beyond.
+        let outcome = tune_jointly(machines, &asked, last.as_ref(), settings)?;
+        let feasible = matches!(outcome, Outcome::Tuned(_));
+        all.push(point(allowed, feasible, &outcome, spec));
+        if feasible {
+            last = Some(outcome.controller().clone());
+        }
+    }
+    all.reverse();
+    for i in 0..all.len() {
+        let beaten = all.iter().any(|o| {
+            o.feasible
+                && o.max_sensitivity <= all[i].max_sensitivity
+                && o.objective <= all[i].objective
+                && (o.max_sensitivity < all[i].max_sensitivity || o.objective < all[i].objective)
+        });
+        all[i].on_front = all[i].feasible && !beaten;
+    }
+    Ok(all)
+}
+
+fn point(allowed: f64, feasible: bool, outcome: &Outcome, spec: &Spec) -> ParetoPoint {
+    let found: Vec<_> = outcome.after().iter().map(|p| &p.judged.found).collect();
+    let [low, high] = super::bench::weights(&spec.limits);
+    let largest = |of: &dyn Fn(&super::Found) -> f64| found.iter().map(|f| of(f)).fold(0.0, f64::max);
+    ParetoPoint {
+        allowed,
+        feasible,
+        on_front: false,
+        max_sensitivity: largest(&|f| f.max_sensitivity),
+        phase_margin_deg: found.iter().filter_map(|f| f.phase_margin_deg).reduce(f64::min),
+        dft_low: largest(&|f| f.dft_low),
+        dft_high: largest(&|f| f.dft_high),
+        objective: largest(&|f| low * f.dft_low + high * f.dft_high),
+        controller: outcome.controller().clone(),
+    }
+}
