@@ -1,6 +1,7 @@
 //! The words of the command line.
 
 pub(super) use super::diagnose_arguments::DiagnoseArguments;
+pub(super) use super::fleet_arguments::{FleetArguments, TwinFleetArguments};
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
 use crate::twin::line::UnknownKind;
@@ -26,6 +27,7 @@ pub(super) enum Command {
     Demo(DemoArguments),
     Diagnose(Box<DiagnoseArguments>),
     Features(FeaturesArguments),
+    Fleet(FleetArguments),
     Identify(Box<IdentifyArguments>),
     Margins(Box<MarginsArguments>),
     Response(ResponseArguments),
@@ -255,6 +257,7 @@ pub(super) struct TwinArguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum TwinCommand {
     Line(TwinLineArguments),
+    Fleet(TwinFleetArguments),
 }
 
 /// Machine folders of a production line

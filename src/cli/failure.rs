@@ -4,6 +4,7 @@ use crate::controller::ControllerError;
 use crate::diagnose::DiagnoseError;
 use crate::document::DocumentError;
 use crate::feedback::FeedbackError;
+use crate::fleet::FleetError;
 use crate::frf::{FrfError, FrfShapeError};
 use crate::gate::GateError;
 use crate::gate::features::FeatureError;
@@ -71,6 +72,8 @@ pub enum Failure {
     Sweep(#[from] FrfShapeError),
     #[error(transparent)]
     Gate(#[from] GateError),
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
     #[error(transparent)]
     Study(#[from] StudyError),
     /// Two algorithms that share no code disagree: no answer can be trusted.

@@ -11,6 +11,10 @@ mod diagnose;
 mod diagnose_arguments;
 mod failure;
 mod features;
+mod fleet;
+mod fleet_arguments;
+mod fleet_progress;
+mod fleet_twin;
 mod gate_arguments;
 mod gated;
 mod identify;
@@ -58,6 +62,7 @@ pub fn main() -> ExitCode {
         Command::Demo(a) => demo::run(&a, &mut screen),
         Command::Diagnose(a) => diagnose::run(&a, &mut screen),
         Command::Features(a) => features::run(&a, &mut screen),
+        Command::Fleet(a) => fleet::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
         Command::Margins(a) => margins::run(&a, &mut screen),
         Command::Response(a) => response::run(&a, &mut screen),

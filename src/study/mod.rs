@@ -5,6 +5,7 @@
 
 mod classes;
 mod error;
+mod fleet_source;
 mod gate;
 mod gate_seeds;
 mod hdd;
@@ -18,6 +19,7 @@ mod plants;
 
 pub use classes::classes;
 pub use error::StudyError;
+pub use fleet_source::TwinSource;
 pub use gate::gate;
 pub use gate_seeds::gate_seeds;
 pub use hdd::hdd;

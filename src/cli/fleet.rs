@@ -1,0 +1,115 @@
+//! `servotune fleet`: all slots of all testers, from raw files to tables and report; history, revisions, differences.
+
+use super::fleet_arguments::{FleetArguments, FleetCommand, FleetRunArguments};
+use super::fleet_progress::Progress;
+use super::{Ending, Failure, Screen};
+use crate::fleet::{
+    self, Context, Effort, FileSource, Fleet, Job, SlotSource, Stamp, Store, Verdict, Worker, write_slots,
+};
+use crate::study::TwinSource;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+#[derive(Serialize)]
+struct Document {
+    run: String,
+    slots: usize,
+    verdicts: BTreeMap<&'static str, usize>,
+    store: PathBuf,
+    files: Vec<PathBuf>,
+}
+
+pub(super) fn run(a: &FleetArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    match &a.what {
+        FleetCommand::Run(a) => run_floor(a, screen),
+    }
+}
+
+/// Now, as RFC 3339 in universal time, to the second.
+pub(super) fn now() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let (days, rest) = (seconds / 86_400, seconds % 86_400);
+    let (year, month, day) = civil(days);
+    format!("{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z", rest / 3600, rest / 60 % 60, rest % 60)
+}
+
+/// Year, month and day of a day counted from 1970-01-01, by the Gregorian calendar's 400-year cycle.
+fn civil(days: u64) -> (u64, u64, u64) {
+    // Counted from 0000-03-01, so that the leap day ends a year.
+    let z = days + 719_468;
+    let (era, day_of_era) = (z / 146_097, z % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let m = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * m + 2) / 5 + 1;
+    let month = if m < 10 { m + 3 } else { m - 9 };
+    (era * 400 + year_of_era + u64::from(month <= 2), month, day)
+}
+
+/// Who does it: as said, else the user's name, else `unknown`.
+pub(super) fn stamp(who: Option<&str>) -> Stamp {
+    let user = || ["USER", "USERNAME", "LOGNAME"].iter().find_map(|k| std::env::var(k).ok());
+    let who = who.map(str::to_owned).or_else(user).unwrap_or_else(|| "unknown".into());
+    Stamp { who, at: now() }
+}
+
+/// The slots that a FLEET.toml names.
+fn source(file: &Path, fleet: &Fleet) -> Result<Box<dyn SlotSource>, Failure> {
+    Ok(match &fleet.file.input.twin {
+        Some(twin) => Box::new(TwinSource::of(twin)),
+        None => Box::new(FileSource::of(file, &fleet.file.input)?),
+    })
+}
+
+fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let fleet = Fleet::read(&a.fleet)?;
+    let context = Context::of(&fleet)?;
+    let source = source(&a.fleet, &fleet)?;
+    let store_file = fleet.file.store.clone().unwrap_or_else(|| a.out.join("fleet.db"));
+    let store = Store::open(&store_file)?;
+    let worker = Worker::at(&store_file, &format!("process-{}", std::process::id()))?;
+    let job = Job {
+        source: source.as_ref(),
+        context: &context,
+        store: &store_file,
+        run: a.run.as_deref(),
+        stamp: stamp(a.who.as_deref()),
+        worker: &worker,
+        effort: Effort { threads: a.threads, chunk: a.chunk, limit_pages: None },
+    };
+    let progress = Progress::new();
+    let run = fleet::run(&job, &progress);
+    progress.close();
+    let run = run?;
+    let mut verdicts: BTreeMap<&'static str, usize> = Verdict::ALL.iter().map(|v| (v.word(), 0)).collect();
+    store.each_row(&run, None, |row| {
+        *verdicts.entry(row.verdict.word()).or_default() += 1;
+        Ok(())
+    })?;
+    let files = write_slots(&store, &run, &context, &a.out, source.count() <= MOST_GAIN_FILES)?;
+    files.iter().for_each(|f| screen.say(&format!("wrote {}", f.display())));
+    let slots = source.count();
+    let counts: Vec<String> = Verdict::ALL.iter().map(|v| format!("{} {}", verdicts[v.word()], v.word())).collect();
+    let text = format!("run {run}: {slots} slots: {}\n", counts.join(", "));
+    let accepted = verdicts[Verdict::Keeps.word()] + verdicts[Verdict::Tuned.word()] == slots;
+    screen.result(&Document { run, slots, verdicts, store: store_file, files }, &text)?;
+    Ok(if accepted { Ending::Accepted } else { Ending::Rejected })
+}
+
+/// Slots above which no folder of gains is written for each: the tables have them all.
+const MOST_GAIN_FILES: usize = 20_000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn days_become_dates() {
+        // 2000-02-29 is day 11016 and 2026-11-21 day 20778 since 1970-01-01.
+        assert_eq!(civil(0), (1970, 1, 1));
+        assert_eq!(civil(11_016), (2000, 2, 29));
+        assert_eq!(civil(20_778), (2026, 11, 21));
+    }
+}

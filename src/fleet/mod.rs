@@ -1,0 +1,39 @@
+//! The fleet: gain tables for every slot of every tester.
+//!
+//! In: FLEET.toml, a source of slots. Out: a row for each slot, tables for each slot and shared ones, all in a store from which every other
+//! output is derived. Reading order: `settings`, `source`, `context`, `evidence`, `prove`, `row`, `library`, `slot`, `pilot`, `store`, `run`.
+//! Convention: a slot's row depends on the slot, the settings and the library only, so bytes are equal for any number of threads and after
+//! any interruption. Spec: `specs/fleet.md`.
+
+mod claims;
+mod context;
+mod error;
+mod evidence;
+mod library;
+mod output;
+mod pilot;
+mod prove;
+mod row;
+mod run;
+mod settings;
+mod slot;
+mod source;
+mod store;
+mod store_run;
+mod table_source;
+
+pub use claims::Worker;
+pub use context::Context;
+pub use error::FleetError;
+pub use evidence::Evidence;
+pub use library::{Candidate, Library};
+pub use output::{gain_table, write_slots};
+pub use pilot::{Pilot, pilot, places};
+pub use prove::{Proved, UNSTABLE, prove};
+pub use row::{GateRow, ModelRow, OwnTable, SlotRow, Verdict, Way};
+pub use run::{Effort, Job, Stage, Watch, run};
+pub use settings::{Fleet, FleetFile, Input, MOST_CANDIDATES, Robust, Tables, Temperature, TwinInput, Untunable};
+pub use slot::work;
+pub use source::{FileSource, Loaded, SlotName, SlotSource};
+pub use store::Store;
+pub use store_run::{Run, Stamp};

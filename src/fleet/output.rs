@@ -1,0 +1,154 @@
+//! Files of a run, derived from the store alone: streamed row by row, written whole by rename, without any time in them.
+//!
+//! In: a store and a run. Out: `slots.csv`, `slots.jsonl`, and gain tables for each tuned slot. The same run gives the same bytes.
+
+use super::row::{SlotRow, Verdict};
+use super::{Context, FleetError, Store};
+use crate::document::DocumentError;
+use crate::gate::features::csv_field;
+use crate::tune::{GainTable, InputDigest, Provenance, Route, Summary};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A file that takes its name only when it is whole.
+pub(super) struct WholeFile {
+    out: BufWriter<File>,
+    temporary: PathBuf,
+    file: PathBuf,
+}
+
+impl WholeFile {
+    pub fn begin(file: &Path) -> Result<WholeFile, FleetError> {
+        let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let temporary = folder.join(format!(".{name}.{}.part", std::process::id()));
+        let made = std::fs::create_dir_all(folder).and_then(|()| File::create(&temporary));
+        let out = made.map_err(|source| io(file, "write", source))?;
+        Ok(WholeFile { out: BufWriter::new(out), temporary, file: file.into() })
+    }
+
+    pub fn line(&mut self, text: &str) -> Result<(), FleetError> {
+        let wrote = self.out.write_all(text.as_bytes()).and_then(|()| self.out.write_all(b"\n"));
+        wrote.map_err(|source| io(&self.file, "write", source))
+    }
+
+    pub fn end(mut self) -> Result<PathBuf, FleetError> {
+        let done = self.out.flush().and_then(|()| self.out.get_ref().sync_all());
+        let done = done.and_then(|()| std::fs::rename(&self.temporary, &self.file));
+        done.map_err(|source| io(&self.file, "write", source))?;
+        Ok(self.file.clone())
+    }
+}
+
+impl Drop for WholeFile {
+    fn drop(&mut self) {
+        // After a rename there is nothing left of that name.
+        let _ = std::fs::remove_file(&self.temporary);
+    }
+}
+
+fn io(file: &Path, action: &'static str, source: std::io::Error) -> FleetError {
+    FleetError::Document(DocumentError::Io { file: file.into(), action, source })
+}
+
+/// Columns of slots.csv.
+const COLUMNS: &str = "tester,slot,verdict,class,probability,action,temperature_c,dc_gain,first_resonance_hz,model_rms,\
+before_passes,before_worst,before_limit,before_case,before_phase_margin_deg,before_gain_margin_db,before_max_sensitivity,before_dft_low,before_dft_high,\
+after_worst,after_limit,after_case,after_phase_margin_deg,after_gain_margin_db,after_max_sensitivity,after_dft_low,after_dft_high,\
+way,kp,ki_per_s,kd_s,lowpass_hz,notch_hz,notch_zero_damping,notch_pole_damping,error,why,digest";
+
+fn number(x: Option<f64>) -> String {
+    x.map(|x| format!("{x}")).unwrap_or_default()
+}
+
+fn figures(s: Option<&Summary>) -> [String; 5] {
+    [
+        number(s.and_then(|s| s.phase_margin_deg)),
+        number(s.and_then(|s| s.gain_margin_db)),
+        number(s.map(|s| s.max_sensitivity)),
+        number(s.map(|s| s.dft_low)),
+        number(s.map(|s| s.dft_high)),
+    ]
+}
+
+/// The row of slots.csv.
+fn csv_row(r: &SlotRow) -> String {
+    let (gate, model) = (r.gate.as_ref(), r.model.as_ref());
+    let (before, table) = (r.current.as_ref(), r.table.as_ref().or(r.nearest.as_ref()));
+    let after = table.map(|t| &t.proved);
+    let gains = table.map(|t| &t.gains);
+    let mut f: Vec<String> = vec![
+        r.tester.clone(),
+        r.slot.clone(),
+        r.verdict.word().into(),
+        gate.map(|g| g.class.clone()).unwrap_or_default(),
+        gate.map(|g| format!("{:.6}", g.probability)).unwrap_or_default(),
+        gate.map(|g| g.action.clone()).unwrap_or_default(),
+        number(Some(r.temperature_c)),
+        number(model.and_then(|m| m.dc_gain)),
+        number(model.and_then(|m| m.first_resonance_hz)),
+        number(model.map(|m| m.rms_relative_error)),
+        before.map(|p| p.passes.to_string()).unwrap_or_default(),
+        number(before.map(|p| p.worst)),
+        before.map(|p| p.limit.to_string()).unwrap_or_default(),
+        before.map(|p| p.case.clone()).unwrap_or_default(),
+    ];
+    f.extend(figures(before.map(|p| &p.figures)));
+    f.push(number(after.map(|p| p.worst)));
+    f.push(after.map(|p| p.limit.to_string()).unwrap_or_default());
+    f.push(after.map(|p| p.case.clone()).unwrap_or_default());
+    f.extend(figures(after.map(|p| &p.figures)));
+    f.push(table.map(|t| t.way.word().to_owned()).unwrap_or_default());
+    f.extend([gains.map(|g| g.pid.kp), gains.map(|g| g.pid.ki_per_s), gains.map(|g| g.pid.kd_s)].map(number));
+    f.push(number(gains.and_then(|g| g.lowpass.first()).map(|l| l.frequency_hz)));
+    let notch = gains.and_then(|g| g.notch.first());
+    f.extend([notch.map(|n| n.frequency_hz), notch.map(|n| n.zero_damping_ratio), notch.map(|n| n.pole_damping_ratio)].map(number));
+    f.push(r.error.clone().unwrap_or_default());
+    f.push(gate.map(|g| g.why.clone()).unwrap_or_default());
+    f.push(r.digest.clone());
+    f.iter().map(|x| csv_field(x)).collect::<Vec<_>>().join(",")
+}
+
+/// The gain table of a tuned slot as a document.
+pub fn gain_table(context: &Context, row: &SlotRow) -> Result<Option<GainTable>, FleetError> {
+    let Some(table) = &row.table else { return Ok(None) };
+    let digest = |role: &str, sha256: &str| InputDigest { role: role.into(), sha256: sha256.into() };
+    let mut inputs = vec![digest("slot", &row.digest)];
+    inputs.extend(context.inputs.iter().filter(|(role, _)| *role != "spec").map(|(role, sha256)| digest(role, sha256)));
+    let spec = context.inputs.iter().find(|(role, _)| *role == "spec").map(|(_, s)| s.clone()).unwrap_or_default();
+    let provenance = Provenance {
+        program: env!("CARGO_PKG_VERSION").into(),
+        route: Route::Response,
+        feasible: table.proved.passes,
+        seed: context.spec.search.seed,
+        evaluations: 0,
+        spec_sha256: spec,
+        gate_class: row.gate.as_ref().map(|g| g.class.clone()),
+        gate_action: row.gate.as_ref().map(|g| g.action.clone()),
+        gate_probability: row.gate.as_ref().map(|g| g.probability),
+        gate_override: None,
+        physics: Vec::new(),
+        inputs,
+    };
+    let before = row.current.as_ref().map(|p| p.figures.clone());
+    Ok(Some(GainTable::new(&table.gains, before, table.proved.figures.clone(), provenance)?))
+}
+
+/// Writes the tables of a run; `gains` asks for `gains/TESTER/SLOT/gains.toml` of each tuned slot as well.
+pub fn write_slots(store: &Store, run: &str, context: &Context, out: &Path, gains: bool) -> Result<Vec<PathBuf>, FleetError> {
+    let mut csv = WholeFile::begin(&out.join("slots.csv"))?;
+    let mut lines = WholeFile::begin(&out.join("slots.jsonl"))?;
+    csv.line(COLUMNS)?;
+    store.each_row(run, None, |row| {
+        csv.line(&csv_row(&row))?;
+        lines.line(&super::store_run::json(&row)?)?;
+        if gains && row.verdict == Verdict::Tuned
+            && let Some(table) = gain_table(context, &row)?
+        {
+            table.write(&out.join("gains").join(&row.tester).join(&row.slot).join("gains.toml"))?;
+        }
+        Ok(())
+    })?;
+    Ok(vec![csv.end()?, lines.end()?])
+}
