@@ -27,8 +27,6 @@ pub struct Context {
     pub hold: Hold,
     /// How responses are identified.
     pub identify: IdentifySettings,
-    /// How tables are searched from a known one.
-    pub polish: TuneSettings,
     /// How tables are searched from nothing.
     pub search: TuneSettings,
     /// Digests by name: fleet file, spec, profile, controller, gate.
@@ -76,7 +74,6 @@ impl Context {
                 },
                 ..IdentifySettings::default()
             },
-            polish: TuneSettings { sample_time_s: base.sample_time_s, starts: 1, simplex_steps: 0, polish_steps: 25 },
             search: TuneSettings { sample_time_s: base.sample_time_s, starts: STARTS, ..TuneSettings::default() },
             digest: sha256_hex(words.as_bytes()),
             file: f.clone(),

@@ -122,6 +122,11 @@ impl Evidence {
         self.cases.iter().map(|c| c.machine(self.hold)).collect()
     }
 
+    /// How many cases.
+    pub fn count(&self) -> usize {
+        self.cases.len()
+    }
+
     /// Name of a case.
     pub fn case(&self, index: usize) -> &str {
         self.cases.get(index).map_or("", |c| &c.name)

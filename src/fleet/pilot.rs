@@ -4,7 +4,7 @@
 //! from their number alone, so the library is the same for any number of threads and after any interruption.
 
 use super::library::{Candidate, Library};
-use super::row::{ModelRow, OwnTable, Way};
+use super::row::{ModelRow, OwnTable};
 use super::slot::{evidence, gate_action, search};
 use super::source::SlotSource;
 use super::Context;
@@ -43,7 +43,7 @@ pub fn pilot(context: &Context, source: &dyn SlotSource, index: usize) -> Pilot 
     if !matches!(action, Some(Action::None | Action::Tune)) {
         return found;
     }
-    found.table = search(context, &cases, Some(&context.base), &context.search, Way::Searched).ok().filter(|t| t.proved.passes);
+    found.table = search(context, &cases).ok().filter(|t| t.proved.passes);
     found
 }
 

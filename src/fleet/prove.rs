@@ -1,11 +1,12 @@
 //! Whether a table meets every limit in a slot, in every case: the one place that says "proven".
 //!
 //! In: the slot's cases, a controller, the spec. Out: [`Proved`]: figures as measured, and the worst case with the limit that it misses most.
-//! Every figure is that of the exact judgement ([`judge`]), never of the search's grid.
+//! No margin is the search grid's.
 
-use super::Evidence;
+use super::Ready;
 use crate::controller::Controller;
-use crate::tune::{Proof, Spec, Summary, TuneError, What, judge};
+use crate::feedback::{MeasuredLoop, margins};
+use crate::tune::{Found, Hold, Judged, Machine, Proof, Requirement, Spec, Summary, TuneError, What, judge};
 use serde::{Deserialize, Serialize};
 
 /// A table judged in every case of a slot.
@@ -29,19 +30,55 @@ pub struct Proved {
 pub const UNSTABLE: f64 = 1e3;
 
 /// Judges a controller in every case.
-pub fn prove(evidence: &Evidence, controller: &Controller, spec: &Spec) -> Result<Proved, TuneError> {
-    let machines = evidence.machines();
-    let measured = judge(&machines[0], controller, spec)?;
-    let (mut worst, mut limit, mut at_hz) = nearest(&measured, spec);
-    let mut case = 0;
-    for (i, machine) in machines.iter().enumerate().skip(1) {
-        let found = nearest(&judge(machine, controller, spec)?, spec);
-        if found.0 > worst {
-            ((worst, limit, at_hz), case) = (found, i);
+///
+/// Margins are refined on the measured curve; the write is read off the spectrum, prepared once for the slot. Gains of another shape than
+/// the fleet's are judged by [`judge`], which prepares everything again.
+pub fn prove(ready: &mut Ready<'_>, controller: &Controller) -> Result<Proved, TuneError> {
+    let spec = ready.spec;
+    let sections = controller.sections()?;
+    let quick = if ready.fits(controller) { Some(ready.writes(controller)) } else { None };
+    let wanted = Requirement::list(&spec.margins, &spec.limits);
+    let mut worst: Option<(f64, What, Option<f64>, usize)> = None;
+    let mut figures = None;
+    for (i, machine) in ready.evidence.machines().iter().enumerate() {
+        let proof = match (&quick, machine) {
+            (Some(writes), Machine::Response { frf, hold, .. }) => {
+                let found = writes.as_ref().map(|w| w[i].clone()).unwrap_or_default();
+                measured(&MeasuredLoop::new(frf, &sections, *hold == Hold::Included)?, found, &wanted)
+            }
+            _ => judge(machine, controller, spec)?,
+        };
+        let (violation, limit, at_hz) = nearest(&proof, spec);
+        if worst.as_ref().is_none_or(|w| violation > w.0) {
+            worst = Some((violation, limit, at_hz, i));
+        }
+        figures.get_or_insert_with(|| figures_of(&proof));
+        if matches!(&quick, Some(None)) && violation < UNSTABLE {
+            // The grid saw an unstable case; the exact judgement of the others has no write to go by.
+            worst = worst.filter(|w| w.0 >= UNSTABLE).or(Some((UNSTABLE, What::GainMargin, None, i)));
         }
     }
-    let case = evidence.case(case).to_owned();
-    Ok(Proved { passes: worst <= 0.0, figures: figures_of(&measured), worst, limit, case, at_hz })
+    let (worst, limit, at_hz, case) = worst.unwrap_or((UNSTABLE, What::GainMargin, None, 0));
+    let case = ready.evidence.case(case).to_owned();
+    let figures = match figures {
+        Some(f) => f,
+        None => figures_of(&judge(&ready.evidence.machines()[0], controller, spec)?),
+    };
+    Ok(Proved { passes: worst <= 0.0, figures, worst, limit, case, at_hz })
+}
+
+/// The judgement of a measured loop whose write is known.
+fn measured(l: &MeasuredLoop<'_>, write: Found, wanted: &[Requirement]) -> Proof {
+    let margins = margins(l);
+    let found = Found {
+        unstable_poles: margins.unstable_poles,
+        phase_margin_deg: margins.phase_margin_deg,
+        gain_margin_db: margins.gain_margin_db,
+        max_sensitivity: margins.max_sensitivity,
+        gain_crossover_hz: margins.gain_crossover_hz,
+        ..write
+    };
+    Proof { judged: Judged::of(wanted, found), margins }
 }
 
 /// The limit nearest to being missed: its violation, what it is, and where.

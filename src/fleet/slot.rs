@@ -3,18 +3,18 @@
 //! In: a loaded slot, the [`Context`], the [`Library`]. Out: a [`SlotRow`]. No state is kept between slots: the row is the same whoever works
 //! it out, on whichever thread, in whichever order. What goes wrong with a slot is written into its row.
 
-use super::library::{Library, Quick, Scored};
-use super::prove::{Proved, prove};
+use super::library::Library;
+use super::prove::prove;
+use super::ready::{Quick, Ready};
 use super::row::{GateRow, ModelRow, OwnTable, SlotRow, Verdict, Way, hex_bits};
 use super::source::{Loaded, SlotName};
 use super::{Context, Evidence};
-use crate::controller::Controller;
 use crate::frf::{Frf, FrfShapeError};
 use crate::gate::features::{RawMachine, features};
 use crate::gate::{Action, Gate, GateError, Table};
-use crate::identify::{IdentifyError, identify};
+use crate::identify::{IdentifyError, identify, identify_near};
 use crate::lti::{Body, Plant, PlantFile};
-use crate::tune::{Outcome, TuneError, TuneSettings, tune_jointly};
+use crate::tune::{TuneError, tune_jointly};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use thiserror::Error;
@@ -34,8 +34,9 @@ pub(super) enum SlotError {
 
 /// Candidates whose exact judgement is asked for although the grid's figure misses by this share: the grid is that close to it.
 const NEAR_MISS: f64 = 0.004;
-/// Candidates that a slot's own search starts from.
+/// Candidates that a slot's own table is polished from at most, and steps of a polish.
 const POLISHED: usize = 2;
+const POLISH_STEPS: usize = 12;
 /// Resonances beyond this many hertz are no "first" one: no loop of this kind crosses there.
 const FIRST_RESONANCE_HZ: [f64; 2] = [500.0, 3000.0];
 
@@ -90,8 +91,8 @@ fn fill(
     let Some(frf) = &machine.response else { return Ok(()) };
     let (evidence, model) = evidence(context, plants, frf, row.index, row.temperature_c)?;
     row.model = Some(model);
-    let current = row.own_gains.as_ref().unwrap_or(&context.base);
-    row.current = Some(prove(&evidence, current, &context.spec)?);
+    let mut ready = Ready::of(&evidence, &context.spec, &context.guarded, &context.base)?;
+    row.current = Some(prove(&mut ready, row.own_gains.as_ref().unwrap_or(&context.base))?);
     row.verdict = match action {
         Action::RepairSensor | Action::RepairPushpin => Verdict::Repair,
         Action::Inspect => Verdict::Inspect,
@@ -100,13 +101,13 @@ fn fill(
     if !row.verdict.served() {
         return Ok(());
     }
-    let (quick, covered) = covered(context, library, &evidence)?;
+    let (quick, covered) = covered(context, library, &mut ready)?;
     row.covered = hex_bits(&covered);
     if row.current.as_ref().is_some_and(|p| p.passes) && (action == Action::None || context.gate.is_none()) {
         row.verdict = Verdict::Keeps;
         return Ok(());
     }
-    let (table, nearest) = own_table(context, library, &evidence, &quick, &covered)?;
+    let (table, nearest) = own_table(library, &mut ready, &quick, &covered)?;
     if table.is_some() {
         row.verdict = Verdict::Tuned;
     }
@@ -138,20 +139,29 @@ fn gated(gate: &Gate, machine: &RawMachine) -> Result<(GateRow, Action), GateErr
     Ok((row, v.action))
 }
 
-/// The model of a slot and the cases that a table must stand.
+/// The model of a slot and the cases that a table must stand: from a neighbour's plant, else from nothing.
 pub(super) fn evidence(
     context: &Context,
-    _plants: &[Plant],
+    plants: &[Plant],
     frf: &Frf,
     index: usize,
     temperature_c: f64,
 ) -> Result<(Evidence, ModelRow), SlotError> {
     let r = &context.file.robust;
-    let found = identify(frf, &context.identify)?;
-    let drawn = found.sample_plants(r.draws, r.seed_of(index));
-    let temperature = &context.file.temperature;
-    let evidence = Evidence::of(frf, context.hold, &found.plant, &drawn, temperature_c, temperature)?;
-    Ok((evidence, model_row(&found.plant, found.rms_relative_error, false)))
+    let (seed, temperature) = (r.seed_of(index), &context.file.temperature);
+    let (plant, drawn, rms, near) = match identify_near(frf, plants, &context.identify)? {
+        Some(found) => {
+            let drawn = found.sample_plants(r.draws, seed);
+            (found.plant, drawn, found.rms_relative_error, true)
+        }
+        None => {
+            let found = identify(frf, &context.identify)?;
+            let drawn = found.sample_plants(r.draws, seed);
+            (found.plant, drawn, found.rms_relative_error, false)
+        }
+    };
+    let evidence = Evidence::of(frf, context.hold, &plant, &drawn, temperature_c, temperature)?;
+    Ok((evidence, model_row(&plant, rms, near)))
 }
 
 pub(super) fn model_row(plant: &Plant, rms_relative_error: f64, near: bool) -> ModelRow {
@@ -177,21 +187,21 @@ pub(super) fn model_row(plant: &Plant, rms_relative_error: f64, near: bool) -> M
 }
 
 /// What every candidate scores, and which are proven: the grid sorts out, the exact judgement decides.
-fn covered(context: &Context, library: &Library, evidence: &Evidence) -> Result<(Vec<Quick>, Vec<bool>), TuneError> {
-    let mut scored = Scored::new(evidence, &context.spec, &context.base)?;
-    let quick: Vec<Quick> = library.tables.iter().map(|t| scored.quick(&t.gains)).collect();
+fn covered(context: &Context, library: &Library, ready: &mut Ready<'_>) -> Result<(Vec<Quick>, Vec<bool>), TuneError> {
+    // The grid's violation is that of a guarded limit: the guard itself is no miss.
+    let miss = 1.1 * context.file.robust.guard + NEAR_MISS;
+    let quick: Vec<Quick> = library.tables.iter().map(|t| ready.quick(&t.gains)).collect();
     let mut covered = Vec::with_capacity(quick.len());
     for (q, t) in quick.iter().zip(&library.tables) {
-        covered.push(q.violation <= NEAR_MISS && prove(evidence, &t.gains, &context.spec)?.passes);
+        covered.push(q.violation <= miss && prove(ready, &t.gains)?.passes);
     }
     Ok((quick, covered))
 }
 
 /// A table of the slot's own: polished from the best candidates; else the best candidate that is proven. Where none is, the nearest.
 fn own_table(
-    context: &Context,
     library: &Library,
-    evidence: &Evidence,
+    ready: &mut Ready<'_>,
     quick: &[Quick],
     covered: &[bool],
 ) -> Result<(Option<OwnTable>, Option<OwnTable>), TuneError> {
@@ -204,16 +214,16 @@ fn own_table(
     order.sort_by(|&a, &b| key(a).0.cmp(&key(b).0).then(key(a).1.total_cmp(&key(b).1)));
     let mut nearest: Option<OwnTable> = None;
     for &i in order.iter().take(POLISHED) {
-        let table = search(context, evidence, Some(&library.tables[i].gains), &context.polish, Way::Polished)?;
+        let Some((gains, _)) = ready.polish(&library.tables[i].gains, POLISH_STEPS) else { continue };
+        let table = OwnTable { proved: prove(ready, &gains)?, gains, way: Way::Polished };
         if table.proved.passes {
             return Ok((Some(table), None));
         }
         keep(&mut nearest, table);
     }
-    for &i in order.iter().filter(|i| covered[**i]) {
-        let gains = &library.tables[i].gains;
-        let proved = prove(evidence, gains, &context.spec)?;
-        return Ok((Some(OwnTable { gains: gains.clone(), way: Way::Library, proved }), None));
+    if let Some(&i) = order.iter().find(|i| covered[**i]) {
+        let gains = library.tables[i].gains.clone();
+        return Ok((Some(OwnTable { proved: prove(ready, &gains)?, gains, way: Way::Library }), None));
     }
     Ok((None, nearest))
 }
@@ -225,15 +235,9 @@ fn keep(nearest: &mut Option<OwnTable>, table: OwnTable) {
 }
 
 /// Searches a table for all cases at once and proves what was found.
-pub(super) fn search(
-    context: &Context,
-    evidence: &Evidence,
-    start: Option<&Controller>,
-    settings: &TuneSettings,
-    way: Way,
-) -> Result<OwnTable, TuneError> {
-    let outcome: Outcome = tune_jointly(&evidence.machines(), &context.guarded, start, settings)?;
-    let gains = outcome.controller().clone();
-    let proved: Proved = prove(evidence, &gains, &context.spec)?;
-    Ok(OwnTable { gains, way, proved })
+pub(super) fn search(context: &Context, evidence: &Evidence) -> Result<OwnTable, TuneError> {
+    let found = tune_jointly(&evidence.machines(), &context.guarded, Some(&context.base), &context.search)?;
+    let gains = found.controller().clone();
+    let mut ready = Ready::of(evidence, &context.spec, &context.guarded, &context.base)?;
+    Ok(OwnTable { proved: prove(&mut ready, &gains)?, gains, way: Way::Searched })
 }

@@ -13,6 +13,7 @@ mod quick;
 mod reference;
 mod simulation;
 mod spectral;
+mod window_frame;
 
 pub use dft::{Harmonic, WindowDft};
 pub use expected::{ExpectedNoise, NoiseWork};
