@@ -122,6 +122,18 @@ impl Evidence {
         self.cases.iter().map(|c| c.machine(self.hold)).collect()
     }
 
+    /// The same cases, each with another response and another plant.
+    pub(super) fn each(
+        &self,
+        change: impl Fn(&Frf, &Plant) -> Result<(Frf, Plant), FrfShapeError>,
+    ) -> Result<Evidence, FrfShapeError> {
+        let of = |c: &Case| {
+            let (frf, plant) = change(&c.frf, &c.plant)?;
+            Ok(Case { name: c.name.clone(), frf, plant })
+        };
+        Ok(Evidence { cases: self.cases.iter().map(of).collect::<Result<_, _>>()?, hold: self.hold })
+    }
+
     /// How many cases.
     pub fn count(&self) -> usize {
         self.cases.len()

@@ -2,6 +2,7 @@
 //!
 //! In: what the pilots found. Out: [`Library`].
 
+use super::cluster::Level;
 use crate::controller::Controller;
 use crate::lti::{Plant, PlantFile};
 use serde::{Deserialize, Serialize};
@@ -13,6 +14,8 @@ pub struct Library {
     pub tables: Vec<Candidate>,
     /// Plants to start identification from.
     pub plants: Vec<PlantFile>,
+    /// Groups of pilots that look alike, at several numbers of groups.
+    pub levels: Vec<Level>,
 }
 
 /// A table that may be shared.

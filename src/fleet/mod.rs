@@ -6,17 +6,23 @@
 //! any interruption. Spec: `specs/fleet.md`.
 
 mod claims;
+mod cluster;
 mod context;
+mod cover;
+mod drift;
 mod error;
 mod evidence;
+mod explain;
 mod library;
 mod output;
 mod pilot;
 mod prove;
 mod ready;
+mod revision;
 mod row;
 mod run;
 mod settings;
+mod share;
 mod slot;
 mod source;
 mod store;
@@ -24,17 +30,23 @@ mod store_run;
 mod table_source;
 
 pub use claims::Worker;
+pub use cluster::{LEVELS, Level, looks, nearest};
 pub use context::Context;
+pub use cover::{Choice, Collect, Coverage};
+pub use drift::{SlotDrift, Trend, drift};
 pub use error::FleetError;
 pub use evidence::Evidence;
+pub use explain::{Cause, Change, Explained, Remedy};
 pub use library::{Candidate, Library};
 pub use output::{gain_table, write_slots};
 pub use pilot::{Pilot, pilot, places};
 pub use prove::{Proved, UNSTABLE, prove};
 pub use ready::{Quick, Ready};
-pub use row::{GateRow, ModelRow, OwnTable, SlotRow, Verdict, Way};
+pub use revision::{Action, Revision, table_text};
+pub use row::{GateRow, ModelRow, OwnTable, Serves, SlotRow, Verdict, Way};
 pub use run::{Effort, Job, Stage, Watch, run};
 pub use settings::{Fleet, FleetFile, Input, MOST_CANDIDATES, Robust, Tables, Temperature, TwinInput, Untunable};
+pub use share::{Shared, SharedTable, assigned};
 pub use slot::work;
 pub use source::{FileSource, Loaded, SlotName, SlotSource};
 pub use store::Store;

@@ -3,13 +3,16 @@
 //! In: a source and a [`Context`]. Out: the [`Library`]: today's table, each pilot's table, each pilot's plant. Which slots are pilots follows
 //! from their number alone, so the library is the same for any number of threads and after any interruption.
 
+use super::Context;
+use super::cluster::{LEVELS, Level, group_table, groups, looks, useful};
 use super::library::{Candidate, Library};
 use super::row::{ModelRow, OwnTable};
-use super::slot::{evidence, gate_action, search};
+use super::slot::{Prepared, evidence, gate_action, search};
 use super::source::SlotSource;
-use super::Context;
+use crate::controller::Controller;
 use crate::gate::Action;
 use crate::lti::PlantFile;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// What one pilot found.
@@ -47,13 +50,39 @@ pub fn pilot(context: &Context, source: &dyn SlotSource, index: usize) -> Pilot 
     found
 }
 
-/// The library of all pilots, in their order.
-pub fn library(context: &Context, pilots: &[Pilot]) -> Library {
-    let today = Candidate { gains: context.base.clone(), origin: "today".into() };
-    let of = |p: &Pilot| p.table.as_ref().map(|t| Candidate { gains: t.gains.clone(), origin: format!("pilot {}", p.id) });
-    let most = context.file.tables.candidates;
-    let tables = std::iter::once(today).chain(pilots.iter().filter_map(of)).take(most).collect();
-    let plants: Vec<PlantFile> = pilots.iter().filter_map(|p| p.model.as_ref()).map(|m| m.plant.clone()).collect();
-    Library { tables, plants }
+/// The library of all pilots, in their order: today's table, the tables of groups, then the pilots' own as far as they add something.
+pub fn library(context: &Context, source: &dyn SlotSource, found: &[(usize, Pilot)]) -> Library {
+    let plants: Vec<PlantFile> = found.iter().filter_map(|(_, p)| p.model.as_ref()).map(|m| m.plant.clone()).collect();
+    let mut library = Library { tables: Vec::new(), plants, levels: Vec::new() };
+    let neighbours = library.plants();
+    // The cases are drawn again from the library's own plants, so that it does not matter whether the pilots were found by this process.
+    let served: Vec<&(usize, Pilot)> = found.iter().filter(|(_, p)| p.table.is_some()).collect();
+    let pilots: Vec<Prepared> =
+        served.par_iter().filter_map(|(i, _)| Prepared::of(context, &neighbours, source, *i)).collect();
+    let own: Vec<Candidate> = served
+        .iter()
+        .filter_map(|(_, p)| Some(Candidate { gains: p.table.as_ref()?.gains.clone(), origin: format!("pilot {}", p.id) }))
+        .collect();
+    let mut tables = vec![Candidate { gains: context.base.clone(), origin: "today".into() }];
+    let looks: Vec<Vec<f64>> = pilots.iter().map(|p| looks(&p.plant)).collect();
+    let from: Vec<Controller> = own.iter().map(|c| c.gains.clone()).collect();
+    for k in LEVELS.into_iter().filter(|k| *k <= pilots.len()) {
+        let (centres, members) = groups(&looks, k);
+        let made: Vec<Option<Controller>> =
+            members.par_iter().map(|m| group_table(context, &pilots, &looks, m, &from)).collect();
+        let mut level = Level { centres, candidates: Vec::new() };
+        for (g, gains) in made.into_iter().enumerate() {
+            level.candidates.push(gains.map(|gains| {
+                tables.push(Candidate { gains, origin: format!("group {} of {k}", g + 1) });
+                tables.len() - 1
+            }));
+        }
+        library.levels.push(level);
+    }
+    let fixed = tables.len();
+    tables.extend(own);
+    let gains: Vec<Controller> = tables.iter().map(|c| c.gains.clone()).collect();
+    let chosen = useful(context, &pilots, &gains, fixed, context.file.tables.candidates);
+    library.tables = chosen.into_iter().map(|i| tables[i].clone()).collect();
+    library
 }
-

@@ -93,6 +93,17 @@ pub struct OwnTable {
     pub proved: Proved,
 }
 
+/// A candidate of the library that is proven in a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Serves {
+    /// Which.
+    pub candidate: usize,
+    /// Largest miss, negative: the room to the nearest limit as a share of it.
+    pub worst: f64,
+    /// Sum of both DFT norms as measured (position_unit).
+    pub dft: f64,
+}
+
 /// How a table was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -145,8 +156,8 @@ pub struct SlotRow {
     pub table: Option<OwnTable>,
     /// The best that was found where none passes.
     pub nearest: Option<OwnTable>,
-    /// Candidates of the library that are proven in it, a bit each, as hexadecimal digits, candidate 0 in the last one.
-    pub covered: String,
+    /// Candidates of the library that are proven in it.
+    pub serves: Vec<Serves>,
 }
 
 impl SlotRow {
@@ -155,32 +166,8 @@ impl SlotRow {
         format!("{}/{}", self.tester, self.slot)
     }
 
-    /// Whether a candidate is proven in it.
-    pub fn covers(&self, candidate: usize) -> bool {
-        let digit = self.covered.len().checked_sub(candidate / 4 + 1).and_then(|at| self.covered.as_bytes().get(at));
-        let value = digit.and_then(|d| char::from(*d).to_digit(16)).unwrap_or(0);
-        value >> (candidate % 4) & 1 == 1
-    }
-}
-
-/// Bits as hexadecimal digits, the first bit lowest in the last digit.
-pub(super) fn hex_bits(bits: &[bool]) -> String {
-    let digit = |c: &[bool]| c.iter().enumerate().fold(0u32, |v, (i, b)| v | u32::from(*b) << i);
-    bits.chunks(4).rev().map(|c| char::from_digit(digit(c), 16).unwrap_or('0')).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    #[test]
-    fn bits_come_back_from_their_digits() {
-        let bits: Vec<bool> = (0..11).map(|i| [1, 4, 10].contains(&i)).collect();
-        // 4 + 4 + 3 bits: 100 0001 0010 from the highest.
-        assert_eq!(hex_bits(&bits), "412");
-        let text = r#"{"index":0,"tester":"T","slot":"S","digest":"","temperature_c":20.0,"verdict":"keeps","covered":"412"}"#;
-        let row: SlotRow = serde_json::from_str(text).unwrap();
-        assert!((0..14).all(|i| row.covers(i) == [1, 4, 10].contains(&i)));
+    /// What a candidate does in it, where it is proven.
+    pub fn served_by(&self, candidate: usize) -> Option<&Serves> {
+        self.serves.iter().find(|s| s.candidate == candidate)
     }
 }

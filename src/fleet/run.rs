@@ -5,14 +5,17 @@
 //! the chunks on their way.
 
 use super::claims::Worker;
+use super::explain::{Explained, explain};
 use super::library::Library;
 use super::pilot::{self, Pilot};
-use super::row::SlotRow;
-use super::slot::work;
+use super::row::{SlotRow, Verdict};
+use super::share::share;
+use super::slot::{Prepared, work};
 use super::source::SlotSource;
 use super::store_run::{Part, Places, Stamp};
 use super::{Context, FleetError, Store};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
@@ -84,7 +87,89 @@ pub fn run(job: &Job<'_>, watch: &dyn Watch) -> Result<String, FleetError> {
     let run = store.begin(job.run, &job.context.digest, job.source.count(), &job.stamp)?.run;
     let library = library(job, &mut store, &run, &pool, watch)?;
     slots(job, &mut store, &run, &library, &pool, watch)?;
+    alone(job, &mut store, &run, "conclude", |store| conclude(job, store, &run, &library, &pool, watch))?;
     Ok(run)
+}
+
+/// Does what one process must do alone, or waits until another one has done it.
+fn alone(
+    job: &Job<'_>,
+    store: &mut Store,
+    run: &str,
+    task: &str,
+    mut work: impl FnMut(&mut Store) -> Result<(), FleetError>,
+) -> Result<(), FleetError> {
+    while store.run(run)?.finished.is_none() {
+        if store.claim(run, task, job.worker)? {
+            return work(store);
+        }
+        std::thread::sleep(PAUSE);
+    }
+    Ok(())
+}
+
+/// What comes after the last slot: explanations, shared tables, proposals.
+fn conclude(
+    job: &Job<'_>,
+    store: &mut Store,
+    run: &str,
+    library: &Library,
+    pool: &rayon::ThreadPool,
+    watch: &dyn Watch,
+) -> Result<(), FleetError> {
+    explanations(job, store, run, library, pool, watch)?;
+    watch.step(Stage::Share, 0, 1);
+    let shared = share(job.context, store, run, library)?;
+    store.keep_part(run, Part::Shared, &shared)?;
+    let begun = store.run(run)?;
+    store.propose(job.context, &begun)?;
+    store.finish(run, &job.stamp)?;
+    watch.step(Stage::Share, 1, 1);
+    Ok(())
+}
+
+/// Explains slots that no table serves: the first ones, as many as the settings allow.
+fn explanations(
+    job: &Job<'_>,
+    store: &mut Store,
+    run: &str,
+    library: &Library,
+    pool: &rayon::ThreadPool,
+    watch: &dyn Watch,
+) -> Result<(), FleetError> {
+    let most = job.context.file.untunable.explained;
+    let there: BTreeSet<usize> = store.places_done(run, Places::Explained)?;
+    let mut left: Vec<SlotRow> = Vec::new();
+    let mut count = there.len();
+    store.each_row(run, Some(Verdict::Untunable), |row| {
+        if count < most && !there.contains(&row.index) {
+            left.push(row);
+            count += 1;
+        }
+        Ok(())
+    })?;
+    let plants = library.plants();
+    let one = |row: &SlotRow| {
+        let slot = Prepared::of(job.context, &plants, job.source, row.index)?;
+        Some((row.index, explain(job.context, &slot, row)))
+    };
+    let mut done = there.len();
+    for group in left.chunks(4 * pool.current_num_threads().max(1)) {
+        watch.step(Stage::Explain, done, count);
+        let found: Vec<(usize, Explained)> = pool.install(|| group.par_iter().filter_map(one).collect());
+        // A slot that the full search has served after all is tuned, in the same transaction.
+        let served: Vec<SlotRow> = group
+            .iter()
+            .filter_map(|row| {
+                let table = found.iter().find(|(i, _)| *i == row.index)?.1.table.clone()?;
+                Some(SlotRow { verdict: Verdict::Tuned, table: Some(table), nearest: None, ..row.clone() })
+            })
+            .collect();
+        store.add_explained(run, &found, &served)?;
+        done += group.len();
+    }
+    watch.step(Stage::Explain, done, count);
+    Ok(())
 }
 
 fn open(job: &Job<'_>) -> Result<Store, FleetError> {
@@ -123,8 +208,8 @@ fn library(
             watch.step(Stage::Pilots, found.len(), places.len());
         }
         found.sort_by_key(|(p, _)| *p);
-        let pilots: Vec<Pilot> = found.into_iter().map(|(_, p)| p).collect();
-        store.keep_part(run, Part::Library, &pilot::library(job.context, &pilots))?;
+        let library = pool.install(|| pilot::library(job.context, job.source, &found));
+        store.keep_part(run, Part::Library, &library)?;
     }
 }
 

@@ -131,7 +131,7 @@ pub struct Tables {
 
 impl Default for Tables {
     fn default() -> Self {
-        Tables { pilots: 32, candidates: 64, most: 16, coverage: 0.99 }
+        Tables { pilots: 32, candidates: 32, most: 16, coverage: 0.99 }
     }
 }
 

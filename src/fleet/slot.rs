@@ -6,8 +6,8 @@
 use super::library::Library;
 use super::prove::prove;
 use super::ready::{Quick, Ready};
-use super::row::{GateRow, ModelRow, OwnTable, SlotRow, Verdict, Way, hex_bits};
-use super::source::{Loaded, SlotName};
+use super::row::{GateRow, ModelRow, OwnTable, Serves, SlotRow, Verdict, Way};
+use super::source::{Loaded, SlotName, SlotSource};
 use super::{Context, Evidence};
 use crate::frf::{Frf, FrfShapeError};
 use crate::gate::features::{RawMachine, features};
@@ -56,7 +56,7 @@ pub fn work(context: &Context, library: &Library, plants: &[Plant], index: usize
         current: None,
         table: None,
         nearest: None,
-        covered: String::new(),
+        serves: Vec::new(),
     };
     let filled = catch_unwind(AssertUnwindSafe(|| {
         fill(context, library, plants, &loaded.machine, &loaded.problems, &mut row).map_err(|e| e.to_string())
@@ -102,7 +102,7 @@ fn fill(
         return Ok(());
     }
     let (quick, covered) = covered(context, library, &mut ready)?;
-    row.covered = hex_bits(&covered);
+    row.serves = covered.clone();
     if row.current.as_ref().is_some_and(|p| p.passes) && (action == Action::None || context.gate.is_none()) {
         row.verdict = Verdict::Keeps;
         return Ok(());
@@ -164,6 +164,23 @@ pub(super) fn evidence(
     Ok((evidence, model_row(&plant, rms, near)))
 }
 
+/// A slot with its plant and its cases.
+pub(super) struct Prepared {
+    pub plant: Plant,
+    pub evidence: Evidence,
+}
+
+impl Prepared {
+    /// The slot at `index`; none where it cannot be read or identified.
+    pub fn of(context: &Context, plants: &[Plant], source: &dyn SlotSource, index: usize) -> Option<Prepared> {
+        let loaded = source.load(index);
+        let frf = loaded.machine.response.as_ref()?;
+        let temperature_c = loaded.temperature_c.unwrap_or(context.file.temperature.measured_c);
+        let (evidence, model) = evidence(context, plants, frf, index, temperature_c).ok()?;
+        Some(Prepared { plant: Plant::try_from(model.plant).ok()?, evidence })
+    }
+}
+
 pub(super) fn model_row(plant: &Plant, rms_relative_error: f64, near: bool) -> ModelRow {
     let dc_gain = match plant.body {
         Body::SecondOrder { dc_gain, .. } => Some(dc_gain * plant.resonance_gain),
@@ -186,16 +203,22 @@ pub(super) fn model_row(plant: &Plant, rms_relative_error: f64, near: bool) -> M
     }
 }
 
-/// What every candidate scores, and which are proven: the grid sorts out, the exact judgement decides.
-fn covered(context: &Context, library: &Library, ready: &mut Ready<'_>) -> Result<(Vec<Quick>, Vec<bool>), TuneError> {
+/// What every candidate scores, and those that are proven: the grid sorts out, the exact judgement decides.
+fn covered(context: &Context, library: &Library, ready: &mut Ready<'_>) -> Result<(Vec<Quick>, Vec<Serves>), TuneError> {
     // The grid's violation is that of a guarded limit: the guard itself is no miss.
     let miss = 1.1 * context.file.robust.guard + NEAR_MISS;
     let quick: Vec<Quick> = library.tables.iter().map(|t| ready.quick(&t.gains)).collect();
-    let mut covered = Vec::with_capacity(quick.len());
-    for (q, t) in quick.iter().zip(&library.tables) {
-        covered.push(q.violation <= miss && prove(ready, &t.gains)?.passes);
+    let mut serves = Vec::new();
+    for (candidate, (q, t)) in quick.iter().zip(&library.tables).enumerate() {
+        // Today's table may lie outside the bounds, where the grid has not looked.
+        if q.violation <= miss || candidate == 0 {
+            let p = prove(ready, &t.gains)?;
+            if p.passes {
+                serves.push(Serves { candidate, worst: p.worst, dft: p.figures.dft_low + p.figures.dft_high });
+            }
+        }
     }
-    Ok((quick, covered))
+    Ok((quick, serves))
 }
 
 /// A table of the slot's own: polished from the best candidates; else the best candidate that is proven. Where none is, the nearest.
@@ -203,7 +226,7 @@ fn own_table(
     library: &Library,
     ready: &mut Ready<'_>,
     quick: &[Quick],
-    covered: &[bool],
+    serves: &[Serves],
 ) -> Result<(Option<OwnTable>, Option<OwnTable>), TuneError> {
     let mut order: Vec<usize> = (0..quick.len()).collect();
     // Candidates that pass by objective, the others by violation; of equals the earlier stays ahead.
@@ -221,8 +244,8 @@ fn own_table(
         }
         keep(&mut nearest, table);
     }
-    if let Some(&i) = order.iter().find(|i| covered[**i]) {
-        let gains = library.tables[i].gains.clone();
+    if let Some(best) = serves.iter().min_by(|a, b| a.dft.total_cmp(&b.dft)) {
+        let gains = library.tables[best.candidate].gains.clone();
         return Ok((Some(OwnTable { proved: prove(ready, &gains)?, gains, way: Way::Library }), None));
     }
     Ok((None, nearest))

@@ -3,6 +3,7 @@
 //! In: rows in any order, from any number of processes. Out: rows in order, streamed. A row is keyed by run and place; what is already
 //! there is left alone, so that work done twice is kept once.
 
+use super::explain::Explained;
 use super::row::{SlotRow, Verdict};
 use super::{FleetError, Store};
 use rusqlite::{OptionalExtension, params};
@@ -176,6 +177,32 @@ impl Store {
             all.push((place.unsigned_abs() as usize, of_json(&text)?));
         }
         Ok(all)
+    }
+
+    /// Which places are there.
+    pub(super) fn places_done(&self, run: &str, places: Places) -> Result<BTreeSet<usize>, FleetError> {
+        let fail = self.fail("read a part of a run");
+        let query = format!("SELECT place FROM {} WHERE run = ?1", places.table());
+        let mut query = self.connection.prepare(&query).map_err(&fail)?;
+        let rows = query.query_map([run], |r| r.get::<_, i64>(0)).map_err(&fail)?;
+        rows.map(|r| r.map(|p| p.unsigned_abs() as usize)).collect::<Result<_, _>>().map_err(&fail)
+    }
+
+    /// Explanations of a run, by place.
+    pub fn explanations(&self, run: &str) -> Result<Vec<(usize, Explained)>, FleetError> {
+        self.places(run, Places::Explained)
+    }
+
+    /// Adds explanations, and the rows of slots that the full search has served after all.
+    pub(super) fn add_explained(&mut self, run: &str, found: &[(usize, Explained)], served: &[SlotRow]) -> Result<(), FleetError> {
+        let texts = found.iter().map(|(p, f)| Ok((*p as i64, json(f)?))).collect::<Result<Vec<_>, FleetError>>()?;
+        let rows = served.iter().map(|r| Ok((r.index as i64, r.verdict.word(), json(r)?))).collect::<Result<Vec<_>, FleetError>>()?;
+        self.write("add explanations", |c| {
+            let mut insert = c.prepare_cached("INSERT OR IGNORE INTO explained (run, place, found) VALUES (?1, ?2, ?3)")?;
+            texts.iter().try_for_each(|(p, text)| insert.execute(params![run, p, text]).map(|_| ()))?;
+            let mut update = c.prepare_cached("UPDATE slots SET verdict = ?3, row = ?4 WHERE run = ?1 AND place = ?2")?;
+            rows.iter().try_for_each(|(p, verdict, row)| update.execute(params![run, p, verdict, row]).map(|_| ()))
+        })
     }
 
     /// Adds to a table of places; what is there stays.
