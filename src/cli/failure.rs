@@ -74,6 +74,8 @@ pub enum Failure {
     Gate(#[from] GateError),
     #[error(transparent)]
     Fleet(#[from] FleetError),
+    #[error("{}: no such store; `servotune fleet run` makes one", file.display())]
+    NoStore { file: PathBuf },
     #[error(transparent)]
     Study(#[from] StudyError),
     /// Two algorithms that share no code disagree: no answer can be trusted.

@@ -2,9 +2,10 @@
 
 use super::fleet_arguments::{FleetArguments, FleetCommand, FleetRunArguments};
 use super::fleet_progress::Progress;
-use super::{Ending, Failure, Screen};
+use super::{Ending, Failure, Screen, fleet_store};
 use crate::fleet::{
-    self, Context, Effort, FileSource, Fleet, Job, SlotSource, Stamp, Store, Verdict, Worker, write_slots,
+    self, Action, Asked, Context, Effort, FileSource, Fleet, Job, SlotSource, Stamp, Store, Verdict, Worker,
+    write_tables,
 };
 use crate::study::TwinSource;
 use serde::Serialize;
@@ -24,6 +25,12 @@ struct Document {
 pub(super) fn run(a: &FleetArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     match &a.what {
         FleetCommand::Run(a) => run_floor(a, screen),
+        FleetCommand::Runs(a) => fleet_store::runs(a, screen),
+        FleetCommand::History(a) => fleet_store::history(a, screen),
+        FleetCommand::Diff(a) => fleet_store::diff(a, screen),
+        FleetCommand::Approve(a) => fleet_store::revise(a, Action::Approve, screen),
+        FleetCommand::Apply(a) => fleet_store::revise(a, Action::Apply, screen),
+        FleetCommand::Rollback(a) => fleet_store::revise(a, Action::Rollback, screen),
     }
 }
 
@@ -88,14 +95,35 @@ fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failu
         *verdicts.entry(row.verdict.word()).or_default() += 1;
         Ok(())
     })?;
-    let files = write_slots(&store, &run, &context, &a.out, source.count() <= MOST_GAIN_FILES)?;
+    let all = store.runs()?;
+    let own = all.iter().position(|r| r.run == run).unwrap_or(0);
+    let before = all[..own].iter().filter(|r| r.finished.is_some()).map(|r| r.run.clone()).collect();
+    let asked = Asked { gains: source.count() <= MOST_GAIN_FILES, before };
+    let files = write_tables(&store, &run, &context, &a.out, &asked)?;
     files.iter().for_each(|f| screen.say(&format!("wrote {}", f.display())));
     let slots = source.count();
     let counts: Vec<String> = Verdict::ALL.iter().map(|v| format!("{} {}", verdicts[v.word()], v.word())).collect();
-    let text = format!("run {run}: {slots} slots: {}\n", counts.join(", "));
+    let mut text = format!("run {run}: {slots} slots: {}\n", counts.join(", "));
+    if let Some(s) = store.shared(&run)? {
+        text += &shared_words(&s);
+    }
     let accepted = verdicts[Verdict::Keeps.word()] + verdicts[Verdict::Tuned.word()] == slots;
     screen.result(&Document { run, slots, verdicts, store: store_file, files }, &text)?;
     Ok(if accepted { Ending::Accepted } else { Ending::Rejected })
+}
+
+/// The shared tables in words.
+fn shared_words(s: &fleet::Shared) -> String {
+    let share = |n: usize| format!("{n} ({:.1} %)", 100.0 * n as f64 / s.slots.max(1) as f64);
+    let served = s.curve.get(s.chosen.saturating_sub(1)).map_or(0, |c| c.served);
+    format!(
+        "of {} slots to be served: today's gains prove {}, a table of their own {}, {} shared tables {}\n",
+        s.slots,
+        share(s.today),
+        share(s.own),
+        s.chosen,
+        share(served)
+    )
 }
 
 /// Slots above which no folder of gains is written for each: the tables have them all.

@@ -14,6 +14,7 @@ mod features;
 mod fleet;
 mod fleet_arguments;
 mod fleet_progress;
+mod fleet_store;
 mod fleet_twin;
 mod gate_arguments;
 mod gated;

@@ -1,8 +1,11 @@
 //! Files of a run, derived from the store alone: streamed row by row, written whole by rename, without any time in them.
 //!
-//! In: a store and a run. Out: `slots.csv`, `slots.jsonl`, and gain tables for each tuned slot. The same run gives the same bytes.
+//! In: a store and a run. Out: slots, shared tables, coverage, work list, drift, and a gain table for each tuned slot. The same run gives the same bytes.
 
+use super::drift::{SlotDrift, Trend};
 use super::row::{SlotRow, Verdict};
+use super::share::assigned;
+use super::store_run::json;
 use super::{Context, FleetError, Store};
 use crate::document::DocumentError;
 use crate::gate::features::csv_field;
@@ -56,7 +59,7 @@ fn io(file: &Path, action: &'static str, source: std::io::Error) -> FleetError {
 const COLUMNS: &str = "tester,slot,verdict,class,probability,action,temperature_c,dc_gain,first_resonance_hz,model_rms,\
 before_passes,before_worst,before_limit,before_case,before_phase_margin_deg,before_gain_margin_db,before_max_sensitivity,before_dft_low,before_dft_high,\
 after_worst,after_limit,after_case,after_phase_margin_deg,after_gain_margin_db,after_max_sensitivity,after_dft_low,after_dft_high,\
-way,kp,ki_per_s,kd_s,lowpass_hz,notch_hz,notch_zero_damping,notch_pole_damping,error,why,digest";
+way,kp,ki_per_s,kd_s,lowpass_hz,notch_hz,notch_zero_damping,notch_pole_damping,shared_table,error,why,digest";
 
 fn number(x: Option<f64>) -> String {
     x.map(|x| format!("{x}")).unwrap_or_default()
@@ -73,7 +76,7 @@ fn figures(s: Option<&Summary>) -> [String; 5] {
 }
 
 /// The row of slots.csv.
-fn csv_row(r: &SlotRow) -> String {
+fn csv_row(r: &SlotRow, shared: Option<String>) -> String {
     let (gate, model) = (r.gate.as_ref(), r.model.as_ref());
     let (before, table) = (r.current.as_ref(), r.table.as_ref().or(r.nearest.as_ref()));
     let after = table.map(|t| &t.proved);
@@ -104,6 +107,7 @@ fn csv_row(r: &SlotRow) -> String {
     f.push(number(gains.and_then(|g| g.lowpass.first()).map(|l| l.frequency_hz)));
     let notch = gains.and_then(|g| g.notch.first());
     f.extend([notch.map(|n| n.frequency_hz), notch.map(|n| n.zero_damping_ratio), notch.map(|n| n.pole_damping_ratio)].map(number));
+    f.push(shared.unwrap_or_default());
     f.push(r.error.clone().unwrap_or_default());
     f.push(gate.map(|g| g.why.clone()).unwrap_or_default());
     f.push(r.digest.clone());
@@ -135,20 +139,85 @@ pub fn gain_table(context: &Context, row: &SlotRow) -> Result<Option<GainTable>,
     Ok(Some(GainTable::new(&table.gains, before, table.proved.figures.clone(), provenance)?))
 }
 
-/// Writes the tables of a run; `gains` asks for `gains/TESTER/SLOT/gains.toml` of each tuned slot as well.
-pub fn write_slots(store: &Store, run: &str, context: &Context, out: &Path, gains: bool) -> Result<Vec<PathBuf>, FleetError> {
+/// What is written of a run.
+#[derive(Clone, Debug, Default)]
+pub struct Asked {
+    /// `gains/TESTER/SLOT/gains.toml` of each tuned slot.
+    pub gains: bool,
+    /// Runs before this one, oldest first, whose drift is told.
+    pub before: Vec<String>,
+}
+
+/// Writes the tables of a run: slots, shared tables, coverage, work list, drift.
+pub fn write_tables(store: &Store, run: &str, context: &Context, out: &Path, asked: &Asked) -> Result<Vec<PathBuf>, FleetError> {
+    let (library, shared) = (store.library(run)?.unwrap_or_default(), store.shared(run)?.unwrap_or_default());
+    let chosen: Vec<usize> = shared.tables.iter().map(|t| t.candidate).collect();
+    let name = |candidate: usize| chosen.iter().position(|c| *c == candidate).map(|i| format!("K{:02}", i + 1));
     let mut csv = WholeFile::begin(&out.join("slots.csv"))?;
     let mut lines = WholeFile::begin(&out.join("slots.jsonl"))?;
     csv.line(COLUMNS)?;
     store.each_row(run, None, |row| {
-        csv.line(&csv_row(&row))?;
-        lines.line(&super::store_run::json(&row)?)?;
-        if gains && row.verdict == Verdict::Tuned
+        let table = row.verdict.served().then(|| assigned(&row, &chosen)).flatten();
+        csv.line(&csv_row(&row, table.and_then(name)))?;
+        lines.line(&json(&row)?)?;
+        if asked.gains && row.verdict == Verdict::Tuned
             && let Some(table) = gain_table(context, &row)?
         {
             table.write(&out.join("gains").join(&row.tester).join(&row.slot).join("gains.toml"))?;
         }
         Ok(())
     })?;
-    Ok(vec![csv.end()?, lines.end()?])
+    let mut files = vec![csv.end()?, lines.end()?];
+    let mut text = |name: &str, text: &str| -> Result<(), FleetError> {
+        crate::document::write_text(&out.join(name), text)?;
+        files.push(out.join(name));
+        Ok(())
+    };
+    let mut coverage = "tables,slots_served,share,no_choice_serves_more_than,candidates\n".to_owned();
+    for c in &shared.curve {
+        let share = c.served as f64 / shared.slots.max(1) as f64;
+        let names: Vec<&str> = c.tables.iter().map(|&t| library.tables[t].origin.as_str()).collect();
+        coverage += &format!("{},{},{share},{},{}\n", c.tables.len(), c.served, c.at_most, csv_field(&names.join("; ")));
+    }
+    text("coverage.csv", &coverage)?;
+    for &c in &chosen {
+        if let (Some(name), Some(candidate)) = (name(c), library.tables.get(c)) {
+            text(&format!("shared/{name}.toml"), &super::table_text(&candidate.gains)?.0)?;
+        }
+    }
+    text("shared.json", &(pretty(&shared)? + "\n"))?;
+    let mut work = "slot,gain,dft_now,dft_after,work,why\n".to_owned();
+    for w in super::work_list(store, run)? {
+        let fields = [w.slot, format!("{}", w.gain), number(w.dft_now), number(w.dft_after), w.work, w.why];
+        work += &(fields.map(|f| csv_field(&f)).join(",") + "\n");
+    }
+    text("work_list.csv", &work)?;
+    let explained: Vec<super::Explained> = store.explanations(run)?.into_iter().map(|(_, e)| e).collect();
+    text("untunable.json", &(pretty(&explained)? + "\n"))?;
+    if !asked.before.is_empty() {
+        let runs: Vec<String> = asked.before.iter().cloned().chain([run.to_owned()]).collect();
+        text("drift.csv", &drift_csv(&super::drift(store, &runs)?))?;
+    }
+    Ok(files)
+}
+
+fn pretty(value: &impl serde::Serialize) -> Result<String, FleetError> {
+    serde_json::to_string_pretty(value).map_err(|source| FleetError::Json { source })
+}
+
+fn drift_csv(all: &[SlotDrift]) -> String {
+    let mut text = "slot,runs,gain_rate,gain_low,gain_high,resonance_rate,resonance_low,resonance_high,room,room_rate,room_low,room_high,\
+runs_left,runs_left_low,runs_left_high\n"
+        .to_owned();
+    for d in all {
+        let rate = |t: Option<Trend>| [number(t.map(|t| t.rate)), number(t.map(|t| t.low)), number(t.map(|t| t.high))];
+        let mut f = vec![csv_field(&d.slot), d.runs.to_string()];
+        f.extend(rate(d.gain));
+        f.extend(rate(d.resonance));
+        f.push(number(d.room.map(|r| r.now)));
+        f.extend(rate(d.room));
+        f.extend([d.runs_left, d.runs_left_low, d.runs_left_high].map(number));
+        text += &(f.join(",") + "\n");
+    }
+    text
 }
