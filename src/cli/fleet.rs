@@ -2,7 +2,8 @@
 
 use super::fleet_arguments::{FleetArguments, FleetCommand, FleetRunArguments};
 use super::fleet_progress::Progress;
-use super::{Ending, Failure, Screen, fleet_store};
+use super::{Ending, Failure, Screen, fleet_page, fleet_store};
+use crate::document::write_text;
 use crate::fleet::{
     self, Action, Asked, Context, Effort, FileSource, Fleet, Job, SlotSource, Stamp, Store, Verdict, Worker,
     write_tables,
@@ -99,7 +100,10 @@ fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failu
     let own = all.iter().position(|r| r.run == run).unwrap_or(0);
     let before = all[..own].iter().filter(|r| r.finished.is_some()).map(|r| r.run.clone()).collect();
     let asked = Asked { gains: source.count() <= MOST_GAIN_FILES, before };
-    let files = write_tables(&store, &run, &context, &a.out, &asked)?;
+    let mut files = write_tables(&store, &run, &context, &a.out, &asked)?;
+    let page = a.out.join("fleet.html");
+    write_text(&page, &fleet_page::html(&store, &run, &context, &asked.before)?)?;
+    files.push(page);
     files.iter().for_each(|f| screen.say(&format!("wrote {}", f.display())));
     let slots = source.count();
     let counts: Vec<String> = Verdict::ALL.iter().map(|v| format!("{} {}", verdicts[v.word()], v.word())).collect();

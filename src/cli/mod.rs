@@ -13,6 +13,7 @@ mod failure;
 mod features;
 mod fleet;
 mod fleet_arguments;
+mod fleet_page;
 mod fleet_progress;
 mod fleet_store;
 mod fleet_twin;

@@ -124,7 +124,7 @@ pub fn drift(store: &Store, runs: &[String]) -> Result<Vec<SlotDrift>, FleetErro
             }
             let f = slots.entry(row.id()).or_default();
             let model = row.model.as_ref();
-            let mut put = |s: &mut Series, value: Option<f64>| s.extend(value.filter(|v| v.is_finite()).map(|v| (x, v)));
+            let put = |s: &mut Series, value: Option<f64>| s.extend(value.filter(|v| v.is_finite()).map(|v| (x, v)));
             put(&mut f.gain, model.and_then(|m| m.dc_gain).map(|g| g.abs().ln()));
             put(&mut f.resonance, model.and_then(|m| m.first_resonance_hz).map(f64::ln));
             put(&mut f.room, row.current.as_ref().map(|p| -p.worst).filter(|r| *r > -1.0));

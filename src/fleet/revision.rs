@@ -161,7 +161,7 @@ impl Store {
             }
             self.write("propose tables", |c| {
                 for (slot, inputs, found, own) in &texts {
-                    let mut one = |action, (text, sha256): &(String, String), why| {
+                    let one = |action, (text, sha256): &(String, String), why| {
                         c.prepare_cached("INSERT OR IGNORE INTO gain_tables (sha256, gains) VALUES (?1, ?2)")?
                             .execute(params![sha256, text])?;
                         add(c, &New { slot, action, sha256, run: Some(&run.run), why, inputs }, &stamp)
