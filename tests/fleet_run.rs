@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use servotune::fleet::{
-    Action, Asked, Context, Effort, Fleet, FleetError, Job, Loaded, SlotName, SlotSource, Stage, Stamp, Store, TwinInput,
-    Verdict, Watch, Worker, run, write_tables,
+    Action, Asked, Context, Effort, Fleet, FleetError, Job, Loaded, SlotName, SlotSource, Stage, Stamp, Store,
+    TwinInput, Verdict, Watch, Worker, run, write_tables,
 };
 use servotune::study::TwinSource;
 use std::path::{Path, PathBuf};
@@ -46,13 +46,27 @@ fn stamp() -> Stamp {
 }
 
 /// Runs a source and gives the files' bytes by name.
-fn outcome(folder: &Path, context: &Context, source: &dyn SlotSource, effort: Effort) -> Result<Vec<(String, Vec<u8>)>, FleetError> {
+fn outcome(
+    folder: &Path,
+    context: &Context,
+    source: &dyn SlotSource,
+    effort: Effort,
+) -> Result<Vec<(String, Vec<u8>)>, FleetError> {
     let store = folder.join("fleet.db");
     let worker = Worker::at(&store, "test")?;
     let job = Job { source, context, store: &store, run: Some("one"), stamp: stamp(), worker: &worker, effort };
     let name = run(&job, &Quiet)?;
-    let files = write_tables(&Store::open(&store)?, &name, context, &folder.join("out"), &Asked { gains: true, before: vec![] })?;
-    Ok(files.iter().map(|f| (f.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(f).unwrap())).collect())
+    let files = write_tables(
+        &Store::open(&store)?,
+        &name,
+        context,
+        &folder.join("out"),
+        &Asked { gains: true, before: vec![] },
+    )?;
+    Ok(files
+        .iter()
+        .map(|f| (f.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(f).unwrap()))
+        .collect())
 }
 
 fn floor(slots: usize) -> (TwinSource, PathBuf, Context) {
@@ -116,22 +130,24 @@ fn threads_chunks_a_full_disk_and_a_power_cut_leave_the_bytes_as_they_are() {
     }
     assert!(refused >= 2, "the disk was never full");
 
-    // A power cut: what had not reached the disk is gone from the end of the log.
-    let cut = folder("cut");
+    // A power cut: what had not reached the disk is gone from the end of the log. An open connection keeps the log from being folded in.
+    let (before, after) = (folder("cut"), folder("after_the_cut"));
+    let open = Store::open(&before.join("fleet.db")).unwrap();
     let limited = Effort { threads: 1, chunk: 1, limit_pages: Some(pages - 12) };
-    let _ = outcome(&cut, &context, &source, limited);
-    let log = cut.join("fleet.db-wal");
-    if let Ok(bytes) = std::fs::read(&log) {
-        std::fs::write(&log, &bytes[..bytes.len() * 2 / 3 + 17]).unwrap();
-    }
-    assert_eq!(outcome(&cut, &context, &source, effort(2, 2)).unwrap(), undisturbed);
+    outcome(&before, &context, &source, limited).unwrap_err();
+    let log = std::fs::read(before.join("fleet.db-wal")).unwrap();
+    std::fs::copy(before.join("fleet.db"), after.join("fleet.db")).unwrap();
+    std::fs::write(after.join("fleet.db-wal"), &log[..log.len() * 2 / 3 + 17]).unwrap();
+    drop(open);
+    assert_eq!(outcome(&after, &context, &source, effort(2, 2)).unwrap(), undisturbed);
     assert!(place.exists());
 }
 
 #[test]
 fn two_workers_share_a_store_and_a_finished_run_is_not_done_again() {
     let (source, _place, context) = floor(6);
-    let alone = outcome(&folder("alone"), &context, &source, Effort { threads: 1, chunk: 1, limit_pages: None }).unwrap();
+    let alone =
+        outcome(&folder("alone"), &context, &source, Effort { threads: 1, chunk: 1, limit_pages: None }).unwrap();
     let together = folder("together");
     let counted = Counted { inner: &source, loads: AtomicUsize::new(0), broken: None };
     let one = || outcome(&together, &context, &counted, Effort { threads: 1, chunk: 1, limit_pages: None }).unwrap();
@@ -154,7 +170,11 @@ fn a_bad_slot_is_a_row_and_revisions_keep_everything() {
     let file = place.join("fleet.db");
     let mut store = Store::open(&file).unwrap();
     let mut rows = Vec::new();
-    store.each_row("one", None, |r| Ok(rows.push(r))).unwrap();
+    let gather = |r| {
+        rows.push(r);
+        Ok(())
+    };
+    store.each_row("one", None, gather).unwrap();
     assert_eq!(rows.len(), 4);
     assert_eq!((rows[2].verdict, rows[2].error.as_deref()), (Verdict::Failed, Some("response.bod:7: no number")));
     let tuned = rows.iter().find(|r| r.verdict == Verdict::Tuned).expect("the floor has slots to be tuned");
@@ -163,7 +183,9 @@ fn a_bad_slot_is_a_row_and_revisions_keep_everything() {
 
     // What is out of order is refused, with what was found.
     let refused = store.revise(&slot, Action::Apply, &stamp(), "too early").unwrap_err();
-    assert!(matches!(&refused, FleetError::Revision { slot: s, expected: "approved", found } if *s == slot && found.starts_with("propose")));
+    assert!(
+        matches!(&refused, FleetError::Revision { slot: s, expected: "approved", found } if *s == slot && found.starts_with("propose"))
+    );
     store.revise(&slot, Action::Approve, &stamp(), "looked at").unwrap();
     let applied = store.revise(&slot, Action::Apply, &stamp(), "installed").unwrap();
     let back = store.revise(&slot, Action::Rollback, &stamp(), "PES rose").unwrap();
@@ -177,7 +199,12 @@ fn a_bad_slot_is_a_row_and_revisions_keep_everything() {
 
     // Not even another program on the same file can change or delete a table or a revision.
     let other = rusqlite::Connection::open(&file).unwrap();
-    for words in ["UPDATE gain_tables SET gains = ''", "DELETE FROM gain_tables", "UPDATE revisions SET who = ''", "DELETE FROM revisions"] {
+    for words in [
+        "UPDATE gain_tables SET gains = ''",
+        "DELETE FROM gain_tables",
+        "UPDATE revisions SET who = ''",
+        "DELETE FROM revisions",
+    ] {
         assert!(other.execute(words, []).is_err(), "{words}");
     }
     // Another spec under the same name is refused; without a name it is a new run.

@@ -47,7 +47,8 @@ fn a_tree_and_a_table_give_the_same_slots() {
             std::fs::create_dir_all(file.parent().unwrap()).unwrap();
             std::fs::write(file, text).unwrap();
         }
-        table += &format!("T001,S{:02},{own}/response.bod,{own}/pes.csv,{own}/log.toml,{own}/controller.toml,\n", i + 1);
+        table +=
+            &format!("T001,S{:02},{own}/response.bod,{own}/pes.csv,{own}/log.toml,{own}/controller.toml,\n", i + 1);
     }
     let file = place.join("slots.csv");
     std::fs::write(&file, &table).unwrap();
@@ -57,7 +58,10 @@ fn a_tree_and_a_table_give_the_same_slots() {
     assert_eq!((tree.count(), rows.count()), (2, 2));
     for i in 0..2 {
         let (a, b) = (tree.load(i), rows.load(i));
-        assert_eq!((a.machine, a.controller, a.temperature_c, a.digest), (b.machine, b.controller, b.temperature_c, b.digest));
+        assert_eq!(
+            (a.machine, a.controller, a.temperature_c, a.digest),
+            (b.machine, b.controller, b.temperature_c, b.digest)
+        );
         assert!(a.problems.is_empty() && a.temperature_c.is_some());
     }
     // A slot that stands twice, a column that is not there, a file that is not there.

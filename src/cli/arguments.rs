@@ -312,6 +312,12 @@ pub(super) struct StudyArguments {
     /// Folder to write to
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Sizes of the floor (study `fleet-scale`)
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [1_000, 10_000, 100_000])]
+    pub sizes: Vec<usize>,
+    /// Kills (study `fleet-kills`)
+    #[arg(long, value_name = "N", default_value_t = 500)]
+    pub kills: usize,
     /// Folder with the measured records (studies `mirror`, `motor`, `hdd`)
     #[arg(long, value_name = "DIR", default_value = "../shared/data")]
     pub data: PathBuf,
@@ -334,6 +340,14 @@ pub(super) enum StudyName {
     Plants,
     /// The nine measured responses of a fast steering mirror
     Mirror,
+    /// 64 testers of 16 slots from raw files, three times
+    Fleet,
+    /// A run killed 500 times
+    FleetKills,
+    /// Slots per second and memory over the size of the floor
+    FleetScale,
+    /// Coverage over the number of shared tables for 1000 slots
+    FleetShared,
     /// Diagnoses of the cases in the folder --data, beside their answers
     Mismatch,
     /// The motor bench with flexible coupling, measured

@@ -74,6 +74,8 @@ pub enum Failure {
     Gate(#[from] GateError),
     #[error(transparent)]
     Fleet(#[from] FleetError),
+    #[error("cannot {what}: {source}")]
+    Child { what: String, source: std::io::Error },
     #[error("{}: no such store; `servotune fleet run` makes one", file.display())]
     NoStore { file: PathBuf },
     #[error(transparent)]

@@ -12,15 +12,31 @@ use crate::study::TwinSource;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 #[derive(Serialize)]
 struct Document {
     run: String,
     slots: usize,
     verdicts: BTreeMap<&'static str, usize>,
+    shared: Option<fleet::Shared>,
     store: PathBuf,
     files: Vec<PathBuf>,
+    /// Time of the run up to the store's last transaction, and of the files after it (s).
+    seconds: f64,
+    files_seconds: f64,
+    /// Slots worked on by this process in a second, pilots included in the time.
+    slots_per_s: f64,
+    /// Most memory that this process ever held (MiB), where the system tells.
+    peak_memory_mib: Option<f64>,
+}
+
+/// Most memory ever held, as Linux tells it.
+fn peak_memory_mib() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib / 1024.0)
 }
 
 pub(super) fn run(a: &FleetArguments, screen: &mut Screen) -> Result<Ending, Failure> {
@@ -76,7 +92,7 @@ fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failu
     let context = Context::of(&fleet)?;
     let source = source(&a.fleet, &fleet)?;
     let store_file = fleet.file.store.clone().unwrap_or_else(|| a.out.join("fleet.db"));
-    let store = Store::open(&store_file)?;
+    let mut store = Store::open(&store_file)?;
     let worker = Worker::at(&store_file, &format!("process-{}", std::process::id()))?;
     let job = Job {
         source: source.as_ref(),
@@ -88,9 +104,11 @@ fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failu
         effort: Effort { threads: a.threads, chunk: a.chunk, limit_pages: None },
     };
     let progress = Progress::new();
+    let begun = Instant::now();
     let run = fleet::run(&job, &progress);
     progress.close();
     let run = run?;
+    let seconds = begun.elapsed().as_secs_f64();
     let mut verdicts: BTreeMap<&'static str, usize> = Verdict::ALL.iter().map(|v| (v.word(), 0)).collect();
     store.each_row(&run, None, |row| {
         *verdicts.entry(row.verdict.word()).or_default() += 1;
@@ -104,15 +122,30 @@ fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failu
     let page = a.out.join("fleet.html");
     write_text(&page, &fleet_page::html(&store, &run, &context, &asked.before)?)?;
     files.push(page);
+    store.finish(&run, &stamp(a.who.as_deref()))?;
     files.iter().for_each(|f| screen.say(&format!("wrote {}", f.display())));
+    let files_seconds = begun.elapsed().as_secs_f64() - seconds;
     let slots = source.count();
     let counts: Vec<String> = Verdict::ALL.iter().map(|v| format!("{} {}", verdicts[v.word()], v.word())).collect();
     let mut text = format!("run {run}: {slots} slots: {}\n", counts.join(", "));
-    if let Some(s) = store.shared(&run)? {
-        text += &shared_words(&s);
-    }
+    let shared = store.shared(&run)?;
+    text += &shared.as_ref().map(shared_words).unwrap_or_default();
+    let slots_per_s = progress.earned() as f64 / seconds.max(1e-9);
+    text += &format!("{seconds:.1} s, {slots_per_s:.1} slots/s\n");
     let accepted = verdicts[Verdict::Keeps.word()] + verdicts[Verdict::Tuned.word()] == slots;
-    screen.result(&Document { run, slots, verdicts, store: store_file, files }, &text)?;
+    let document = Document {
+        run,
+        slots,
+        verdicts,
+        shared,
+        store: store_file,
+        files,
+        seconds,
+        files_seconds,
+        slots_per_s,
+        peak_memory_mib: peak_memory_mib(),
+    };
+    screen.result(&document, &text)?;
     Ok(if accepted { Ending::Accepted } else { Ending::Rejected })
 }
 

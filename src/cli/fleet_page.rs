@@ -41,8 +41,18 @@ pub(super) fn html(store: &Store, run: &str, context: &Context, before: &[String
         ("the one table of FLEET.toml for all".into(), share(shared.base)),
         ("a table of its own for each slot".into(), share(shared.own)),
     ];
-    view.ways.extend(shared.groups.iter().map(|(k, served)| (format!("{k} groups of machines that look alike, one table each"), share(*served))));
-    view.ways.extend(shared.curve.iter().map(|c| (format!("{} shared tables, chosen by what is proven", c.tables.len()), share(c.served))));
+    view.ways.extend(
+        shared
+            .groups
+            .iter()
+            .map(|(k, served)| (format!("{k} groups of machines that look alike, one table each"), share(*served))),
+    );
+    view.ways.extend(
+        shared
+            .curve
+            .iter()
+            .map(|c| (format!("{} shared tables, chosen by what is proven", c.tables.len()), share(c.served))),
+    );
     let named = |(i, t): (usize, &crate::fleet::SharedTable)| (format!("K{:02}", i + 1), t.origin.clone(), t.slots);
     view.tables = shared.tables.iter().enumerate().map(named).collect();
     view.work = work_list(store, run)?.into_iter().map(|w| (w.slot, w.gain, w.work, w.why)).collect();
@@ -78,7 +88,8 @@ fn line(row: &SlotRow, shared: Option<String>) -> SlotLine {
     };
     let of = |f: &dyn Fn(&Proved) -> Option<f64>| [now, then].map(|p| p.and_then(f).unwrap_or(f64::NAN));
     let gate = row.gate.as_ref();
-    let limit = then.or(now).map(|p| if p.case.is_empty() { p.limit.to_string() } else { format!("{}, {}", p.limit, p.case) });
+    let limit =
+        then.or(now).map(|p| if p.case.is_empty() { p.limit.to_string() } else { format!("{}, {}", p.limit, p.case) });
     let why = || gate.filter(|_| matches!(row.verdict, Verdict::Repair | Verdict::Inspect)).map(|g| g.why.clone());
     let note = row.error.clone().or_else(why).unwrap_or_default();
     SlotLine {

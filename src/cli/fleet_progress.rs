@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 pub(super) struct Progress {
     terminal: bool,
     state: Mutex<Option<State>>,
+    /// Slots done when they were counted first and last.
+    slots: Mutex<Option<(usize, usize)>>,
 }
 
 struct State {
@@ -27,7 +29,12 @@ const WIDTH: usize = 30;
 
 impl Progress {
     pub(super) fn new() -> Progress {
-        Progress { terminal: std::io::stderr().is_terminal(), state: Mutex::new(None) }
+        Progress { terminal: std::io::stderr().is_terminal(), state: Mutex::new(None), slots: Mutex::new(None) }
+    }
+
+    /// Slots that this process has seen done since it began.
+    pub(super) fn earned(&self) -> usize {
+        self.slots.lock().map_or(0, |s| s.map_or(0, |(first, last)| last.saturating_sub(first)))
     }
 
     /// Ends the bar's line.
@@ -72,6 +79,11 @@ fn words(stage: Stage, done: usize, of: usize, before: usize, seconds: f64) -> S
 
 impl Watch for Progress {
     fn step(&self, stage: Stage, done: usize, of: usize) {
+        if stage == Stage::Slots
+            && let Ok(mut slots) = self.slots.lock()
+        {
+            *slots = Some((slots.map_or(done, |s| s.0), done));
+        }
         // A poisoned lock only means that another thread failed while it printed.
         let Ok(mut state) = self.state.lock() else { return };
         let now = Instant::now();

@@ -23,7 +23,13 @@ pub(super) fn runs(a: &FleetRunsArguments, screen: &mut Screen) -> Result<Ending
     for r in &all {
         let slots = r.slots.to_string();
         let finished = r.finished.as_deref().unwrap_or("not finished");
-        t.push(vec![r.run.as_str().into(), slots.as_str().into(), r.started.as_str().into(), finished.into(), r.who.as_str().into()])?;
+        t.push(vec![
+            r.run.as_str().into(),
+            slots.as_str().into(),
+            r.started.as_str().into(),
+            finished.into(),
+            r.who.as_str().into(),
+        ])?;
     }
     screen.result(&all, &t.text())?;
     Ok(Ending::Accepted)
@@ -45,7 +51,15 @@ pub(super) fn history(a: &FleetHistoryArguments, screen: &mut Screen) -> Result<
         let gains = if a.gains { Some(store.table(&revision.sha256)?) } else { None };
         let r = &revision;
         let run = r.run.as_deref().unwrap_or("-");
-        text += &format!("{:>6}  {}  {:<8}  {}  {run}  {}: {}\n", r.id, r.at, r.action, &r.sha256[..r.sha256.len().min(12)], r.who, r.why);
+        text += &format!(
+            "{:>6}  {}  {:<8}  {}  {run}  {}: {}\n",
+            r.id,
+            r.at,
+            r.action,
+            &r.sha256[..r.sha256.len().min(12)],
+            r.who,
+            r.why
+        );
         text += &gains.as_deref().map(|g| format!("{g}\n")).unwrap_or_default();
         all.push(Shown { revision, gains });
     }

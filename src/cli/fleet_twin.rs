@@ -60,7 +60,7 @@ fn write_files(folder: &Path, files: Vec<(&'static str, String)>) -> Result<(), 
 fn document(input: &str) -> String {
     format!(
         "# A made-up floor; every key: specs/fleet.md.\ngate = \"gate.json\"\nspec = \"spec.toml\"\ncontroller = \"controller.toml\"\n\n\
-         [input]\n{input}\n\n[robust]\ndraws = 4\nguard = 0.01\n\n\
+         [input]\n{input}\n\n[robust]\ndraws = 2\nguard = 0.01\n\n\
          # The hall's range, and what a degree does to torque constant and frequencies.\n\
          [temperature]\ncases_c = [18.0, 30.0]\ngain_per_c = {GAIN_PER_C:e}\nfrequency_per_c = {FREQUENCY_PER_C:e}\n\n\
          [tables]\npilots = 32\nmost = 16\ncoverage = 0.99\n"

@@ -16,6 +16,7 @@ mod fleet_arguments;
 mod fleet_page;
 mod fleet_progress;
 mod fleet_store;
+mod fleet_study;
 mod fleet_twin;
 mod gate_arguments;
 mod gated;

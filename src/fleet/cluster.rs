@@ -54,7 +54,8 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 
 /// The centre nearest to a look; of equals the first.
 pub fn nearest(look: &[f64], centres: &[Vec<f64>]) -> Option<usize> {
-    (0..centres.len()).min_by(|&a, &b| distance(look, &centres[a]).total_cmp(&distance(look, &centres[b])).then(a.cmp(&b)))
+    (0..centres.len())
+        .min_by(|&a, &b| distance(look, &centres[a]).total_cmp(&distance(look, &centres[b])).then(a.cmp(&b)))
 }
 
 /// `count` of the looks that lie farthest apart, beginning with the one nearest to the mean.
@@ -64,7 +65,8 @@ fn apart(looks: &[&Vec<f64>], count: usize) -> Vec<usize> {
     let mut chosen: Vec<usize> = first.into_iter().collect();
     while chosen.len() < count.min(looks.len()) {
         let far = |i: usize| chosen.iter().map(|&c| distance(looks[i], looks[c])).fold(f64::INFINITY, f64::min);
-        let next = (0..looks.len()).filter(|i| !chosen.contains(i)).max_by(|&a, &b| far(a).total_cmp(&far(b)).then(b.cmp(&a)));
+        let next =
+            (0..looks.len()).filter(|i| !chosen.contains(i)).max_by(|&a, &b| far(a).total_cmp(&far(b)).then(b.cmp(&a)));
         chosen.extend(next);
     }
     chosen
@@ -99,7 +101,13 @@ pub(super) fn groups(looks: &[Vec<f64>], k: usize) -> (Vec<Vec<f64>>, Vec<Vec<us
 }
 
 /// The table of a group: polished on its most different members at once, from the tables that miss least there.
-pub(super) fn group_table(context: &Context, pilots: &[Prepared], looks: &[Vec<f64>], members: &[usize], from: &[Controller]) -> Option<Controller> {
+pub(super) fn group_table(
+    context: &Context,
+    pilots: &[Prepared],
+    looks: &[Vec<f64>],
+    members: &[usize],
+    from: &[Controller],
+) -> Option<Controller> {
     let own: Vec<&Vec<f64>> = members.iter().map(|&i| &looks[i]).collect();
     let chosen: Vec<usize> = apart(&own, MEMBERS).into_iter().map(|i| members[i]).collect();
     let machines: Vec<Machine<'_>> = chosen.iter().flat_map(|&i| pilots[i].evidence.machines()).collect();
@@ -111,12 +119,20 @@ pub(super) fn group_table(context: &Context, pilots: &[Prepared], looks: &[Vec<f
     starts.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let polished = starts.iter().take(STARTS).filter_map(|(_, i)| polish_table(&bench, &from[*i], STEPS, &mut desk));
     let key = |violation: f64, objective: f64| if violation <= 0.0 { (0, objective) } else { (1, violation) };
-    let best = polished.map(|(c, s)| (key(s.violation, s.objective), c)).min_by(|a, b| a.0.0.cmp(&b.0.0).then(a.0.1.total_cmp(&b.0.1)));
+    let best = polished
+        .map(|(c, s)| (key(s.violation, s.objective), c))
+        .min_by(|a, b| a.0.0.cmp(&b.0.0).then(a.0.1.total_cmp(&b.0.1)));
     best.map(|(_, c)| c)
 }
 
 /// Candidates that add most to what the pilots are served by, in the order in which they add it, until nothing more is added thrice over.
-pub(super) fn useful(context: &Context, pilots: &[Prepared], tables: &[Controller], fixed: usize, most: usize) -> Vec<usize> {
+pub(super) fn useful(
+    context: &Context,
+    pilots: &[Prepared],
+    tables: &[Controller],
+    fixed: usize,
+    most: usize,
+) -> Vec<usize> {
     let serves: Vec<Vec<bool>> = pilots
         .iter()
         .map(|p| match Ready::of(&p.evidence, &context.spec, &context.guarded, &context.base) {
@@ -130,7 +146,8 @@ pub(super) fn useful(context: &Context, pilots: &[Prepared], tables: &[Controlle
     let worth = |times: usize| [100usize, 10, 1].get(times).copied().unwrap_or(0);
     while chosen.len() < most {
         let gain = |i: usize| serves.iter().zip(&times).filter(|(s, _)| s[i]).map(|(_, t)| worth(*t)).sum::<usize>();
-        let best = (0..tables.len()).filter(|i| !chosen.contains(i)).max_by(|&a, &b| gain(a).cmp(&gain(b)).then(b.cmp(&a)));
+        let best =
+            (0..tables.len()).filter(|i| !chosen.contains(i)).max_by(|&a, &b| gain(a).cmp(&gain(b)).then(b.cmp(&a)));
         let Some(i) = best.filter(|&i| gain(i) > 0) else { break };
         chosen.push(i);
         times.iter_mut().zip(&serves).filter(|(_, s)| s[i]).for_each(|(t, _)| *t += 1);

@@ -2,8 +2,8 @@
 //!
 //! In: a [`Fleet`] file. Out: spec, gate, gains, settings, and the digest that ties results to them.
 
-use super::settings::{Fleet, FleetFile};
 use super::FleetError;
+use super::settings::{Fleet, FleetFile};
 use crate::controller::Controller;
 use crate::document::{parse_toml, read_text, sha256_hex};
 use crate::gate::Gate;

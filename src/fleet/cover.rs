@@ -94,7 +94,8 @@ impl Coverage {
         for (set, n) in self.rows.iter().filter(|(set, _)| !tables.iter().any(|&t| Self::has(set, t))) {
             (0..self.candidates).filter(|&i| Self::has(set, i)).for_each(|i| gain[i] += n);
         }
-        let best = (0..self.candidates).filter(|i| !tables.contains(i)).max_by(|&a, &b| gain[a].cmp(&gain[b]).then(b.cmp(&a)));
+        let best =
+            (0..self.candidates).filter(|i| !tables.contains(i)).max_by(|&a, &b| gain[a].cmp(&gain[b]).then(b.cmp(&a)));
         tables.extend(best);
     }
 
@@ -219,7 +220,8 @@ impl Branch<'_> {
             return false;
         }
         let rows = &self.coverage.rows;
-        let gain = |i: usize| -> usize { left.iter().filter(|&&r| Coverage::has(&rows[r].0, i)).map(|&r| rows[r].1).sum() };
+        let gain =
+            |i: usize| -> usize { left.iter().filter(|&&r| Coverage::has(&rows[r].0, i)).map(|&r| rows[r].1).sum() };
         let mut gains: Vec<usize> = self.order[from..].iter().map(|&i| gain(i)).collect();
         let first = gains[0];
         gains.sort_unstable_by(|a, b| b.cmp(a));

@@ -31,6 +31,9 @@ pub enum FleetError {
     TwinHere { file: PathBuf },
     #[error("{}: this program was built without Parquet; build it with --features parquet, or give a CSV table", file.display())]
     NoParquet { file: PathBuf },
+    #[cfg(feature = "parquet")]
+    #[error("{}: {source}", file.display())]
+    Parquet { file: PathBuf, source: ::parquet::errors::ParquetError },
     #[error(transparent)]
     Spec(#[from] SpecError),
     #[error(transparent)]
@@ -47,9 +50,11 @@ pub enum FleetError {
     Schema { file: PathBuf, found: i64, expected: i64 },
     #[error("{}: the store is full ({action}): nothing is lost, free space and run again", file.display())]
     Full { file: PathBuf, action: &'static str },
-    #[error("{}: the lock file cannot be {action}: {source}", file.display())]
+    #[error("{}: the file cannot be {action}: {source}", file.display())]
     Lock { file: PathBuf, action: &'static str, source: std::io::Error },
-    #[error("run {run}: what stands in the store was made from {key} {stored}, now it is {found}; give the run another name")]
+    #[error(
+        "run {run}: what stands in the store was made from {key} {stored}, now it is {found}; give the run another name"
+    )]
     OtherInputs { run: String, key: &'static str, stored: String, found: String },
     #[error("no run `{run}` in the store; found {found}")]
     NoRun { run: String, found: String },

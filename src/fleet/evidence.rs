@@ -110,7 +110,8 @@ impl Evidence {
                 case = Frf::new(frf.w_rad_s().to_vec(), value, frf.relative_std().map(<[f64]>::to_vec))?;
                 model = draw.clone();
             }
-            let words = [to_c.map(|c| format!("at {c} deg C")), draw.map(|_| format!("model draw {}", i % drawn.len() + 1))];
+            let words =
+                [to_c.map(|c| format!("at {c} deg C")), draw.map(|_| format!("model draw {}", i % drawn.len() + 1))];
             let name = words.into_iter().flatten().collect::<Vec<_>>().join(", ");
             cases.push(Case { name, frf: shift.of_frf(&case, model.delay_s)?, plant: shift.of_plant(&model) });
         }

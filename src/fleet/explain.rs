@@ -189,7 +189,8 @@ impl Changed<'_> {
 
 /// Explains an untunable slot.
 pub(super) fn explain(context: &Context, slot: &Prepared, row: &SlotRow) -> Explained {
-    let mut found = Explained { slot: row.id(), table: None, nearest: row.nearest.clone(), cause: None, remedies: Vec::new() };
+    let mut found =
+        Explained { slot: row.id(), table: None, nearest: row.nearest.clone(), cause: None, remedies: Vec::new() };
     if let Ok(table) = search(context, &slot.evidence) {
         if table.proved.passes {
             found.table = Some(table);
@@ -259,7 +260,9 @@ fn cause(context: &Context, slot: &Prepared, nearest: &OwnTable) -> Cause {
     let delay = slot.plant.delay_s * w;
     let all: f64 = slot.plant.modes.iter().map(|m| weight(m, w)).sum::<f64>() + delay;
     match guilty(&slot.plant, Some(hz)) {
-        Some(m) if weight(&m, w) >= delay => Cause::Mode { hz: m.pole_rad_s / TAU, share: weight(&m, w) / all.max(1e-9) },
+        Some(m) if weight(&m, w) >= delay => {
+            Cause::Mode { hz: m.pole_rad_s / TAU, share: weight(&m, w) / all.max(1e-9) }
+        }
         _ => Cause::Delay { phase_deg: delay.to_degrees() },
     }
 }

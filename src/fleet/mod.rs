@@ -15,6 +15,8 @@ mod evidence;
 mod explain;
 mod library;
 mod output;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod pilot;
 mod prove;
 mod ready;

@@ -75,8 +75,8 @@ fn figures(s: Option<&Summary>) -> [String; 5] {
     ]
 }
 
-/// The row of slots.csv.
-fn csv_row(r: &SlotRow, shared: Option<String>) -> String {
+/// The row of slots.csv, field by field.
+fn fields(r: &SlotRow, shared: Option<String>) -> Vec<String> {
     let (gate, model) = (r.gate.as_ref(), r.model.as_ref());
     let (before, table) = (r.current.as_ref(), r.table.as_ref().or(r.nearest.as_ref()));
     let after = table.map(|t| &t.proved);
@@ -106,13 +106,36 @@ fn csv_row(r: &SlotRow, shared: Option<String>) -> String {
     f.extend([gains.map(|g| g.pid.kp), gains.map(|g| g.pid.ki_per_s), gains.map(|g| g.pid.kd_s)].map(number));
     f.push(number(gains.and_then(|g| g.lowpass.first()).map(|l| l.frequency_hz)));
     let notch = gains.and_then(|g| g.notch.first());
-    f.extend([notch.map(|n| n.frequency_hz), notch.map(|n| n.zero_damping_ratio), notch.map(|n| n.pole_damping_ratio)].map(number));
+    f.extend(
+        [notch.map(|n| n.frequency_hz), notch.map(|n| n.zero_damping_ratio), notch.map(|n| n.pole_damping_ratio)]
+            .map(number),
+    );
     f.push(shared.unwrap_or_default());
     f.push(r.error.clone().unwrap_or_default());
     f.push(gate.map(|g| g.why.clone()).unwrap_or_default());
     f.push(r.digest.clone());
-    f.iter().map(|x| csv_field(x)).collect::<Vec<_>>().join(",")
+    f
 }
+
+/// Columns of slots.csv that hold words; all others hold numbers.
+#[cfg(feature = "parquet")]
+const WORDS: [&str; 15] = [
+    "tester",
+    "slot",
+    "verdict",
+    "class",
+    "action",
+    "before_passes",
+    "before_limit",
+    "before_case",
+    "after_limit",
+    "after_case",
+    "way",
+    "shared_table",
+    "error",
+    "why",
+    "digest",
+];
 
 /// The gain table of a tuned slot as a document.
 pub fn gain_table(context: &Context, row: &SlotRow) -> Result<Option<GainTable>, FleetError> {
@@ -149,18 +172,33 @@ pub struct Asked {
 }
 
 /// Writes the tables of a run: slots, shared tables, coverage, work list, drift.
-pub fn write_tables(store: &Store, run: &str, context: &Context, out: &Path, asked: &Asked) -> Result<Vec<PathBuf>, FleetError> {
+pub fn write_tables(
+    store: &Store,
+    run: &str,
+    context: &Context,
+    out: &Path,
+    asked: &Asked,
+) -> Result<Vec<PathBuf>, FleetError> {
     let (library, shared) = (store.library(run)?.unwrap_or_default(), store.shared(run)?.unwrap_or_default());
     let chosen: Vec<usize> = shared.tables.iter().map(|t| t.candidate).collect();
     let name = |candidate: usize| chosen.iter().position(|c| *c == candidate).map(|i| format!("K{:02}", i + 1));
     let mut csv = WholeFile::begin(&out.join("slots.csv"))?;
     let mut lines = WholeFile::begin(&out.join("slots.jsonl"))?;
     csv.line(COLUMNS)?;
+    #[cfg(feature = "parquet")]
+    let mut parquet = {
+        let columns: Vec<(&str, bool)> = COLUMNS.split(',').map(|c| (c, !WORDS.contains(&c))).collect();
+        super::parquet::ParquetTable::begin(&out.join("slots.parquet"), &columns)?
+    };
     store.each_row(run, None, |row| {
         let table = row.verdict.served().then(|| assigned(&row, &chosen)).flatten();
-        csv.line(&csv_row(&row, table.and_then(name)))?;
+        let fields = fields(&row, table.and_then(name));
+        csv.line(&fields.iter().map(|x| csv_field(x)).collect::<Vec<_>>().join(","))?;
+        #[cfg(feature = "parquet")]
+        parquet.row(fields)?;
         lines.line(&json(&row)?)?;
-        if asked.gains && row.verdict == Verdict::Tuned
+        if asked.gains
+            && row.verdict == Verdict::Tuned
             && let Some(table) = gain_table(context, &row)?
         {
             table.write(&out.join("gains").join(&row.tester).join(&row.slot).join("gains.toml"))?;
@@ -168,6 +206,8 @@ pub fn write_tables(store: &Store, run: &str, context: &Context, out: &Path, ask
         Ok(())
     })?;
     let mut files = vec![csv.end()?, lines.end()?];
+    #[cfg(feature = "parquet")]
+    files.push(parquet.end()?);
     let mut text = |name: &str, text: &str| -> Result<(), FleetError> {
         crate::document::write_text(&out.join(name), text)?;
         files.push(out.join(name));
@@ -177,7 +217,8 @@ pub fn write_tables(store: &Store, run: &str, context: &Context, out: &Path, ask
     for c in &shared.curve {
         let share = c.served as f64 / shared.slots.max(1) as f64;
         let names: Vec<&str> = c.tables.iter().map(|&t| library.tables[t].origin.as_str()).collect();
-        coverage += &format!("{},{},{share},{},{}\n", c.tables.len(), c.served, c.at_most, csv_field(&names.join("; ")));
+        coverage +=
+            &format!("{},{},{share},{},{}\n", c.tables.len(), c.served, c.at_most, csv_field(&names.join("; ")));
     }
     text("coverage.csv", &coverage)?;
     for &c in &chosen {

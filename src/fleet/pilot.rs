@@ -61,7 +61,9 @@ pub fn library(context: &Context, source: &dyn SlotSource, found: &[(usize, Pilo
         served.par_iter().filter_map(|(i, _)| Prepared::of(context, &neighbours, source, *i)).collect();
     let own: Vec<Candidate> = served
         .iter()
-        .filter_map(|(_, p)| Some(Candidate { gains: p.table.as_ref()?.gains.clone(), origin: format!("pilot {}", p.id) }))
+        .filter_map(|(_, p)| {
+            Some(Candidate { gains: p.table.as_ref()?.gains.clone(), origin: format!("pilot {}", p.id) })
+        })
         .collect();
     let mut tables = vec![Candidate { gains: context.base.clone(), origin: "today".into() }];
     let looks: Vec<Vec<f64>> = pilots.iter().map(|p| looks(&p.plant)).collect();

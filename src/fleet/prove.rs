@@ -36,35 +36,35 @@ pub const UNSTABLE: f64 = 1e3;
 pub fn prove(ready: &mut Ready<'_>, controller: &Controller) -> Result<Proved, TuneError> {
     let spec = ready.spec;
     let sections = controller.sections()?;
-    let quick = if ready.fits(controller) { Some(ready.writes(controller)) } else { None };
+    // What the bench knows of the write; none where it saw an unstable case, whose write means nothing.
+    let writes = if ready.fits(controller) { Some(ready.writes(controller)) } else { None };
+    let unstable = matches!(writes, Some(None));
     let wanted = Requirement::list(&spec.margins, &spec.limits);
-    let mut worst: Option<(f64, What, Option<f64>, usize)> = None;
-    let mut figures = None;
-    for (i, machine) in ready.evidence.machines().iter().enumerate() {
-        let proof = match (&quick, machine) {
+    let machines = ready.evidence.machines();
+    let judged = |i: usize| -> Result<Proof, TuneError> {
+        match (&writes, &machines[i]) {
             (Some(writes), Machine::Response { frf, hold, .. }) => {
                 let found = writes.as_ref().map(|w| w[i].clone()).unwrap_or_default();
-                measured(&MeasuredLoop::new(frf, &sections, *hold == Hold::Included)?, found, &wanted)
+                Ok(measured(&MeasuredLoop::new(frf, &sections, *hold == Hold::Included)?, found, &wanted))
             }
-            _ => judge(machine, controller, spec)?,
-        };
-        let (violation, limit, at_hz) = nearest(&proof, spec);
-        if worst.as_ref().is_none_or(|w| violation > w.0) {
-            worst = Some((violation, limit, at_hz, i));
+            _ => judge(&machines[i], controller, spec),
         }
-        figures.get_or_insert_with(|| figures_of(&proof));
-        if matches!(&quick, Some(None)) && violation < UNSTABLE {
-            // The grid saw an unstable case; the exact judgement of the others has no write to go by.
-            worst = worst.filter(|w| w.0 >= UNSTABLE).or(Some((UNSTABLE, What::GainMargin, None, i)));
+    };
+    let first = judged(0)?;
+    let figures = figures_of(&first);
+    let (mut worst, mut limit, mut at_hz) = nearest(&first, spec);
+    let mut case = 0;
+    for i in 1..machines.len() {
+        let found = nearest(&judged(i)?, spec);
+        if found.0 > worst {
+            ((worst, limit, at_hz), case) = (found, i);
         }
     }
-    let (worst, limit, at_hz, case) = worst.unwrap_or((UNSTABLE, What::GainMargin, None, 0));
+    if unstable && worst < UNSTABLE {
+        (worst, limit) = (UNSTABLE, What::GainMargin);
+    }
     let case = ready.evidence.case(case).to_owned();
-    let figures = match figures {
-        Some(f) => f,
-        None => figures_of(&judge(&ready.evidence.machines()[0], controller, spec)?),
-    };
-    Ok(Proved { passes: worst <= 0.0, figures, worst, limit, case, at_hz })
+    Ok(Proved { passes: worst <= 0.0, figures, worst, limit, case, at_hz: at_hz.filter(|hz| hz.is_finite()) })
 }
 
 /// The judgement of a measured loop whose write is known.

@@ -168,7 +168,9 @@ impl Store {
                     };
                     let before = last(c, slot)?;
                     // Gains are recorded where they are not those that the chain says are there.
-                    if before.as_ref().is_none_or(|b| b.sha256 != found.1 && matches!(b.action.as_str(), "found" | "apply" | "rollback")) {
+                    if before.as_ref().is_none_or(|b| {
+                        b.sha256 != found.1 && matches!(b.action.as_str(), "found" | "apply" | "rollback")
+                    }) {
                         one(Action::Found, found, "in the slot when the run began")?;
                     }
                     if let Some(own) = own {

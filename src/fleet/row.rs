@@ -27,14 +27,8 @@ pub enum Verdict {
 
 impl Verdict {
     /// All, best first.
-    pub const ALL: [Verdict; 6] = [
-        Verdict::Keeps,
-        Verdict::Tuned,
-        Verdict::Untunable,
-        Verdict::Repair,
-        Verdict::Inspect,
-        Verdict::Failed,
-    ];
+    pub const ALL: [Verdict; 6] =
+        [Verdict::Keeps, Verdict::Tuned, Verdict::Untunable, Verdict::Repair, Verdict::Inspect, Verdict::Failed];
 
     /// In one word, as in the tables.
     pub fn word(self) -> &'static str {
@@ -98,8 +92,8 @@ pub struct OwnTable {
 pub struct Serves {
     /// Which.
     pub candidate: usize,
-    /// Largest miss, negative: the room to the nearest limit as a share of it.
-    pub worst: f64,
+    /// Room to the nearest limit in the worst case, as a share of it.
+    pub room: f64,
     /// Sum of both DFT norms as measured (position_unit).
     pub dft: f64,
 }

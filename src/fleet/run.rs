@@ -79,7 +79,7 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Chunks on their way to the writer.
 const UNDERWAY: usize = 2;
 
-/// Works on a run until every slot is done; gives the run's name.
+/// Works on a run until every slot is done; gives the run's name. Whoever has written its files says so with [`Store::finish`].
 pub fn run(job: &Job<'_>, watch: &dyn Watch) -> Result<String, FleetError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(job.effort.threads).build();
     let pool = pool.map_err(|source| FleetError::Threads { source })?;
@@ -87,25 +87,15 @@ pub fn run(job: &Job<'_>, watch: &dyn Watch) -> Result<String, FleetError> {
     let run = store.begin(job.run, &job.context.digest, job.source.count(), &job.stamp)?.run;
     let library = library(job, &mut store, &run, &pool, watch)?;
     slots(job, &mut store, &run, &library, &pool, watch)?;
-    alone(job, &mut store, &run, "conclude", |store| conclude(job, store, &run, &library, &pool, watch))?;
-    Ok(run)
-}
-
-/// Does what one process must do alone, or waits until another one has done it.
-fn alone(
-    job: &Job<'_>,
-    store: &mut Store,
-    run: &str,
-    task: &str,
-    mut work: impl FnMut(&mut Store) -> Result<(), FleetError>,
-) -> Result<(), FleetError> {
-    while store.run(run)?.finished.is_none() {
-        if store.claim(run, task, job.worker)? {
-            return work(store);
+    // One process concludes, the others wait for it.
+    while store.shared(&run)?.is_none() {
+        if store.claim(&run, "conclude", job.worker)? {
+            conclude(job, &mut store, &run, &library, &pool, watch)?;
+        } else {
+            std::thread::sleep(PAUSE);
         }
-        std::thread::sleep(PAUSE);
     }
-    Ok(())
+    Ok(run)
 }
 
 /// What comes after the last slot: explanations, shared tables, proposals.
@@ -120,10 +110,10 @@ fn conclude(
     explanations(job, store, run, library, pool, watch)?;
     watch.step(Stage::Share, 0, 1);
     let shared = share(job.context, store, run, library)?;
-    store.keep_part(run, Part::Shared, &shared)?;
     let begun = store.run(run)?;
     store.propose(job.context, &begun)?;
-    store.finish(run, &job.stamp)?;
+    // Last: that they are there says that all is done.
+    store.keep_part(run, Part::Shared, &shared)?;
     watch.step(Stage::Share, 1, 1);
     Ok(())
 }

@@ -83,7 +83,7 @@ pub struct Robust {
 
 impl Default for Robust {
     fn default() -> Self {
-        Robust { draws: 4, seed: 1, guard: 0.01 }
+        Robust { draws: 2, seed: 1, guard: 0.01 }
     }
 }
 
@@ -105,13 +105,7 @@ pub struct Temperature {
 
 impl Default for Temperature {
     fn default() -> Self {
-        Temperature {
-            cases_c: Vec::new(),
-            measured_c: 24.0,
-            gain_per_c: 0.0,
-            frequency_per_c: 0.0,
-            delay_per_c: 0.0,
-        }
+        Temperature { cases_c: Vec::new(), measured_c: 24.0, gain_per_c: 0.0, frequency_per_c: 0.0, delay_per_c: 0.0 }
     }
 }
 
@@ -174,7 +168,10 @@ impl Fleet {
         let mut file: FleetFile = parse_toml(path, text)?;
         let base = path.parent().unwrap_or(Path::new("."));
         let place = |p: &mut PathBuf| *p = base.join(&*p);
-        [&mut file.input.tree, &mut file.input.table, &mut file.gate, &mut file.store].into_iter().flatten().for_each(place);
+        [&mut file.input.tree, &mut file.input.table, &mut file.gate, &mut file.store]
+            .into_iter()
+            .flatten()
+            .for_each(place);
         [&mut file.spec, &mut file.controller].into_iter().for_each(place);
         file.check(path)?;
         Ok(Fleet { file, sha256: sha256_hex(text.as_bytes()) })

@@ -34,6 +34,8 @@ pub(super) enum SlotError {
 
 /// Candidates whose exact judgement is asked for although the grid's figure misses by this share: the grid is that close to it.
 const NEAR_MISS: f64 = 0.004;
+/// Least guard at which a candidate inside the guarded limits needs no exact judgement.
+const CLEAR_GUARD: f64 = 0.005;
 /// Candidates that a slot's own table is polished from at most, and steps of a polish.
 const POLISHED: usize = 2;
 const POLISH_STEPS: usize = 12;
@@ -41,7 +43,14 @@ const POLISH_STEPS: usize = 12;
 const FIRST_RESONANCE_HZ: [f64; 2] = [500.0, 3000.0];
 
 /// Works on one slot.
-pub fn work(context: &Context, library: &Library, plants: &[Plant], index: usize, name: SlotName, loaded: Loaded) -> SlotRow {
+pub fn work(
+    context: &Context,
+    library: &Library,
+    plants: &[Plant],
+    index: usize,
+    name: SlotName,
+    loaded: Loaded,
+) -> SlotRow {
     let mut row = SlotRow {
         index,
         tester: name.tester,
@@ -62,12 +71,32 @@ pub fn work(context: &Context, library: &Library, plants: &[Plant], index: usize
         fill(context, library, plants, &loaded.machine, &loaded.problems, &mut row).map_err(|e| e.to_string())
     }));
     // Not even a fault of this program in one slot may stop the others.
-    let filled = filled.unwrap_or_else(|_| Err("this program failed on the slot; please report it with its files".into()));
+    let filled =
+        filled.unwrap_or_else(|_| Err("this program failed on the slot; please report it with its files".into()));
     if let Err(words) = filled {
         row.verdict = Verdict::Failed;
         row.error = Some(words);
     }
+    if !comes_back(&row) {
+        row = SlotRow {
+            verdict: Verdict::Failed,
+            error: Some("a figure of this slot is not finite: look at its response".into()),
+            gate: None,
+            model: None,
+            own_gains: None,
+            current: None,
+            table: None,
+            nearest: None,
+            serves: Vec::new(),
+            ..row
+        };
+    }
     row
+}
+
+/// Whether the row can be read again: JSON has no number that is not finite.
+fn comes_back(row: &SlotRow) -> bool {
+    serde_json::to_string(row).is_ok_and(|text| serde_json::from_str::<SlotRow>(&text).is_ok())
 }
 
 fn fill(
@@ -130,12 +159,8 @@ fn gated(gate: &Gate, machine: &RawMachine) -> Result<(GateRow, Action), GateErr
     table.complete(needed);
     let table = Table::parse(Path::new("features of the slot"), &table.csv(), Some(&gate.label))?;
     let v = gate.classify(&table)?.swap_remove(0);
-    let row = GateRow {
-        class: v.class_name,
-        probability: v.probability,
-        action: v.action.word().to_owned(),
-        why: v.why,
-    };
+    let row =
+        GateRow { class: v.class_name, probability: v.probability, action: v.action.word().to_owned(), why: v.why };
     Ok((row, v.action))
 }
 
@@ -203,22 +228,35 @@ pub(super) fn model_row(plant: &Plant, rms_relative_error: f64, near: bool) -> M
     }
 }
 
-/// What every candidate scores, and those that are proven: the grid sorts out, the exact judgement decides.
-fn covered(context: &Context, library: &Library, ready: &mut Ready<'_>) -> Result<(Vec<Quick>, Vec<Serves>), TuneError> {
-    // The grid's violation is that of a guarded limit: the guard itself is no miss.
-    let miss = 1.1 * context.file.robust.guard + NEAR_MISS;
-    let quick: Vec<Quick> = library.tables.iter().map(|t| ready.quick(&t.gains)).collect();
+/// What every candidate scores, and those that serve.
+///
+/// A candidate that the grid sees inside the guarded limits keeps the guard to the limits themselves, many times what the grid can be wrong by
+/// (`specs/fleet.md`, "Proof"); closer to a limit the exact judgement decides.
+fn covered(
+    context: &Context,
+    library: &Library,
+    ready: &mut Ready<'_>,
+) -> Result<(Vec<Quick>, Vec<Serves>), TuneError> {
+    let guard = context.file.robust.guard;
     let mut serves = Vec::new();
-    for (candidate, (q, t)) in quick.iter().zip(&library.tables).enumerate() {
+    let mut all = Vec::with_capacity(library.tables.len());
+    for (candidate, t) in library.tables.iter().enumerate() {
+        let q = ready.quick(&t.gains);
+        let dft = ready.dft();
+        all.push(q);
         // Today's table may lie outside the bounds, where the grid has not looked.
-        if q.violation <= miss || candidate == 0 {
+        let clear = candidate > 0 && guard >= CLEAR_GUARD && q.violation <= 0.0;
+        if clear {
+            serves.push(Serves { candidate, room: guard - q.violation, dft });
+        } else if candidate == 0 || q.violation <= 1.1 * guard + NEAR_MISS {
             let p = prove(ready, &t.gains)?;
             if p.passes {
-                serves.push(Serves { candidate, worst: p.worst, dft: p.figures.dft_low + p.figures.dft_high });
+                let dft = p.figures.dft_low + p.figures.dft_high;
+                serves.push(Serves { candidate, room: -p.worst, dft });
             }
         }
     }
-    Ok((quick, serves))
+    Ok((all, serves))
 }
 
 /// A table of the slot's own: polished from the best candidates; else the best candidate that is proven. Where none is, the nearest.

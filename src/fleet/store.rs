@@ -102,10 +102,8 @@ impl Store {
         f: impl FnOnce(&Connection) -> Result<T, rusqlite::Error>,
     ) -> Result<T, FleetError> {
         let fail = |source| failure(&self.file, action, source);
-        let transaction = self
-            .connection
-            .transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)
-            .map_err(fail)?;
+        let transaction =
+            self.connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate).map_err(fail)?;
         let value = f(&transaction).map_err(fail)?;
         transaction.commit().map_err(fail)?;
         Ok(value)

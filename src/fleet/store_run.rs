@@ -130,7 +130,9 @@ impl Store {
             c.execute(query, params![name, config, slots as i64, stamp.at, stamp.who])?;
             c.query_row(&format!("{RUN} WHERE run = ?1"), [&name], run_of)
         })?;
-        let other = |key, stored: String, found: String| Err(FleetError::OtherInputs { run: run.run.clone(), key, stored, found });
+        let other = |key, stored: String, found: String| {
+            Err(FleetError::OtherInputs { run: run.run.clone(), key, stored, found })
+        };
         if run.config != config {
             return other("settings", run.config.clone(), config.to_owned());
         }
@@ -194,19 +196,34 @@ impl Store {
     }
 
     /// Adds explanations, and the rows of slots that the full search has served after all.
-    pub(super) fn add_explained(&mut self, run: &str, found: &[(usize, Explained)], served: &[SlotRow]) -> Result<(), FleetError> {
+    pub(super) fn add_explained(
+        &mut self,
+        run: &str,
+        found: &[(usize, Explained)],
+        served: &[SlotRow],
+    ) -> Result<(), FleetError> {
         let texts = found.iter().map(|(p, f)| Ok((*p as i64, json(f)?))).collect::<Result<Vec<_>, FleetError>>()?;
-        let rows = served.iter().map(|r| Ok((r.index as i64, r.verdict.word(), json(r)?))).collect::<Result<Vec<_>, FleetError>>()?;
+        let rows = served
+            .iter()
+            .map(|r| Ok((r.index as i64, r.verdict.word(), json(r)?)))
+            .collect::<Result<Vec<_>, FleetError>>()?;
         self.write("add explanations", |c| {
-            let mut insert = c.prepare_cached("INSERT OR IGNORE INTO explained (run, place, found) VALUES (?1, ?2, ?3)")?;
+            let mut insert =
+                c.prepare_cached("INSERT OR IGNORE INTO explained (run, place, found) VALUES (?1, ?2, ?3)")?;
             texts.iter().try_for_each(|(p, text)| insert.execute(params![run, p, text]).map(|_| ()))?;
-            let mut update = c.prepare_cached("UPDATE slots SET verdict = ?3, row = ?4 WHERE run = ?1 AND place = ?2")?;
+            let mut update =
+                c.prepare_cached("UPDATE slots SET verdict = ?3, row = ?4 WHERE run = ?1 AND place = ?2")?;
             rows.iter().try_for_each(|(p, verdict, row)| update.execute(params![run, p, verdict, row]).map(|_| ()))
         })
     }
 
     /// Adds to a table of places; what is there stays.
-    pub(super) fn add_places<T: Serialize>(&mut self, run: &str, places: Places, found: &[(usize, T)]) -> Result<(), FleetError> {
+    pub(super) fn add_places<T: Serialize>(
+        &mut self,
+        run: &str,
+        places: Places,
+        found: &[(usize, T)],
+    ) -> Result<(), FleetError> {
         let texts = found.iter().map(|(p, f)| Ok((*p as i64, json(f)?))).collect::<Result<Vec<_>, FleetError>>()?;
         let query = format!("INSERT OR IGNORE INTO {} (run, place, found) VALUES (?1, ?2, ?3)", places.table());
         self.write("add to a run", |c| {
@@ -219,7 +236,8 @@ impl Store {
     pub fn add_rows(&mut self, run: &str, rows: &[SlotRow]) -> Result<(), FleetError> {
         let texts = rows.iter().map(json).collect::<Result<Vec<_>, FleetError>>()?;
         self.write("add slots", |c| {
-            let query = "INSERT OR IGNORE INTO slots (run, place, slot, digest, verdict, row) VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
+            let query =
+                "INSERT OR IGNORE INTO slots (run, place, slot, digest, verdict, row) VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
             let mut insert = c.prepare_cached(query)?;
             for (row, text) in rows.iter().zip(&texts) {
                 insert.execute(params![run, row.index as i64, row.id(), row.digest, row.verdict.word(), text])?;
@@ -266,11 +284,8 @@ impl Store {
     /// The row of a slot in a run.
     pub fn row(&self, run: &str, slot: &str) -> Result<Option<SlotRow>, FleetError> {
         let query = "SELECT row FROM slots WHERE slot = ?1 AND run = ?2";
-        let text: Option<String> = self
-            .connection
-            .query_row(query, [slot, run], |r| r.get(0))
-            .optional()
-            .map_err(self.fail("find a slot"))?;
+        let text: Option<String> =
+            self.connection.query_row(query, [slot, run], |r| r.get(0)).optional().map_err(self.fail("find a slot"))?;
         text.map(|t| of_json(&t)).transpose()
     }
 }

@@ -3,8 +3,8 @@
 //! In: columns `tester`, `slot`, `response`, `pes`, and where there are any `log`, `controller`, `temperature_c`. Out: a [`FileSource`].
 //! Paths are relative to the table's folder; an empty field is absent. A Parquet table has the same columns.
 
-use super::source::{FileSource, SlotFiles, SlotName};
 use super::FleetError;
+use super::source::{FileSource, SlotFiles, SlotName};
 use crate::document::read_text;
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -38,10 +38,15 @@ pub fn work_list(store: &Store, run: &str) -> Result<Vec<WorkItem>, FleetError> 
             Verdict::Tuned => good.extend(row.table.as_ref().map(|t| dft(&t.proved))),
             Verdict::Repair => {
                 let gate = row.gate.as_ref();
-                let word = gate.map_or("repair", |g| if g.action == "repair_sensor" { "repair the encoder sensor" } else { "repair the pushpin" });
+                let word = gate.map_or("repair", |g| {
+                    if g.action == "repair_sensor" { "repair the encoder sensor" } else { "repair the pushpin" }
+                });
                 let why = gate.map_or(String::new(), |g| format!("{}, probability {:.3}", g.class, g.probability));
                 let dft_now = row.current.as_ref().map(dft);
-                items.push((WorkItem { slot: row.id(), work: word.into(), why, dft_now, dft_after: None, gain: 0.0 }, true));
+                items.push((
+                    WorkItem { slot: row.id(), work: word.into(), why, dft_now, dft_after: None, gain: 0.0 },
+                    true,
+                ));
             }
             Verdict::Untunable => items.push((untunable(&row, explained.get(&row.index)), false)),
             Verdict::Inspect | Verdict::Failed => {}

@@ -27,6 +27,8 @@ pub struct Near {
     spread: Spread,
 }
 
+/// Points on which neighbours are compared at most.
+const COMPARED: usize = 60;
 /// Steps of the fit before and after the noise is known, and the tolerance: a share of chi square far below its own scatter.
 const STEPS: usize = 12;
 const LAST_STEPS: usize = 8;
@@ -35,7 +37,11 @@ const TOLERANCE: f64 = 1e-4;
 const STRANGE: f64 = 1.6;
 
 /// The plant nearest to a neighbour's, `None` where the residual has structure that no neighbour explains.
-pub fn identify_near(frf: &Frf, neighbours: &[Plant], settings: &IdentifySettings) -> Result<Option<Near>, IdentifyError> {
+pub fn identify_near(
+    frf: &Frf,
+    neighbours: &[Plant],
+    settings: &IdentifySettings,
+) -> Result<Option<Near>, IdentifyError> {
     let sweep = Sweep::new(frf, settings)?;
     let n = sweep.len();
     let (low, high) = (sweep.w[0], sweep.w[n - 1]);
@@ -47,13 +53,14 @@ pub fn identify_near(frf: &Frf, neighbours: &[Plant], settings: &IdentifySetting
     };
     // Far off in gain alone is near: the level is taken out before neighbours are compared.
     let distance = |p: &Plant| -> f64 {
-        let ratio = sweep.w.iter().zip(&sweep.value).map(|(&w, v)| (v / p.at(w)).norm().ln());
-        let logs: Vec<f64> = ratio.collect();
-        let mean = logs.iter().sum::<f64>() / n as f64;
+        let some = sweep.w.iter().zip(&sweep.value).step_by(n.div_ceil(COMPARED));
+        let logs: Vec<f64> = some.map(|(&w, v)| (v / p.at(w)).norm().ln()).collect();
+        let mean = logs.iter().sum::<f64>() / logs.len() as f64;
         logs.iter().map(|l| (l - mean).powi(2)).sum()
     };
     let ranked = neighbours.iter().enumerate().map(|(i, p)| (distance(p), i));
-    let Some((_, neighbour)) = ranked.filter(|(d, _)| d.is_finite()).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+    let Some((_, neighbour)) =
+        ranked.filter(|(d, _)| d.is_finite()).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
     else {
         return Ok(None);
     };
@@ -76,7 +83,10 @@ pub fn identify_near(frf: &Frf, neighbours: &[Plant], settings: &IdentifySetting
     joint.refine(shape, &mut x, STEPS, TOLERANCE);
     if !known {
         joint.weight = local_noise(&joint.ratio(shape, &x)).iter().map(|s| 1.0 / s).collect();
-        joint.refine(shape, &mut x, LAST_STEPS, TOLERANCE);
+        // Even noise is one weight for all points, which moves nothing.
+        if joint.weight.iter().any(|w| *w != joint.weight[0]) {
+            joint.refine(shape, &mut x, LAST_STEPS, TOLERANCE);
+        }
     }
     let r = joint.linearise(shape, &x);
     let freedom = (2 * n - shape.parameters()) as f64;

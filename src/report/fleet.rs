@@ -156,7 +156,10 @@ fn floor(v: &FleetView) -> Vec<Block> {
     let testers = by_tester(v);
     let words: Vec<String> = v.verdicts.iter().map(|(w, _)| format!("{} {w}", letter(w))).collect();
     if testers.len() > MAPPED {
-        let text = format!("{} testers are too many for a map; the counts stand above, the slots in slots.csv.", testers.len());
+        let text = format!(
+            "{} testers are too many for a map; the counts stand above, the slots in slots.csv.",
+            testers.len()
+        );
         return vec![Block::Prose(text)];
     }
     let mut figures = Vec::new();
@@ -195,14 +198,16 @@ fn distributions(v: &FleetView) -> Result<Vec<Block>, ReportError> {
     let mut blocks = vec![Block::Prose(
         "Slots with a table of their own, or gains that are kept: as found in the slot and with the table, as measured.".into(),
     )];
-    let mut draw = |title: &str, quantity: (&str, &str), of: &dyn Fn(&SlotLine) -> [f64; 2]| -> Result<(), ReportError> {
-        let [before, after] = both(v, of);
-        if !before.is_empty() {
-            let groups = [Group { name: "as found", values: &before }, Group { name: "with its table", values: &after }];
-            blocks.push(Block::Figure(histogram(title, "Slots in each bin.", quantity, &groups, 40)?));
-        }
-        Ok(())
-    };
+    let mut draw =
+        |title: &str, quantity: (&str, &str), of: &dyn Fn(&SlotLine) -> [f64; 2]| -> Result<(), ReportError> {
+            let [before, after] = both(v, of);
+            if !before.is_empty() {
+                let groups =
+                    [Group { name: "as found", values: &before }, Group { name: "with its table", values: &after }];
+                blocks.push(Block::Figure(histogram(title, "Slots in each bin.", quantity, &groups, 40)?));
+            }
+            Ok(())
+        };
     draw("PES", ("DFT norms, low and high band together", &v.position_unit), &|s| s.dft)?;
     draw("Phase margin", ("Phase margin", "deg"), &|s| s.phase_margin_deg)?;
     draw("Gain margin", ("Gain margin", "dB"), &|s| s.gain_margin_db)?;
@@ -227,19 +232,18 @@ fn shared(v: &FleetView) -> Result<Vec<Block>, ReportError> {
             panels: vec![panel],
         }));
     }
-    let mut t = Table::new("Ways to serve the floor", vec![
-        Column::words("way"),
-        Column::numbers("slots served", "%", NumberFormat::Decimals(1)),
-    ]);
+    let mut t = Table::new(
+        "Ways to serve the floor",
+        vec![Column::words("way"), Column::numbers("slots served", "%", NumberFormat::Decimals(1))],
+    );
     for (way, share) in &v.ways {
         t.push(vec![way.as_str().into(), (100.0 * share).into()])?;
     }
     blocks.push(Block::Table(t));
-    let mut t = Table::new("The shared tables", vec![
-        Column::words("table"),
-        Column::words("from"),
-        Column::numbers("slots", "", NumberFormat::Decimals(0)),
-    ]);
+    let mut t = Table::new(
+        "The shared tables",
+        vec![Column::words("table"), Column::words("from"), Column::numbers("slots", "", NumberFormat::Decimals(0))],
+    );
     for (name, origin, slots) in &v.tables {
         t.push(vec![name.as_str().into(), origin.as_str().into(), (*slots as f64).into()])?;
     }
@@ -293,12 +297,15 @@ fn worst(v: &FleetView) -> Result<Table, ReportError> {
 }
 
 fn work(v: &FleetView) -> Result<Table, ReportError> {
-    let mut t = Table::new("What to do, by what it gains", vec![
-        Column::words("slot"),
-        Column::numbers("gain", &v.position_unit, NumberFormat::Significant(3)),
-        Column::words("work"),
-        Column::words("why"),
-    ]);
+    let mut t = Table::new(
+        "What to do, by what it gains",
+        vec![
+            Column::words("slot"),
+            Column::numbers("gain", &v.position_unit, NumberFormat::Significant(3)),
+            Column::words("work"),
+            Column::words("why"),
+        ],
+    );
     for (slot, gain, work, why) in v.work.iter().take(4 * WORST) {
         t.push(vec![slot.as_str().into(), (*gain).into(), work.as_str().into(), why.as_str().into()])?;
     }
@@ -307,16 +314,26 @@ fn work(v: &FleetView) -> Result<Table, ReportError> {
 
 fn drift(v: &FleetView) -> Result<Table, ReportError> {
     let number = |name: &str, unit: &str| Column::numbers(name, unit, NumberFormat::Significant(3));
-    let mut t = Table::new("Slots that lose their margins first at today's rate", vec![
-        Column::words("slot"),
-        number("gain a run", "%"),
-        number("room left", "%"),
-        number("runs left", ""),
-        number("earliest", ""),
-        number("latest", ""),
-    ]);
+    let mut t = Table::new(
+        "Slots that lose their margins first at today's rate",
+        vec![
+            Column::words("slot"),
+            number("gain a run", "%"),
+            number("room left", "%"),
+            number("runs left", ""),
+            number("earliest", ""),
+            number("latest", ""),
+        ],
+    );
     for (slot, gain, room, [low, likely, high]) in v.drift.iter().take(2 * WORST) {
-        t.push(vec![slot.as_str().into(), (*gain).into(), (*room).into(), (*likely).into(), (*low).into(), (*high).into()])?;
+        t.push(vec![
+            slot.as_str().into(),
+            (*gain).into(),
+            (*room).into(),
+            (*likely).into(),
+            (*low).into(),
+            (*high).into(),
+        ])?;
     }
     Ok(t)
 }
