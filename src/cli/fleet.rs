@@ -2,10 +2,10 @@
 
 use super::fleet_arguments::{FleetArguments, FleetCommand, FleetRunArguments};
 use super::fleet_progress::Progress;
-use super::{Ending, Failure, Screen, fleet_page, fleet_store};
+use super::{Ending, Failure, Screen, fleet_page, fleet_slot, fleet_store};
 use crate::document::write_text;
 use crate::fleet::{
-    self, Action, Asked, Context, Effort, FileSource, Fleet, Job, SlotSource, Stamp, Store, Verdict, Worker,
+    self, Action, Asked, Context, Effort, FileSource, Fleet, Job, SlotRow, SlotSource, Stamp, Store, Verdict, Worker,
     write_tables,
 };
 use crate::study::TwinSource;
@@ -122,6 +122,7 @@ fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failu
     let page = a.out.join("fleet.html");
     write_text(&page, &fleet_page::html(&store, &run, &context, &asked.before)?)?;
     files.push(page);
+    files.extend(slot_pages(&store, &run, &context, source.as_ref(), a, screen)?);
     store.finish(&run, &stamp(a.who.as_deref()))?;
     files.iter().for_each(|f| screen.say(&format!("wrote {}", f.display())));
     let files_seconds = begun.elapsed().as_secs_f64() - seconds;
@@ -147,6 +148,42 @@ fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failu
     };
     screen.result(&document, &text)?;
     Ok(if accepted { Ending::Accepted } else { Ending::Rejected })
+}
+
+/// Full reports of the slots whose limits are missed most, or nearest to it.
+fn slot_pages(
+    store: &Store,
+    run: &str,
+    context: &Context,
+    source: &dyn SlotSource,
+    a: &FleetRunArguments,
+    screen: &mut Screen,
+) -> Result<Vec<PathBuf>, Failure> {
+    let mut worst: Vec<(f64, SlotRow)> = Vec::new();
+    store.each_row(run, None, |row| {
+        let best = row.table.as_ref().or(row.nearest.as_ref()).map(|t| &t.proved).or(row.current.as_ref());
+        let Some(now) = best.map(|p| p.worst) else { return Ok(()) };
+        // Rows come in order: of equals the earlier stays.
+        if worst.len() < a.pages || worst.last().is_some_and(|w| now > w.0) {
+            let at = worst.partition_point(|w| w.0 >= now);
+            worst.insert(at, (now, row));
+            worst.truncate(a.pages);
+        }
+        Ok(())
+    })?;
+    let mut files = Vec::new();
+    for (_, row) in &worst {
+        let file = a.out.join("slots").join(format!("{}_{}.html", row.tester, row.slot));
+        match fleet_slot::html(context, source, row) {
+            Ok(Some(page)) => {
+                write_text(&file, &page)?;
+                files.push(file);
+            }
+            Ok(None) => {}
+            Err(e) => screen.say(&format!("note: no page of {}: {e}", row.id())),
+        }
+    }
+    Ok(files)
 }
 
 /// The shared tables in words.

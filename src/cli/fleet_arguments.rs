@@ -46,6 +46,9 @@ pub(super) struct FleetRunArguments {
     /// Threads [default: as many as the machine has]
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub threads: usize,
+    /// Full reports written, of the slots whose limits are missed most or nearest to it
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    pub pages: usize,
     /// Slots in one transaction
     #[arg(long, value_name = "N", default_value_t = 64)]
     pub chunk: usize,

@@ -15,6 +15,7 @@ mod fleet;
 mod fleet_arguments;
 mod fleet_page;
 mod fleet_progress;
+mod fleet_slot;
 mod fleet_store;
 mod fleet_study;
 mod fleet_twin;

@@ -41,7 +41,7 @@ pub use error::FleetError;
 pub use evidence::Evidence;
 pub use explain::{Cause, Change, Explained, Remedy};
 pub use library::{Candidate, Library};
-pub use output::{Asked, gain_table, write_tables};
+pub use output::{Asked, gain_table, gain_table_of, write_tables};
 pub use pilot::{Pilot, pilot, places};
 pub use prove::{Proved, UNSTABLE, prove};
 pub use ready::{Quick, Ready};

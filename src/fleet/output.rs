@@ -3,10 +3,12 @@
 //! In: a store and a run. Out: slots, shared tables, coverage, work list, drift, and a gain table for each tuned slot. The same run gives the same bytes.
 
 use super::drift::{SlotDrift, Trend};
+use super::prove::Proved;
 use super::row::{SlotRow, Verdict};
 use super::share::assigned;
 use super::store_run::json;
 use super::{Context, FleetError, Store};
+use crate::controller::Controller;
 use crate::document::DocumentError;
 use crate::gate::features::csv_field;
 use crate::tune::{GainTable, InputDigest, Provenance, Route, Summary};
@@ -139,7 +141,16 @@ const WORDS: [&str; 15] = [
 
 /// The gain table of a tuned slot as a document.
 pub fn gain_table(context: &Context, row: &SlotRow) -> Result<Option<GainTable>, FleetError> {
-    let Some(table) = &row.table else { return Ok(None) };
+    row.table.as_ref().map(|t| gain_table_of(context, row, &t.gains, &t.proved)).transpose()
+}
+
+/// Any gains in a slot as a document: before is what was found there.
+pub fn gain_table_of(
+    context: &Context,
+    row: &SlotRow,
+    gains: &Controller,
+    proved: &Proved,
+) -> Result<GainTable, FleetError> {
     let digest = |role: &str, sha256: &str| InputDigest { role: role.into(), sha256: sha256.into() };
     let mut inputs = vec![digest("slot", &row.digest)];
     inputs.extend(context.inputs.iter().filter(|(role, _)| *role != "spec").map(|(role, sha256)| digest(role, sha256)));
@@ -147,7 +158,7 @@ pub fn gain_table(context: &Context, row: &SlotRow) -> Result<Option<GainTable>,
     let provenance = Provenance {
         program: env!("CARGO_PKG_VERSION").into(),
         route: Route::Response,
-        feasible: table.proved.passes,
+        feasible: proved.passes,
         seed: context.spec.search.seed,
         evaluations: 0,
         spec_sha256: spec,
@@ -159,7 +170,7 @@ pub fn gain_table(context: &Context, row: &SlotRow) -> Result<Option<GainTable>,
         inputs,
     };
     let before = row.current.as_ref().map(|p| p.figures.clone());
-    Ok(Some(GainTable::new(&table.gains, before, table.proved.figures.clone(), provenance)?))
+    Ok(GainTable::new(gains, before, proved.figures.clone(), provenance)?)
 }
 
 /// What is written of a run.
