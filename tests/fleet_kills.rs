@@ -11,7 +11,7 @@ const KILLS: u64 = 4;
 
 fn run(fleet: &Path, out: &Path) -> Command {
     let mut c = Command::new(env!("CARGO_BIN_EXE_servotune"));
-    c.args(["fleet", "run"]).arg(fleet).arg("--out").arg(out).args(["--run", "one", "--chunk", "1"]);
+    c.args(["fleet", "run"]).arg(fleet).arg("--out").arg(out).args(["--run", "one", "--chunk", "1", "--pages", "0"]);
     c.stdout(Stdio::null()).stderr(Stdio::null());
     c
 }

@@ -288,10 +288,12 @@ pub(super) fn kills(out: &Path, kills: usize, screen: &mut Screen) -> Result<Vec
         let mut most = 0usize;
         loop {
             let fail = |source| Failure::Child { what: "start a run".into(), source };
-            let mut child = program(&["fleet", "run", &words[0], "--out", &words[1], "--chunk", "2", "--run", "one"])?
-                .stdout(Stdio::null())
-                .spawn()
-                .map_err(fail)?;
+            let mut child = program(&[
+                "fleet", "run", &words[0], "--out", &words[1], "--chunk", "2", "--run", "one", "--pages", "0",
+            ])?
+            .stdout(Stdio::null())
+            .spawn()
+            .map_err(fail)?;
             let wait = Duration::from_secs_f64(random.between(0.0, 0.6 * whole));
             let begun = Instant::now();
             let ended = loop {

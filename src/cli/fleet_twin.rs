@@ -63,7 +63,7 @@ fn document(input: &str) -> String {
          [input]\n{input}\n\n[robust]\ndraws = 2\nguard = 0.01\n\n\
          # The hall's range, and what a degree does to torque constant and frequencies.\n\
          [temperature]\ncases_c = [18.0, 30.0]\ngain_per_c = {GAIN_PER_C:e}\nfrequency_per_c = {FREQUENCY_PER_C:e}\n\n\
-         [tables]\npilots = 32\nmost = 16\ncoverage = 0.99\n"
+         [tables]\npilots = 32\nmost = 16\ncoverage = 0.99\n\n[untunable]\nexplained = 40\n"
     )
 }
 

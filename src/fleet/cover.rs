@@ -29,8 +29,8 @@ pub struct Choice {
     pub at_most: usize,
 }
 
-/// Nodes that branch and bound may visit for one K; beyond, the bound stays open and says so by its distance.
-const NODES: usize = 200_000;
+/// Rows that branch and bound may look at for one K, half a second's worth; beyond, the bound stays open and says so by its distance.
+const LOOKS: usize = 200_000_000;
 /// Steps of the Lagrangean bound.
 const STEPS: usize = 200;
 
@@ -161,7 +161,7 @@ impl Coverage {
         let mut order: Vec<usize> = (0..self.candidates).collect();
         let alone: Vec<usize> = order.iter().map(|&i| self.served(&[i])).collect();
         order.sort_by(|&a, &b| alone[b].cmp(&alone[a]).then(a.cmp(&b)));
-        let mut search = Branch { coverage: self, order, best: served, found: None, nodes: 0 };
+        let mut search = Branch { coverage: self, order, best: served, found: None, looks: 0 };
         let left: Vec<usize> = (0..self.rows.len()).collect();
         let exact = search.visit(0, k, 0, &left, &mut Vec::new());
         Some((search.found, exact))
@@ -201,11 +201,11 @@ struct Branch<'a> {
     order: Vec<usize>,
     best: usize,
     found: Option<Vec<usize>>,
-    nodes: usize,
+    looks: usize,
 }
 
 impl Branch<'_> {
-    /// Chooses `k` more among `order[from..]`; false where the nodes ran out.
+    /// Chooses `k` more among `order[from..]`; false where the looks ran out.
     fn visit(&mut self, from: usize, k: usize, served: usize, left: &[usize], chosen: &mut Vec<usize>) -> bool {
         if k == 0 || from == self.order.len() {
             if served > self.best {
@@ -215,8 +215,8 @@ impl Branch<'_> {
             }
             return true;
         }
-        self.nodes += 1;
-        if self.nodes > NODES {
+        self.looks += left.len() * (self.order.len() - from);
+        if self.looks > LOOKS {
             return false;
         }
         let rows = &self.coverage.rows;

@@ -42,6 +42,9 @@ const POLISH_STEPS: usize = 12;
 /// Resonances beyond this many hertz are no "first" one: no loop of this kind crosses there.
 const FIRST_RESONANCE_HZ: [f64; 2] = [500.0, 3000.0];
 
+/// Height (distance of pole and zero over the damping) from which a pair is clear of the noise.
+const CLEAR_HEIGHT: f64 = 0.3;
+
 /// Works on one slot.
 pub fn work(
     context: &Context,
@@ -214,11 +217,10 @@ pub(super) fn model_row(plant: &Plant, rms_relative_error: f64, near: bool) -> M
     let [low, high] = FIRST_RESONANCE_HZ.map(|hz| hz * std::f64::consts::TAU);
     // Height of a pair: how far its pole and zero lie apart over its damping.
     let height = |m: &crate::lti::Mode| (m.zero_rad_s / m.pole_rad_s).ln().abs() / m.pole_damping_ratio;
-    let first = plant
-        .modes
-        .iter()
-        .filter(|m| (low..high).contains(&m.pole_rad_s))
-        .max_by(|a, b| height(a).total_cmp(&height(b)));
+    let inside = || plant.modes.iter().filter(|m| (low..high).contains(&m.pole_rad_s));
+    // Weaker pairs come and go with the noise.
+    let clear = inside().filter(|m| height(m) >= CLEAR_HEIGHT).min_by(|a, b| a.pole_rad_s.total_cmp(&b.pole_rad_s));
+    let first = clear.or_else(|| inside().max_by(|a, b| height(a).total_cmp(&height(b))));
     ModelRow {
         plant: PlantFile::from(plant),
         dc_gain,
