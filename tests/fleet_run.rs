@@ -26,7 +26,7 @@ fn fleet(folder: &Path, slots: usize) -> PathBuf {
     let text = format!(
         "spec = {:?}\ncontroller = {:?}\n[input]\ntwin = {{ slots = {slots}, seed = 3 }}\n[robust]\ndraws = 1\n\
          [temperature]\ncases_c = [18.0, 30.0]\ngain_per_c = -1.2e-3\nfrequency_per_c = -2.5e-4\n\
-         [tables]\npilots = 2\ncandidates = 6\nmost = 4\n[untunable]\nexplained = 1\n",
+         [tables]\npilots = 2\ncandidates = 6\nmost = 4\n[untunable]\nexplained = 0\n",
         specs.join("limits/floor.toml"),
         specs.join("controllers/nominal.toml"),
     );

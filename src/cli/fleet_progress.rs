@@ -105,7 +105,7 @@ impl Watch for Progress {
         let mut err = std::io::stderr().lock();
         // There is nowhere to report that stderr is closed.
         let _ = if self.terminal {
-            let full = if of == 0 { WIDTH } else { WIDTH * done.min(of) / of };
+            let full = (WIDTH * done.min(of)).checked_div(of).unwrap_or(WIDTH);
             write!(err, "\r[{}{}] {text}\x1b[K", "#".repeat(full), "-".repeat(WIDTH - full)).and_then(|()| err.flush())
         } else {
             writeln!(err, "{text}")
