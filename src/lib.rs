@@ -57,6 +57,7 @@ pub mod tune;
 
 pub mod fleet;
 pub mod twin;
+pub mod verify;
 
 pub mod report;
 

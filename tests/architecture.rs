@@ -11,7 +11,7 @@ const RANKS: [&[&str]; 10] = [
     &["identify", "feedback"],
     &["pes"],
     &["tune", "gate", "diagnose"],
-    &["twin", "fleet"],
+    &["twin", "fleet", "verify"],
     &["report"],
     &["study"],
     &["cli"],

@@ -57,14 +57,21 @@ fn excitation(size: f64, seed: u64) -> Vec<f64> {
         .collect()
 }
 
+/// The answer to a command that is held over each sample.
 fn respond(truth: &Truth, u: &[f64], seed: u64) -> Vec<f64> {
+    let held = |t: f64| {
+        let at = (t / T).floor();
+        if at < 0.0 { 0.0 } else { u[at as usize].clamp(-truth.clip, truth.clip) }
+    };
+    respond_to(truth, &held, seed)
+}
+
+/// The answer to a command over time.
+fn respond_to(truth: &Truth, command: &dyn Fn(f64) -> f64, seed: u64) -> Vec<f64> {
     let mut noise = Random::new(seed);
     let (mut x, mut v) = (0.0, 0.0);
     let h = T / STEPS as f64;
-    let push = |t: f64| {
-        let at = ((t - truth.delay) / T).floor();
-        if at < 0.0 { 0.0 } else { u[at as usize].clamp(-truth.clip, truth.clip) }
-    };
+    let push = |t: f64| command(t - truth.delay);
     // A steep tanh stands for dry friction; its slope is far above what the record's speeds resolve.
     let slope = |x: f64, v: f64, w: f64| truth.b * (w - truth.coulomb * (v / 2.0).tanh()) - truth.k * x - truth.c * v;
     (0..N)
@@ -103,6 +110,12 @@ fn record(name: &str, role: Role, group: &str, command: &[f64], position: Vec<f6
 }
 
 fn diagnosed(truth: &Truth) -> Diagnosis {
+    let records = records(truth);
+    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
+    diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
+}
+
+fn records(truth: &Truth) -> Vec<(RecordEntry, Record)> {
     let mut records = Vec::new();
     for (g, size) in [("a", 0.02), ("b", 0.06)] {
         let u = excitation(size, 5 + records.len() as u64);
@@ -118,8 +131,7 @@ fn diagnosed(truth: &Truth) -> Diagnosis {
     }
     let u = excitation(0.04, 77);
     records.push(record("held.csv", Role::Holdout, "h", &u, respond(truth, &u, 999)));
-    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
-    diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
+    records
 }
 
 #[test]
@@ -166,4 +178,57 @@ fn a_clipped_command_is_named_and_measured() {
     assert_eq!((d.verdict, d.findings[0].effect.as_str()), (Verdict::Named, "current_saturation"));
     let limit = d.findings[0].parameters["limit"].value;
     assert!((limit / 0.09 - 1.0).abs() < 0.02, "{limit}");
+}
+
+#[test]
+fn a_line_whose_phase_differs_between_repeats_is_a_finding_and_no_noise() {
+    let (hz, amplitude) = (137.0, 2.0 * NOISE);
+    let mut phase = Random::new(31);
+    let mut records = records(&GIVEN);
+    for (_, r) in &mut records {
+        let p = phase.between(0.0, std::f64::consts::TAU);
+        r.position
+            .iter_mut()
+            .enumerate()
+            .for_each(|(k, y)| *y += amplitude * (std::f64::consts::TAU * hz * k as f64 * T + p).cos());
+    }
+    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
+    let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
+    assert_eq!(d.findings[0].effect, "line_disturbance", "{:?}", d.verdict);
+    let p = &d.findings[0].parameters;
+    // Six records of 2000 samples: standard errors are 0.02 Hz and 1.3 % of the amplitude.
+    assert!((p["frequency_hz"].value - hz).abs() < 0.1, "{p:?}");
+    assert!((p["amplitude"].value / amplitude - 1.0).abs() < 0.05, "{p:?}");
+    assert!((d.noise.sensor_rms / NOISE - 1.0).abs() < 0.03, "{}", d.noise.sensor_rms);
+}
+
+#[test]
+fn laps_of_one_drive_stand_for_repeats() {
+    // The excitation's lines are multiples of 5 Hz: it repeats every 2000 samples, so one of 10 Hz steps repeats inside.
+    let u: Vec<f64> = excitation(0.04, 3).iter().take(N / 2).copied().cycle().take(N).collect();
+    let mut one = record("laps.csv", Role::Fit, "only", &u, respond(&GIVEN, &u, 8));
+    one.0.repeat_group = None;
+    let case =
+        Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records: vec![one] };
+    let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
+    assert!(d.noise.from_repeats);
+    // 1000 independent differences: 2.2 % standard error, times three.
+    assert!((d.noise.sensor_rms / NOISE - 1.0).abs() < 0.07, "{}", d.noise.sensor_rms);
+}
+
+#[test]
+fn a_command_that_was_measured_and_not_held_is_seen() {
+    let prompt = Truth { delay: 0.0, ..GIVEN };
+    let lines: Vec<(f64, f64)> = (1..60).map(|h| (f64::from(h) * 5.0, f64::from(h * h) * 0.7)).collect();
+    let command =
+        |t: f64| 0.05 * lines.iter().map(|(hz, p)| (std::f64::consts::TAU * hz * t + p).cos()).sum::<f64>() / 7.7;
+    let u: Vec<f64> = (0..N).map(|k| command(k as f64 * T)).collect();
+    let records = (0..3)
+        .map(|i| record(&format!("m{i}.csv"), Role::Fit, "m", &u, respond_to(&prompt, &command, 40 + i)))
+        .collect();
+    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
+    let given = Plant { delay_s: 0.0, ..plant() };
+    let d = diagnose(&case, &given, None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
+    assert!(d.remarks.iter().any(|r| r.contains("as measured")), "{:?}", d.remarks);
+    assert!(d.fit.fit.rms_after < 1.05 * NOISE, "{:?}", d.fit.fit);
 }

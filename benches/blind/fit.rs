@@ -121,21 +121,24 @@ pub fn solve(a: &[Vec<f64>], b: &[f64], ridge: f64) -> Vec<f64> {
 }
 
 /// (projected, raw) lambda of what the records hold beyond `plant`, and raw lambda of each record. Projected: what a linear
-/// refit (gain, spring, damping, delay unless `hold_delay`) and each record's own offset, torque and initial state leave over.
+/// refit (gain, spring, damping, delay unless `hold_delay`, all modes if `modes`) and each record's own offset, torque and initial state leave over.
 pub fn lambda(
     plant: &Plant,
     recs: &[Recorded],
     noise: Noise,
     ts: f64,
     hold_delay: bool,
+    modes: bool,
 ) -> Option<(f64, f64, Vec<f64>)> {
-    let (mut best, raw, each, mut at) = pass(plant, recs, noise, ts, hold_delay)?;
+    let free: Vec<usize> =
+        (0..if modes { 4 + 4 * plant.modes.len() } else { 4 }).filter(|&i| i != 3 || !hold_delay).collect();
+    let (mut best, raw, each, mut at) = pass(plant, recs, noise, ts, &free)?;
     // A far refit is not the tangent's: go there and look again.
     for _ in 0..2 {
         if raw < 5.0 * best {
             break;
         }
-        let Some(next) = at.take().and_then(|p| pass(&p, recs, noise, ts, hold_delay)) else { break };
+        let Some(next) = at.take().and_then(|p| pass(&p, recs, noise, ts, &free)) else { break };
         if next.0 < best {
             best = next.0;
             at = next.3;
@@ -146,9 +149,9 @@ pub fn lambda(
 
 type Pass = (f64, f64, Vec<f64>, Option<Plant>);
 
-fn pass(plant: &Plant, recs: &[Recorded], noise: Noise, ts: f64, hold_delay: bool) -> Option<Pass> {
-    let count = if hold_delay { 3 } else { 4 };
-    let step = 1e-3;
+fn pass(plant: &Plant, recs: &[Recorded], noise: Noise, ts: f64, free: &[usize]) -> Option<Pass> {
+    let count = free.len();
+    let step = |which: usize| if which < 4 { 1e-3 } else { 1e-4 };
     let mut a = vec![vec![0.0; count]; count];
     let (mut b, mut raw, mut rest) = (vec![0.0; count], Vec::new(), 0.0);
     for rec in recs {
@@ -161,8 +164,8 @@ fn pass(plant: &Plant, recs: &[Recorded], noise: Noise, ts: f64, hold_delay: boo
         raw.push(own);
         rest += own;
         let mut columns = Vec::new();
-        for i in 0..count {
-            let p = moved(plant, i, step);
+        for &i in free {
+            let (p, step) = (moved(plant, i, step(i)), step(i));
             let mut c: Vec<f64> = replay(&p, rec, ts)?.iter().zip(&base).map(|(a, b)| (a - b) / step).collect();
             whiten(&mut c, noise);
             project(&mut c, &q);
@@ -177,8 +180,9 @@ fn pass(plant: &Plant, recs: &[Recorded], noise: Noise, ts: f64, hold_delay: boo
     }
     let x = solve(&a, &b, 1e-9);
     let mut there = plant.clone();
-    for (i, x) in x.iter().enumerate() {
-        there = moved(&there, i, x.clamp(-0.6, 0.6));
+    for (&i, x) in free.iter().zip(&x) {
+        let most = if i >= 4 && (i - 4) % 4 < 2 { 0.05 } else { 0.6 };
+        there = moved(&there, i, x.clamp(-most, most));
     }
     Some(((rest - dot(&x, &b)).max(0.0), rest, raw, (there.k >= 0.0 && there.delay > 0.0).then_some(there)))
 }
@@ -190,7 +194,16 @@ fn moved(plant: &Plant, which: usize, step: f64) -> Plant {
         0 => p.b *= 1.0 + step,
         1 => p.k += step * if p.k > 0.0 { p.k } else { 1e4 },
         2 => p.c *= 1.0 + step,
-        _ => p.delay *= 1.0 + step,
+        3 => p.delay *= 1.0 + step,
+        _ => {
+            let m = &mut p.modes[(which - 4) / 4];
+            match (which - 4) % 4 {
+                0 => m.wp *= 1.0 + step,
+                1 => m.wz *= 1.0 + step,
+                2 => m.zp *= 1.0 + step,
+                _ => m.zz *= 1.0 + step,
+            }
+        }
     }
     p
 }

@@ -130,7 +130,8 @@ impl Stage {
         if r.chance(0.5) {
             base.quantum = noise.sigma * r.range(0.02, 0.2);
         }
-        if r.chance(0.2) {
+        // The oracle's noise is the sensor's: beside an effect no windage.
+        if r.chance(0.2) && matches!(order.kind, "null" | "linear") {
             base.windage = noise.sigma * 0.04 * plant.k.max(1e5) / plant.b;
             base.windage_hz = 60.0;
         }
@@ -170,7 +171,7 @@ impl Stage {
     }
 
     /// Oracle lambda of a truth over all fitted records, from one record of each group.
-    pub fn lambda(&self, t: &Truth) -> Option<(f64, f64, Vec<f64>)> {
+    pub fn lambda(&self, t: &Truth, modes: bool) -> Option<(f64, f64, Vec<f64>)> {
         let few = self.few();
         let mut quiet = t.clone();
         if self.base.quantum > 0.0 && (t.physics.quantum - self.base.quantum).abs() < 1e-15 {
@@ -180,7 +181,7 @@ impl Stage {
             quiet.physics.windage = 0.0;
         }
         let recs = self.take(&quiet, &few, SEARCH)?;
-        let (p, raw, each) = lambda(&self.plant, &recs, self.noise, self.ts, t.physics.extra_delay > 0.0)?;
+        let (p, raw, each) = lambda(&self.plant, &recs, self.noise, self.ts, t.physics.extra_delay > 0.0, modes)?;
         // Repeats count in proportion.
         let fitted = self.plans.iter().filter(|p| !p.holdout).count() as f64 / few.len() as f64;
         let fitted = if t.shocked.is_some() || !t.faults.only.is_empty() { 1.0 } else { fitted };
@@ -200,7 +201,7 @@ fn strength(stage: &Stage, name: &str, u: &[f64; 8], want: f64) -> Option<f64> {
     let at = |q: f64| {
         let mut t = stage.truth();
         put(name, q, u, stage.ts, &mut t);
-        stage.lambda(&t).map(|l| l.0)
+        stage.lambda(&t, false).map(|l| l.0)
     };
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..8 {
@@ -236,10 +237,7 @@ pub fn make(order: &Order, out: &Path, attempt: u64) -> Option<Value> {
         let q = if graded { strength(&stage, name, &u, order.lambda)? } else { r.range(0.3, 1.0) };
         let mut alone = stage.truth();
         put(name, q, &u, stage.ts, &mut alone);
-        let (projected, raw, each) = stage.lambda(&alone)?;
-        if graded && projected < 5.0f64.min(0.5 * order.lambda) {
-            return None;
-        }
+        let (projected, raw, each) = stage.lambda(&alone, true)?;
         let named = contract_name(name);
         let noted = if graded { json!(projected) } else { Value::Null };
         lambdas.insert(named.into(), json!({"projected": noted, "raw": raw, "records": each, "strength": q}));
@@ -279,7 +277,7 @@ pub fn make(order: &Order, out: &Path, attempt: u64) -> Option<Value> {
     }
     let seen = visibility(&stage, &given, &recs)?;
     if facts.is_empty() {
-        let (projected, raw, _) = stage.lambda(&truth)?;
+        let (projected, raw, _) = stage.lambda(&truth, true)?;
         lambdas.insert("numerical".into(), json!({"projected": projected, "raw": raw}));
     }
     write::case(order, out, &stage, &given, &recs, &scale, &mut r).ok()?;

@@ -142,7 +142,7 @@ pub fn make(order: &Order, null: bool, out: &Path, attempt: u64) -> Option<Value
     let all: Vec<usize> = (0..stage.plans.len()).collect();
     let recs = stage.take(&truth, &all, 64)?;
     let seen = visibility(&stage, &given, &recs)?;
-    let (projected, raw, each) = stage.lambda(&truth)?;
+    let (projected, raw, each) = stage.lambda(&truth, true)?;
     let units = Units { length: 1.0, command: 1.0, length_name: "track", command_name: "V" };
     write::case(order, out, &stage, &given, &recs, &units, &mut r).ok()?;
     let names = if null { vec!["none"] } else { vec!["pivot_friction", "torque_factor_rolloff", "cable_spring"] };

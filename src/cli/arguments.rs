@@ -4,6 +4,7 @@ pub(super) use super::diagnose_arguments::DiagnoseArguments;
 pub(super) use super::fleet_arguments::{FleetArguments, TwinFleetArguments};
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
+pub(super) use super::verify_arguments::VerifyArguments;
 use crate::twin::line::UnknownKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -36,6 +37,7 @@ pub(super) enum Command {
     Train(Box<TrainArguments>),
     Classify(ClassifyArguments),
     Study(StudyArguments),
+    Verify(Box<VerifyArguments>),
     #[command(hide = true)]
     Twin(TwinArguments),
 }
@@ -332,6 +334,8 @@ pub(super) enum StudyName {
     Gate,
     /// The gate over 20 seeds, on fresh lines and on unknown kinds
     GateSeeds,
+    /// 100 000 random loops of known truth against the certificate; mutated tables; the four machines
+    Certificate,
     /// The ladder of Table 1 and figures 6, 9, 12-14
     Ladder,
     /// The production line in features (figures 24-34)
@@ -350,6 +354,8 @@ pub(super) enum StudyName {
     FleetShared,
     /// Diagnoses of the cases in the folder --data, beside their answers
     Mismatch,
+    /// Real recordings: EMPS, Silverbox, motor bench, mirror, diagnosed from a linear model
+    Recordings,
     /// The motor bench with flexible coupling, measured
     Motor,
     /// The nine cases of the public HDD benchmark plant

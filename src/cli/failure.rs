@@ -17,6 +17,7 @@ use crate::report::ReportError;
 use crate::study::StudyError;
 use crate::tune::{GainTableError, TuneError};
 use crate::twin::TwinError;
+use crate::verify::VerifyError;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -66,6 +67,8 @@ pub enum Failure {
     Diagnose(#[from] DiagnoseError),
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
     #[error(transparent)]
     Twin(#[from] TwinError),
     #[error(transparent)]

@@ -35,6 +35,8 @@ mod train;
 mod tune;
 mod tune_machines;
 mod twin;
+mod verify;
+mod verify_arguments;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -76,6 +78,7 @@ pub fn main() -> ExitCode {
         Command::Classify(a) => classify::run(&a, &mut screen),
         Command::Study(a) => study::run(&a, &mut screen),
         Command::Twin(a) => twin::run(&a, &mut screen),
+        Command::Verify(a) => verify::run(&a, &mut screen),
     };
     match ending {
         Ok(Ending::Accepted) => ExitCode::SUCCESS,

@@ -29,11 +29,13 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::Classes => study::classes()?,
         StudyName::Gate => study::gate()?,
         StudyName::GateSeeds => study::gate_seeds()?,
+        StudyName::Certificate => study::certificate(&a.data)?,
         StudyName::Ladder => study::ladder()?,
         StudyName::Line => study::line_study()?,
         StudyName::Plants => study::plants()?,
         StudyName::Mirror => study::mirror(&a.data)?,
         StudyName::Mismatch => study::mismatch(&a.data)?,
+        StudyName::Recordings => study::recordings(&a.data)?,
         StudyName::Motor => study::motor(&a.data)?,
         StudyName::Hdd => study::hdd(&a.data)?,
         StudyName::Fleet | StudyName::FleetKills | StudyName::FleetScale | StudyName::FleetShared => {

@@ -4,9 +4,11 @@
 //! Convention: e = reference - position, negative feedback; discrete law in `specs/conventions.md`.
 
 mod filters;
+mod law;
 mod pid;
 mod settings;
 
 pub use filters::{Feedforward, Lowpass, Notch};
+pub use law::Law;
 pub use pid::Pid;
 pub use settings::{Controller, ControllerError};

@@ -1,13 +1,16 @@
 //! Everything that a diagnosis works on, made in order: given plant, noise, filter, refit, motion.
 
-use super::columns::raw_columns;
-use super::linear::{Carrier, LinearForm, Sampled};
+use super::columns::{Drive, drive, raw_columns};
+use super::linear::{Carrier, LinearForm, Sampled, body_numbers, free_motions, free_scales};
+use super::lines::{Line, take_lines};
 use super::refit::{Chosen, Fit, simulation_error};
 use super::run::{Run, mean_run};
-use super::stack::Stack;
+use super::select::Model;
+use super::stack::{Basis, Stack};
 use super::trajectory::{Smoother, Trajectory, acting};
 use super::whiten::{NoiseLevels, Whitener};
-use crate::lti::{LtiError, Plant};
+use crate::lti::{Body, LtiError, Plant};
+use crate::numeric::least_squares::Qr;
 use crate::physics::{Entry, Port, Scene};
 use crate::recording::Role;
 
@@ -24,6 +27,8 @@ pub struct Bench {
     pub levels: NoiseLevels,
     /// Its whitening filter.
     pub whitener: Whitener,
+    /// Lines whose phase differs from run to run; they are taken out of the mean runs.
+    pub lines: Vec<Line>,
     /// The mean run of every segment of the stack.
     pub means: Vec<Run>,
     /// The motion behind each of them.
@@ -34,8 +39,6 @@ pub struct Bench {
     pub scene: Scene,
     /// What repeats differ by, whitened, with the run it belongs to; empty without repeats.
     pub repeats: Vec<(usize, Vec<f64>)>,
-    /// Linear parameters of the last refit.
-    pub p: Vec<f64>,
 }
 
 /// Series that hold noise only: each repeat less the mean of its group, scaled back to the noise of one record.
@@ -65,93 +68,161 @@ fn noise_series(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<(usize, Vec<f
     out
 }
 
+fn values(series: &[(usize, Vec<f64>)]) -> Vec<Vec<f64>> {
+    series.iter().map(|s| s.1.clone()).collect()
+}
+
+/// Series with each record's own start and constant torque taken out, all of it seen through a filter.
+fn without_start(
+    series: &[(usize, Vec<f64>)],
+    free: &dyn Fn(usize) -> Vec<Vec<f64>>,
+    filter: &dyn Fn(&mut Vec<f64>),
+) -> Vec<(usize, Vec<f64>)> {
+    let mut out = series.to_vec();
+    for (_, e) in &mut out {
+        let mut basis = Basis::default();
+        for mut c in free(e.len()) {
+            filter(&mut c);
+            basis.add_local(0, c);
+        }
+        filter(e);
+        basis.project(e);
+    }
+    out
+}
+
+/// Errors of records that were not repeated but whose drive repeats inside, lap by lap, as if the laps were repeats.
+fn in_laps(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<(usize, Vec<f64>)> {
+    let mut out = Vec::new();
+    for (r, e) in errors {
+        let alone = errors.iter().filter(|(o, _)| runs[*o].group == runs[*r].group).count() == 1;
+        match runs[*r].period().filter(|_| alone) {
+            Some(n) => out.extend(e.chunks_exact(n).map(|lap| (*r, lap.to_vec()))),
+            None => out.push((*r, e.clone())),
+        }
+    }
+    out
+}
+
+/// Levels and filter of series that hold noise only, but for each record's own start; and the series, filtered.
+fn noise_of(
+    series: &[(usize, Vec<f64>)],
+    free: &dyn Fn(usize) -> Vec<Vec<f64>>,
+    body: &Body,
+    sample_time_s: f64,
+    from_repeats: bool,
+) -> (NoiseLevels, Whitener, Vec<(usize, Vec<f64>)>) {
+    let levels = NoiseLevels::fit(&values(&without_start(series, free, &|_| {})), body, sample_time_s, from_repeats);
+    let mut whitener = Whitener::new(&levels, body, sample_time_s);
+    let filtered = without_start(series, free, &|x| whitener.apply(x));
+    whitener.refine(&values(&filtered));
+    let filtered = without_start(series, free, &|x| whitener.apply(x));
+    (levels, whitener, filtered)
+}
+
+/// Weights for the noise of each segment as its own repeats show it: a fast move may be noisier than a slow one.
+fn weigh(stack: &mut Stack, repeats: &[(usize, Vec<f64>)]) {
+    for s in &mut stack.segments {
+        let own = repeats.iter().filter(|(r, _)| s.runs.contains(r));
+        let (sum, n) = own.fold((0.0, 0), |(sum, n), (_, e)| (sum + e.iter().map(|v| v * v).sum::<f64>(), n + e.len()));
+        if n > 0 && sum > 0.0 {
+            s.weight /= (sum / n as f64).sqrt();
+        }
+    }
+}
+
+/// Machine and size of its motion in the fit records; speed and noise come later.
+pub fn scene(given: &Plant, runs: &[Run], sample_time_s: f64, spindle_hz: Option<f64>) -> Scene {
+    let fit: Vec<&Run> = runs.iter().filter(|r| r.role == Role::Fit).collect();
+    let extremes = |of: &dyn Fn(&Run) -> &[f64]| {
+        let all = fit.iter().flat_map(|r| of(r).iter().copied());
+        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
+    };
+    let (low, high) = extremes(&|r| &r.position);
+    let (least, most) = extremes(&|r| &r.input);
+    let step = fit.iter().flat_map(|r| r.input.windows(2).map(|w| (w[1] - w[0]).abs())).fold(0.0f64, f64::max);
+    Scene {
+        plant: given.clone(),
+        sample_time_s,
+        spindle_hz,
+        travel: low.abs().max(high.abs()).max(1e-12),
+        centre: 0.5 * (low + high),
+        speed: 1.0,
+        command: least.abs().max(most.abs()).max(1e-12),
+        command_step: step.max(1e-15),
+        noise: 0.0,
+        duration_s: fit.iter().map(|r| r.len()).max().unwrap_or(0) as f64 * sample_time_s,
+        indexed: fit.iter().any(|r| r.spindle_rad.is_some()),
+        warm: fit.iter().any(|r| r.temperature.is_some()),
+    }
+}
+
 impl Bench {
     /// Sets up a diagnosis of `given` on these runs.
     pub fn new(given: &Plant, runs: Vec<Run>, sample_time_s: f64, spindle_hz: Option<f64>) -> Result<Bench, LtiError> {
         let form = LinearForm::new(given, sample_time_s);
         let fit_runs: Vec<usize> = (0..runs.len()).filter(|&i| runs[i].role == Role::Fit).collect();
-        let stack = Stack::grouped(&runs, &fit_runs);
-        let means = stack.segments.iter().map(|s| mean_run(&runs, &s.runs)).collect();
-        let extremes = |of: &dyn Fn(&Run) -> &[f64]| {
-            fit_runs
-                .iter()
-                .flat_map(|&r| of(&runs[r]).iter().copied())
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
-        };
-        let (low, high) = extremes(&|r| &r.position);
-        let (least, most) = extremes(&|r| &r.input);
-        let step =
-            fit_runs.iter().flat_map(|&r| runs[r].input.windows(2).map(|w| (w[1] - w[0]).abs())).fold(0.0f64, f64::max);
-        let scene = Scene {
-            plant: given.clone(),
-            sample_time_s,
-            spindle_hz,
-            travel: low.abs().max(high.abs()).max(1e-12),
-            centre: 0.5 * (low + high),
-            speed: 1.0,
-            command: least.abs().max(most.abs()).max(1e-12),
-            command_step: step.max(1e-15),
-            noise: 0.0,
-            duration_s: fit_runs.iter().map(|&r| runs[r].len()).max().unwrap_or(0) as f64 * sample_time_s,
-            indexed: fit_runs.iter().any(|&r| runs[r].spindle_rad.is_some()),
-            warm: fit_runs.iter().any(|&r| runs[r].temperature.is_some()),
-        };
-        let levels = NoiseLevels { sensor_rms: 1.0, torque_rms: 0.0, torque_corner_hz: 60.0, from_repeats: false };
-        let whitener = Whitener::new(&levels, &given.body, sample_time_s);
+        let mut stack = Stack::grouped(&runs, &fit_runs);
+        let scene = scene(given, &runs, sample_time_s, spindle_hz);
         let p = vec![0.0; form.knobs.len()];
+        let carrier = form.carrier(&p);
+        let sampled = Sampled::of(&carrier.plant, sample_time_s)?;
+        // Repeats differ by noise only, so that the linear answer to the difference of their commands is all that counts.
+        let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
+        let still = Trajectory { samples: Vec::new(), unexplained: Vec::new() };
+        let free = |n: usize| free_motions(&given.body, sample_time_s, n).to_vec();
+        let mut errors: Vec<(usize, Vec<f64>)> =
+            (fit_runs.iter()).map(|&r| (r, simulation_error(&sampled, &plain, &[], &runs[r], &still, 0))).collect();
+        let body = &carrier.plant.body;
+        let mut white = |errors: &[(usize, Vec<f64>)]| {
+            let series = noise_series(&in_laps(errors, &runs), &runs);
+            let levels = NoiseLevels::fit(&values(&without_start(&series, &free, &|_| {})), body, sample_time_s, true);
+            let whitener = Whitener::new(&levels, body, sample_time_s);
+            let filtered = without_start(&series, &free, &|x| whitener.apply(x));
+            (values(&filtered), series.iter().map(|s| runs[s.0].group).collect())
+        };
+        let recorded = errors.clone();
+        let lines = take_lines(&mut errors, &runs, &free, sample_time_s, spindle_hz, &mut white);
+        let mut cleaned = runs.clone();
+        for ((r, before), (_, after)) in recorded.iter().zip(&errors) {
+            let position = &mut cleaned[*r].position;
+            position.iter_mut().zip(before).zip(after).for_each(|((y, b), a)| *y -= b - a);
+        }
+        let means: Vec<Run> = stack.segments.iter().map(|s| mean_run(&cleaned, &s.runs)).collect();
+        let repeats = noise_series(&in_laps(&errors, &runs), &runs);
+        let from_repeats = !repeats.is_empty();
+        let series = if from_repeats { &repeats } else { &errors };
+        let (levels, whitener, filtered) = noise_of(series, &free, body, sample_time_s, from_repeats);
+        let repeats = if from_repeats { filtered } else { Vec::new() };
+        weigh(&mut stack, &repeats);
         let mut bench = Bench {
             form,
             runs,
             fit_runs,
             levels,
             whitener,
+            lines,
             means,
             trajectories: Vec::new(),
             stack,
             scene,
-            repeats: Vec::new(),
-            p,
+            repeats,
         };
-        bench.renew()?;
+        bench.scene.noise = bench.levels.sensor_rms;
+        bench.smooth(&carrier, &sampled, &bench.means.clone(), &vec![Vec::new(); bench.means.len()]);
+        let speeds = bench.trajectories.iter().flat_map(|t| t.samples.iter().map(|s| s.v.abs()));
+        bench.scene.speed = speeds.fold(0.0f64, f64::max).max(1e-12);
         Ok(bench)
     }
 
-    /// Noise, filter and motion anew, for the linear parameters as they are now.
-    pub fn renew(&mut self) -> Result<(), LtiError> {
-        let carrier = self.form.carrier(&self.p);
+    /// Without repeats there is only what a model leaves: noise and filter anew from the errors of the best one so far.
+    /// Verdicts are weaker for it.
+    pub fn renew(&mut self, p: &[f64], chosen: &[Chosen]) {
         let t = self.scene.sample_time_s;
-        let sampled = Sampled::of(&carrier.plant, t)?;
-        // Repeats differ by noise only, so that the linear answer to the difference of their commands is all that counts.
-        let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
-        let still = Trajectory { samples: Vec::new(), unexplained: Vec::new() };
-        let error = |r: usize| simulation_error(&sampled, &plain, &[], &self.scene, &self.runs[r], &still, 0);
-        let errors: Vec<(usize, Vec<f64>)> = self.fit_runs.iter().map(|&r| (r, error(r))).collect();
-        let repeats = noise_series(&errors, &self.runs);
-        let from_repeats = !repeats.is_empty();
-        let owners: Vec<usize> = repeats.iter().map(|r| r.0).collect();
-        let series = if from_repeats {
-            repeats.into_iter().map(|r| r.1).collect()
-        } else {
-            self.residual_series(&sampled, &carrier)
-        };
-        let weight = vec![1.0; series.len()];
-        self.levels = NoiseLevels::fit(&series, &weight, &carrier.plant.body, t, from_repeats);
-        self.whitener = Whitener::new(&self.levels, &carrier.plant.body, t);
-        let filtered: Vec<Vec<f64>> = series
-            .into_iter()
-            .map(|mut s| {
-                self.whitener.apply(&mut s);
-                s
-            })
-            .collect();
-        self.whitener.refine(&filtered, &weight);
-        self.repeats = owners.into_iter().zip(filtered).collect();
+        let left: Vec<(usize, Vec<f64>)> = self.fit(chosen.to_vec()).errors(p).into_iter().enumerate().collect();
+        let body = self.form.carrier(p).plant.body;
+        (self.levels, self.whitener, _) = noise_of(&left, &|n| free_motions(&body, t, n).to_vec(), &body, t, false);
         self.scene.noise = self.levels.sensor_rms;
-        self.scene.plant = carrier.plant.clone();
-        self.smooth(&carrier, &sampled, &self.means.clone(), &vec![Vec::new(); self.means.len()]);
-        let speeds = self.trajectories.iter().flat_map(|t| t.samples.iter().map(|s| s.v.abs()));
-        self.scene.speed = speeds.fold(0.0f64, f64::max).max(1e-12);
-        Ok(())
     }
 
     /// The motion behind each mean run, with a known torque beside the carrier.
@@ -168,7 +239,7 @@ impl Bench {
     pub fn correct(&mut self, p: &[f64], chosen: &[Chosen]) {
         let carrier = self.form.carrier(p);
         let Ok(sampled) = Sampled::of(&carrier.plant, self.scene.sample_time_s) else { return };
-        let arm = self.scene.arm_over_record();
+        let arm = carrier.arm_over_record();
         let mut means = self.means.clone();
         let mut known: Vec<Vec<f64>> = Vec::with_capacity(means.len());
         for (i, run) in means.iter_mut().enumerate() {
@@ -182,13 +253,9 @@ impl Bench {
                     continue;
                 }
                 let raw = raw_columns(c.effect, &c.setting.inner, &self.scene, motion);
-                let own = match facts.per_record {
-                    true => c.setting.strengths.get(i * facts.columns..).unwrap_or(&[]),
-                    false => &c.setting.strengths[..],
-                };
-                for (column, s) in raw.iter().zip(own) {
+                for (column, s) in raw.iter().zip(c.own(i)) {
                     // A command reaches the arm late, like the one it is added to.
-                    let late = (facts.entry == Entry::Command).then(|| acting(&sampled.delayed, column));
+                    let late = (facts.entry == Entry::Command).then(|| acting(&sampled.delayed, column, 0.0));
                     let column = late.as_ref().unwrap_or(column);
                     if sensed {
                         run.position.iter_mut().zip(column).for_each(|(y, v)| *y -= s * v);
@@ -202,23 +269,53 @@ impl Bench {
         self.smooth(&carrier, &sampled, &means, &known);
     }
 
-    /// Without repeats there is only what the model leaves: the error of the carrier along the recorded motion, which holds
-    /// what the model lacks as well as the noise. Verdicts are weaker for it.
-    fn residual_series(&self, sampled: &Sampled, carrier: &Carrier) -> Vec<Vec<f64>> {
-        let still = Trajectory { samples: Vec::new(), unexplained: Vec::new() };
-        let moved = self.trajectories.len() == self.means.len();
-        self.means
-            .iter()
-            .enumerate()
-            .map(|(i, run)| {
-                if moved {
-                    simulation_error(sampled, carrier, &[], &self.scene, run, &self.trajectories[i], i)
-                } else {
-                    let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
-                    simulation_error(sampled, &plain, &[], &self.scene, run, &still, i)
-                }
-            })
-            .collect()
+    /// Errors of the mean runs with each one's own start taken out.
+    pub fn without_starts(&self, errors: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let free = |n: usize| free_motions(&self.form.given.body, self.scene.sample_time_s, n).to_vec();
+        values(&without_start(&errors.into_iter().enumerate().collect::<Vec<_>>(), &free, &|_| {}))
+    }
+
+    /// The error of a model on any run along its recorded motion, effects of each record's own left out.
+    fn raw_along(&self, run: &Run, model: &Model) -> Result<(Carrier, Vec<f64>), LtiError> {
+        let carrier = self.form.carrier(&model.refitted.p);
+        let sampled = Sampled::of(&carrier.plant, self.scene.sample_time_s)?;
+        let alone = std::slice::from_ref(run);
+        let smoother = Smoother::of(&carrier.plant, &sampled.delayed, self.levels.sensor_rms, alone, &[Vec::new()]);
+        let motion = [smoother.smooth(run, &[], &sampled.delayed, self.scene.spindle_hz.unwrap_or(0.0))];
+        let lasting: Vec<&Chosen> = model.chosen.iter().filter(|c| !c.effect.facts().per_record).collect();
+        let drives: Vec<Drive> =
+            lasting.iter().map(|c| drive(c.effect, &c.setting.inner, &self.scene, &motion)).collect();
+        let parts: Vec<(&Drive, &[f64])> =
+            drives.iter().zip(lasting.iter().map(|c| &c.setting.strengths[..])).collect();
+        let e = simulation_error(&sampled, &carrier, &parts, run, &motion[0], 0);
+        Ok((carrier, e))
+    }
+
+    /// The whitened error of a model on any run along its recorded motion, with `own` columns of the record taken out.
+    pub fn along(&self, run: &Run, model: &Model, own: &[Vec<f64>]) -> Result<Vec<f64>, LtiError> {
+        let (_, mut e) = self.raw_along(run, model)?;
+        let mut basis = Basis::default();
+        for mut c in own.iter().cloned() {
+            self.whitener.apply(&mut c);
+            basis.add_local(0, c);
+        }
+        self.whitener.apply(&mut e);
+        basis.project(&mut e);
+        Ok(e)
+    }
+
+    /// The constant torque on a run beside command and laws (command_unit): what the error along the recorded motion asks for.
+    pub fn constant_torque(&self, run: &Run, model: &Model) -> Result<f64, LtiError> {
+        let (carrier, mut e) = self.raw_along(run, model)?;
+        let (t, n, body) = (self.scene.sample_time_s, run.len(), self.form.given.body);
+        self.whitener.apply(&mut e);
+        let mut free = free_motions(&body, t, n);
+        free.iter_mut().for_each(|c| self.whitener.apply(c));
+        let mut qr = Qr::default();
+        qr.factor(n, 3, |a| a.chunks_exact_mut(n).zip(&free).for_each(|(a, c)| a.copy_from_slice(c)));
+        let acceleration = qr.solve(&mut e)[2] * free_scales(&body, t, n)[2];
+        let gain = body_numbers(&carrier.plant.body).0 * carrier.plant.resonance_gain;
+        Ok(acceleration * carrier.arm_over_record() / gain - run.before)
     }
 
     /// A fit on the stack with these effects.
@@ -229,6 +326,7 @@ impl Bench {
             trajectories: &self.trajectories,
             whitener: &self.whitener,
             stack: &self.stack,
+            lines: &self.lines,
             scene: &self.scene,
             chosen,
         }

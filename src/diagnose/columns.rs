@@ -3,10 +3,44 @@
 //! The law is driven by the motion as recorded, so the answer is exact whatever the effect's size: with
 //! x'' + c x' + k x = b (u + w), the error of the model without w is the plant's answer to w alone.
 
-use super::linear::{Sampled, add_response};
+use super::linear::Sampled;
 use super::trajectory::Trajectory;
 use super::whiten::Whitener;
 use crate::physics::{COLUMNS, Effect, Entry, Sample, Scene};
+
+/// What an effect's law gives along every mean run, before strengths.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    /// Where it enters.
+    pub entry: Entry,
+    /// Columns of one record, where the strengths differ from record to record; 0 where they do not.
+    pub apart: usize,
+    /// The columns, segment by segment.
+    pub segments: Vec<Vec<Vec<f64>>>,
+}
+
+impl Default for Drive {
+    fn default() -> Drive {
+        Drive { entry: Entry::Position, apart: 0, segments: Vec::new() }
+    }
+}
+
+impl Drive {
+    /// The strengths of one segment.
+    pub fn own<'s>(&self, strengths: &'s [f64], segment: usize) -> &'s [f64] {
+        strengths.get(segment * self.apart..).unwrap_or(&[])
+    }
+}
+
+/// The law of an effect along every trajectory.
+pub fn drive(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectories: &[Trajectory]) -> Drive {
+    let facts = effect.facts();
+    Drive {
+        entry: facts.entry,
+        apart: if facts.per_record { facts.columns } else { 0 },
+        segments: trajectories.iter().map(|t| raw_columns(effect, inner, scene, t)).collect(),
+    }
+}
 
 /// The columns of an effect along one trajectory, at their place of entry.
 pub fn raw_columns(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectory: &Trajectory) -> Vec<Vec<f64>> {
@@ -53,7 +87,7 @@ pub fn position_columns(
     raw.into_iter()
         .map(|column| {
             let mut y = vec![0.0; column.len()];
-            add_response(through, &column, &mut y);
+            through.add_response(&column, &mut y);
             y
         })
         .collect()

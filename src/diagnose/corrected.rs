@@ -3,8 +3,11 @@
 //! Where a bearing that sticks takes over the spring of the body, little or less than nothing of that spring is left; the body
 //! then is a free inertia and the rest stands as a plain cable spring, of either sign.
 
+use super::bench::Bench;
+use super::judge::Judged;
 use super::linear::{LinearForm, body_numbers};
 use super::refit::Chosen;
+use super::select::Selection;
 use crate::lti::{Body, PhysicsEntry, Plant};
 use crate::physics::{Effect, Scene, Setting, effect};
 
@@ -15,6 +18,21 @@ pub struct Corrected {
     pub plant: Plant,
     /// The effects of the entries.
     pub effects: Vec<(&'static dyn Effect, Setting)>,
+}
+
+impl Corrected {
+    /// The same as a model to be judged, with what is each record's own.
+    pub(super) fn judged<'a>(&'a self, bench: &'a Bench, selection: &'a Selection) -> Judged<'a> {
+        let own = selection.model.chosen.iter().filter(|c| c.effect.facts().per_record);
+        Judged {
+            plant: &self.plant,
+            effects: self.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect(),
+            own: own.map(|c| (c.effect as &dyn Effect, &c.setting.inner[..])).collect(),
+            lines: &bench.lines,
+            fit: Some((bench, &selection.model)),
+            scene: &bench.scene,
+        }
+    }
 }
 
 /// Share of the given stiffness below which the body counts as free.

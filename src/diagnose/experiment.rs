@@ -11,11 +11,17 @@ use crate::physics::{Effect, Scene, facts};
 /// Scales of the existing excitations that are tried.
 const SCALES: [f64; 4] = [0.3, 1.0, 2.0, 4.0];
 
+/// Reach over the largest position on record beyond which nobody would let the machine go.
+const STROKE: f64 = 2.0;
+
 /// Proposes the record that tells the final model best from its strongest rival: the existing excitations at other sizes
 /// (T-optimality over a catalogue; Atkinson & Fedorov 1975), by simulating both and counting the whitened difference.
 pub(super) fn propose(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
     let standing = match d.verdict {
         Verdict::DataFault => "record again with the log repaired; every other verdict rests on it".to_owned(),
+        Verdict::Undecidable => {
+            "the same excitation at least four times: what repeats differ by is noise, the rest is the machine".to_owned()
+        }
         Verdict::NoMismatch | Verdict::Refit => {
             "the same excitation at a third and at three times its size: a linear machine scales, friction and limits do not".to_owned()
         }
@@ -39,6 +45,7 @@ pub(super) fn propose(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
             for scale in SCALES {
                 let mut test: Run = run.clone();
                 test.input.iter_mut().for_each(|u| *u *= scale);
+                (test.before, test.origin) = (scale * test.before, scale * test.origin);
                 let separation = difference(bench, &test, final_model, rival);
                 if separation > best.0 {
                     best = (separation, scale, i);
@@ -62,9 +69,14 @@ fn difference(bench: &Bench, run: &Run, a: &super::select::Model, b: &super::sel
         let fixed = super::corrected::corrected(&bench.form, &m.refitted.p, &m.chosen, &bench.scene);
         let effects: Vec<(&dyn Effect, _)> = fixed.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
         let scene: &Scene = &bench.scene;
-        error(&Judged { plant: &fixed.plant, effects, scene }, run, None).ok()
+        error(&Judged { plant: &fixed.plant, effects, own: Vec::new(), lines: &[], fit: None, scene }, run, None).ok()
     };
     let (Some(x), Some(y)) = (simulate(a), simulate(b)) else { return 0.0 };
+    // A record that would leave the stroke is no proposal.
+    let reach = |e: &[f64]| run.position.iter().zip(e).map(|(y, e)| (y - e).abs()).fold(0.0, f64::max);
+    if !(reach(&x) < STROKE * bench.scene.travel && reach(&y) < STROKE * bench.scene.travel) {
+        return 0.0;
+    }
     let mut off: Vec<f64> = x.iter().zip(&y).map(|(x, y)| x - y).collect();
     let whitener: &Whitener = &bench.whitener;
     whitener.apply(&mut off);

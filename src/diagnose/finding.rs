@@ -173,6 +173,8 @@ pub struct Diagnosis {
     pub sample_faults: Vec<SampleFault>,
     /// Whitened error per sample: given, linear refit, final model; 1 is noise alone.
     pub whitened: [f64; 3],
+    /// The same on the records that were not used, along their recorded motion: linear refit, final model.
+    pub holdout_whitened: Option<[f64; 2]>,
     /// Natural frequency, damping and gain before and after, and other remarks in plain words.
     pub remarks: Vec<String>,
     /// The search.

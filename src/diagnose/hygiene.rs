@@ -5,16 +5,18 @@
 //! does not.
 
 use super::run::Run;
-use crate::controller::{Controller, ControllerError};
-use crate::lti::Section;
+use super::stack::Basis;
+use crate::controller::Law;
+use crate::lti::step_chain;
 use crate::numeric::golden::{Bound, golden_section};
 use crate::numeric::least_squares::dot;
 use crate::recording::ClockGap;
+use rayon::prelude::*;
 
 /// What the replay of the controller says.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Replay {
-    /// Error of the replay as logged, rms over the command's rms.
+    /// Error of the replay as logged, rms over the command's rms; of the failing records where there are any.
     pub error: f64,
     /// Shift of the position log (samples) under which the replay fits best; positive where the position is late.
     pub shift_samples: f64,
@@ -26,6 +28,8 @@ pub struct Replay {
     pub command_factor: f64,
     /// Error with both factors.
     pub error_scaled: f64,
+    /// The records whose replay fails; all other figures but the factors of sound logs are of these.
+    pub failing: Vec<String>,
 }
 
 /// What is wrong with one record's samples.
@@ -39,46 +43,6 @@ pub struct SampleFault {
     pub samples: f64,
     /// Whether the position stood still rather than jumped.
     pub stuck: bool,
-}
-
-/// The replay of a controller over one record with its position shifted by `shift` samples and scaled by `factor`.
-fn replay(
-    chain: &[Section],
-    controller: &Controller,
-    run: &Run,
-    reference: &[f64],
-    position: &dyn Fn(usize) -> f64,
-) -> [Vec<f64>; 2] {
-    let n = run.len();
-    let pass = |input: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        let mut memory = vec![[0.0; 2]; chain.len()];
-        (0..n)
-            .map(|k| {
-                let mut s = input(k);
-                for (c, m) in chain.iter().zip(memory.iter_mut()) {
-                    let out = c.b0 * s + m[0];
-                    m[0] = c.b1 * s - c.a1 * out + m[1];
-                    m[1] = c.b2 * s - c.a2 * out;
-                    s = out;
-                }
-                s
-            })
-            .collect()
-    };
-    // Before a record starts the reference stands where it starts, and so does the position: only the error counts.
-    let mut from_reference = pass(&|k| reference[k] - reference[0]);
-    let from_position = pass(&|k| position(k) - reference[0]);
-    if let Some(f) = &controller.feedforward {
-        let t = controller.sample_time_s;
-        let at = |k: usize| reference[k.min(n - 1)];
-        for (k, u) in from_reference.iter_mut().enumerate() {
-            let (back, ahead) = (at(k.saturating_sub(1)), at(k + 1));
-            *u += f.factor
-                * (f.velocity_s * (ahead - back) / (2.0 * t)
-                    + f.acceleration_s2 * (ahead - 2.0 * at(k) + back) / (t * t));
-        }
-    }
-    [from_reference, from_position]
 }
 
 /// Position at a real-valued sample, by cubic interpolation.
@@ -95,58 +59,118 @@ fn between(y: &[f64], at: f64) -> f64 {
     b + 0.5 * f * (c - a + f * (2.0 * a - 5.0 * b + 4.0 * c - d + f * (3.0 * (b - c) + d - a)))
 }
 
-/// Error of predicted commands: squares, with the record's own constant and drift (the integrator's unknown start) taken out.
-fn misfit(predicted: &[f64], recorded: &[f64], limit: f64) -> (f64, f64) {
-    let free: Vec<usize> = (0..recorded.len()).filter(|&k| recorded[k].abs() < 0.999 * limit).collect();
-    let n = free.len().max(1) as f64;
-    let e: Vec<f64> = free.iter().map(|&k| recorded[k] - predicted[k]).collect();
-    let mean = e.iter().sum::<f64>() / n;
-    let total: f64 = free.iter().map(|&k| recorded[k] * recorded[k]).sum();
-    (e.iter().map(|v| (v - mean).powi(2)).sum(), total)
+/// Samples at each end of a record that a replay leaves out.
+const END: usize = 16;
+
+/// Squares of recorded less replayed commands off the limit, and of the recorded ones.
+///
+/// The ends are left out: a shifted log lacks samples there.
+fn misfit(law: &Law, run: &Run, reference: &[f64], position: &dyn Fn(usize) -> f64) -> (f64, f64) {
+    let n = run.len();
+    let inside = if n > 20 * END { END..n - END } else { 0..n };
+    let error: Vec<f64> = inside.clone().map(|k| reference[k] - position(k)).collect();
+    let command = &run.command[inside.clone()];
+    let replayed = law.replay(&reference[inside], &error, command);
+    let free = command.iter().zip(&replayed).filter(|(u, _)| u.abs() < 0.999 * law.limit);
+    free.fold((0.0, 0.0), |(off, all), (u, p)| (off + (u - p).powi(2), all + u * u))
 }
 
-/// Whether the recorded commands follow from the documented controller; none where no record has a reference.
-pub fn replay_records(controller: &Controller, runs: &[&Run]) -> Result<Option<Replay>, ControllerError> {
-    let chain = controller.sections()?.chain;
-    let limit = controller.output_limit.unwrap_or(f64::INFINITY);
-    let with: Vec<(&Run, &Vec<f64>)> = runs.iter().filter_map(|r| r.reference.as_ref().map(|f| (*r, f))).collect();
+/// Error of a replay above which the law is not the documented one; logs round their numbers.
+pub const REPLAY: f64 = 5e-3;
+/// Most samples by which a log is taken to be shifted.
+const SHIFT: i32 = 6;
+
+/// Whether the recorded commands follow from the documented controller; none where no record has a reference. `smooth` is the
+/// motion behind each record without the sensor's noise.
+pub fn replay_records(law: &Law, runs: &[&Run], smooth: &[Vec<f64>]) -> Option<Replay> {
+    let with: Vec<(&Run, &[f64], &[f64])> =
+        runs.iter().zip(smooth).filter_map(|(r, s)| r.reference.as_deref().map(|f| (*r, f, &s[..]))).collect();
     if with.is_empty() {
-        return Ok(None);
+        return None;
     }
-    let error = |shift: f64| -> f64 {
-        let (mut off, mut all) = (0.0, 0.0);
-        for (run, reference) in &with {
-            let [r, p] = replay(&chain, controller, run, reference, &|k| between(&run.position, k as f64 + shift));
-            let predicted: Vec<f64> = r.iter().zip(&p).map(|(r, p)| (r - p).clamp(-limit, limit)).collect();
-            let (a, b) = misfit(&predicted, &run.command, limit);
-            (off, all) = (off + a, all + b);
-        }
-        (off / f64::max(all, 1e-300)).sqrt()
+    let each: Vec<(f64, f64)> = with.par_iter().map(|(run, r, _)| misfit(law, run, r, &|k| run.position[k])).collect();
+    let relative = |(off, all): (f64, f64)| (off / f64::max(all, 1e-300)).sqrt();
+    let failing: Vec<usize> = (0..with.len()).filter(|&i| relative(each[i]) > REPLAY).collect();
+    let plain = relative(each.iter().fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1)));
+    let mut out = Replay {
+        error: plain,
+        shift_samples: 0.0,
+        error_shifted: plain,
+        position_factor: 1.0,
+        command_factor: 1.0,
+        error_scaled: plain,
+        failing: failing.iter().map(|&i| with[i].0.name.clone()).collect(),
     };
-    let plain = error(0.0);
-    let mut best = (0.0, plain);
-    for whole in -4..=4 {
-        let e = error(f64::from(whole));
-        if e < best.1 {
-            best = (f64::from(whole), e);
-        }
+    if failing.is_empty() {
+        return Some(out);
     }
-    // A real-valued shift only where a whole one helps or none fits: the replay as logged is exact on sound logs.
-    if best.1 > 1e-3 {
-        let m = golden_section(&error, best.0 - 1.0, best.0 + 1.0, 1e-4);
+    out.error = relative(failing.iter().fold((0.0, 0.0), |a, &i| (a.0 + each[i].0, a.1 + each[i].1)));
+    out.error_shifted = out.error;
+    // The whole reading is late, its noise with it; or the motion alone, as where the noise is of the converter.
+    for noise_too in [true, false] {
+        let error = |shift: f64| -> f64 {
+            let sums: Vec<(f64, f64)> = (failing.par_iter())
+                .map(|&i| {
+                    let (run, reference, smooth) = with[i];
+                    let position = |k: usize| match noise_too {
+                        true => between(&run.position, k as f64 + shift),
+                        false => run.position[k] + smooth[k] - between(smooth, k as f64 - shift),
+                    };
+                    misfit(law, run, reference, &position)
+                })
+                .collect();
+            relative(sums.iter().fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1)))
+        };
+        let mut best = (0.0, out.error);
+        for whole in -SHIFT..=SHIFT {
+            let e = error(f64::from(whole));
+            if e < best.1 {
+                best = (f64::from(whole), e);
+            }
+        }
+        let m = golden_section(&error, best.0 - 1.0, best.0 + 1.0, 1e-3);
+        // A real-valued shift only where it is clearly better than the whole one.
         if m.value < 0.7 * best.1 && m.at_bound == Bound::Inside {
             best = (m.x, m.value);
         }
+        if best.1 < out.error_shifted {
+            (out.shift_samples, out.error_shifted) = best;
+        }
     }
-    let (mut rr, mut rp, mut pp, mut ru, mut pu, mut uu) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    for (run, reference) in &with {
-        let [r, p] = replay(&chain, controller, run, reference, &|k| run.position[k]);
+    let (a, b, left) = factors(law, &failing.iter().map(|&i| (with[i].0, with[i].1)).collect::<Vec<_>>());
+    out.position_factor = if a != 0.0 { b / a } else { f64::NAN };
+    (out.command_factor, out.error_scaled) = (a, left);
+    Some(out)
+}
+
+/// The factors of reference and position under which the command follows best, the law's memory free in each record, and the
+/// relative error that they leave.
+fn factors(law: &Law, with: &[(&Run, &[f64])]) -> (f64, f64, f64) {
+    let (mut rr, mut rp, mut pp, mut ru, mut pu, mut uu, mut all) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (run, reference) in with {
+        let n = run.len();
+        let mask = |k: usize| if run.command[k].abs() < 0.999 * law.limit { 1.0 } else { 0.0 };
+        let through = |memory: &mut [[f64; 2]], input: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            (0..n).map(|k| mask(k) * step_chain(&law.chain, memory, input(k))).collect()
+        };
+        let mut basis = Basis::default();
+        for i in 0..2 * law.chain.len() {
+            let mut memory = law.rest();
+            memory[i / 2][i % 2] = 1.0;
+            basis.add_local(0, through(&mut memory, &|_| 0.0));
+        }
+        let mut r = through(&mut law.rest(), &|k| reference[k]);
+        r.iter_mut().enumerate().for_each(|(k, v)| *v += mask(k) * law.ahead(reference, k));
+        let mut p = through(&mut law.rest(), &|k| run.position[k]);
+        let mut u: Vec<f64> = (0..n).map(|k| mask(k) * run.command[k]).collect();
+        all += dot(&u, &u);
+        [&mut r, &mut p, &mut u].into_iter().for_each(|x| basis.project(x));
         rr += dot(&r, &r);
         rp += dot(&r, &p);
         pp += dot(&p, &p);
-        ru += dot(&r, &run.command);
-        pu += dot(&p, &run.command);
-        uu += dot(&run.command, &run.command);
+        ru += dot(&r, &u);
+        pu += dot(&p, &u);
+        uu += dot(&u, &u);
     }
     // command = a (C r) - b (C y); where the reference says little, b alone.
     let det = rr * pp - rp * rp;
@@ -155,15 +179,7 @@ pub fn replay_records(controller: &Controller, runs: &[&Run]) -> Result<Option<R
     } else {
         (1.0, -pu / f64::max(pp, 1e-300))
     };
-    let scaled = (uu - a * ru + b * pu).max(0.0) / f64::max(uu, 1e-300);
-    Ok(Some(Replay {
-        error: plain,
-        shift_samples: best.0,
-        error_shifted: best.1,
-        position_factor: if a != 0.0 { b / a } else { f64::NAN },
-        command_factor: a,
-        error_scaled: scaled.sqrt(),
-    }))
+    (a, b, ((uu - a * ru + b * pu).max(0.0) / f64::max(all, 1e-300)).sqrt())
 }
 
 /// Samples that the clock says are missing, and stretches where the position did not move although its noise says it must.
@@ -202,15 +218,16 @@ pub fn sample_faults(run: &Run, gaps: &[ClockGap], sample_time_s: f64) -> Vec<Sa
     all
 }
 
+/// Most samples that a log is taken to jump by.
+const SLIP: i32 = 40;
+
 /// A jump of the position log against the command log inside a record: where the replay starts to fail, and the shift behind
 /// that place that makes it right again.
-pub fn slip(controller: &Controller, run: &Run) -> Result<Option<SampleFault>, ControllerError> {
-    let Some(reference) = &run.reference else { return Ok(None) };
-    let chain = controller.sections()?.chain;
-    let limit = controller.output_limit.unwrap_or(f64::INFINITY);
+pub fn slip(law: &Law, run: &Run, sample_time_s: f64) -> Option<SampleFault> {
+    let reference = run.reference.as_deref()?;
     let predicted = |position: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        let [r, p] = replay(&chain, controller, run, reference, position);
-        r.iter().zip(&p).map(|(r, p)| (r - p).clamp(-limit, limit)).collect()
+        let error: Vec<f64> = reference.iter().enumerate().map(|(k, r)| r - position(k)).collect();
+        law.replay(reference, &error, &run.command)
     };
     let off = |p: &[f64]| -> Vec<f64> { p.iter().zip(&run.command).map(|(p, u)| (u - p).abs()).collect() };
     let plain = off(&predicted(&|k| run.position[k]));
@@ -220,29 +237,27 @@ pub fn slip(controller: &Controller, run: &Run) -> Result<Option<SampleFault>, C
     start.sort_by(f64::total_cmp);
     let size = (dot(&run.command, &run.command) / n as f64).sqrt();
     let quiet = start[head * 9 / 10].max(1e-6 * size);
-    let Some(first) = plain.iter().position(|e| *e > 20.0 * quiet && *e > 1e-3 * size) else { return Ok(None) };
-    // The start itself fails: not a slip inside the record.
-    if first < head {
-        return Ok(None);
+    let first = plain.iter().position(|e| *e > 20.0 * quiet && *e > 1e-3 * size)?;
+    // The start itself fails: not a slip inside the record. Too little behind it: no proof.
+    let tail = first + SLIP as usize;
+    if first < head || n < tail + head {
+        return None;
     }
+    // Behind the slip the law goes on from a memory of its own.
     let rest = |d: f64| -> f64 {
-        let p = predicted(&|k| if k < first { run.position[k] } else { between(&run.position, k as f64 + d) });
-        off(&p)[first..].iter().map(|e| e * e).sum()
+        let error: Vec<f64> = (tail..n).map(|k| reference[k] - between(&run.position, k as f64 + d)).collect();
+        let replayed = law.replay(&reference[tail..], &error, &run.command[tail..]);
+        replayed.iter().zip(&run.command[tail..]).map(|(p, u)| (u - p).powi(2)).sum()
     };
-    let before: f64 = plain[first..].iter().map(|e| e * e).sum();
-    let mut best = (0.0, before);
-    for d in (-20..=20).filter(|d| *d != 0) {
-        let e = rest(f64::from(d));
-        if e < best.1 {
-            best = (f64::from(d), e);
-        }
-    }
-    Ok((best.1 < 0.05 * before).then(|| SampleFault {
+    let before = rest(0.0);
+    let all = (1 - SLIP..SLIP).filter(|d| *d != 0).map(|d| (d, rest(f64::from(d))));
+    let (d, left) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (left < 0.05 * before).then(|| SampleFault {
         record: run.name.clone(),
-        time_s: first as f64 * controller.sample_time_s,
-        samples: -best.0,
+        time_s: first as f64 * sample_time_s,
+        samples: -f64::from(d),
         stuck: false,
-    }))
+    })
 }
 
 /// The step of the position's grid (position_unit), where the values lie on one that is coarser than the printed digits.

@@ -1,15 +1,21 @@
 //! Simulation against recording, per record: before, after a linear refit, after the findings, and the noise floor.
 //!
 //! Closed loop from reference and excitation where a controller is known and its law holds; open loop from the recorded
-//! command otherwise. The start of each record is estimated: the body's free motions are taken out by least squares.
+//! command otherwise. The start of each record is estimated.
 
-use super::linear::free_motions;
+use super::bench::Bench;
+use super::columns::raw_columns;
+use super::linear::{Sampled, free_motions};
+use super::lines::Line;
 use super::run::Run;
-use crate::controller::Controller;
-use crate::lti::{LtiError, Plant, Section};
-use crate::numeric::least_squares::Qr;
-use crate::physics::{Effect, Machine, Scene, Setting};
+use super::select::Model;
+use super::stack::Basis;
+use super::trajectory::Trajectory;
+use crate::controller::Law;
+use crate::lti::{Body, DiscretePlant, LtiError, Plant, PlantState, step_chain};
+use crate::physics::{Effect, Entry, Machine, Sample, Scene, Setting};
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 
 /// How records are simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -27,81 +33,127 @@ pub struct Judged<'a> {
     pub plant: &'a Plant,
     /// Its effects.
     pub effects: Vec<(&'a dyn Effect, &'a Setting)>,
+    /// Effects whose strengths are each record's own, with their inner parameters: fitted to the record that is judged, like
+    /// its start.
+    pub own: Vec<(&'a dyn Effect, &'a [f64])>,
+    /// Lines whose phase is each record's own.
+    pub lines: &'a [Line],
+    /// The bench and the fit that the model comes from, for records that do not begin at rest: the constant torque on them is
+    /// then found along the recorded motion.
+    pub fit: Option<(&'a Bench, &'a Model)>,
     /// Machine and size of its motion.
     pub scene: &'a Scene,
 }
 
-/// The loop that a closed-loop simulation closes.
-pub struct Loop<'a> {
-    /// The controller.
-    pub controller: &'a Controller,
-    /// Its sections.
-    pub chain: Vec<Section>,
+impl Judged<'_> {
+    /// Position per constant command (position_unit per command_unit), infinite for a free inertia.
+    fn gain_at_rest(&self) -> f64 {
+        let modes: f64 = self.plant.modes.iter().map(|m| (m.zero_rad_s / m.pole_rad_s).powi(2)).product();
+        match self.plant.body {
+            Body::SecondOrder { dc_gain, .. } => dc_gain * self.plant.resonance_gain * modes,
+            Body::FreeInertia { .. } => f64::INFINITY,
+        }
+    }
+
+    /// What is each record's own, in the position: the start, lines, and effects of a strength of their own.
+    pub fn columns(&self, run: &Run) -> Result<Vec<Vec<f64>>, LtiError> {
+        let t = self.scene.sample_time_s;
+        let direct = Sampled::of(self.plant, t)?.direct;
+        let mut all = free_motions(&self.plant.body, t, run.len()).to_vec();
+        all.extend(self.lines.iter().flat_map(|l| l.columns(run, t)));
+        let spindle = self.scene.spindle_hz.unwrap_or(0.0) * TAU;
+        let samples = (0..run.len())
+            .map(|k| Sample {
+                t: k as f64 * t,
+                u: run.input[k],
+                spindle_rad: run.spindle_rad.as_ref().map_or(spindle * k as f64 * t, |s| s[k]),
+                ..Sample::default()
+            })
+            .collect();
+        let motion = Trajectory { samples, unexplained: Vec::new() };
+        for (effect, inner) in &self.own {
+            for column in raw_columns(*effect, inner, self.scene, &motion) {
+                let mut y = vec![0.0; column.len()];
+                match effect.facts().entry {
+                    Entry::Position => y = column,
+                    _ => direct.add_response(&column, &mut y),
+                }
+                all.push(y);
+            }
+        }
+        Ok(all)
+    }
 }
 
-/// Recorded less simulated position of one record.
-pub fn error(model: &Judged, run: &Run, closed: Option<&Loop>) -> Result<Vec<f64>, LtiError> {
-    let mut machine = Machine::new(model.plant, &model.effects, model.scene)?;
-    let free = matches!(model.plant.body, crate::lti::Body::FreeInertia { .. });
-    let origin = if free { run.position[0] } else { 0.0 };
-    if free {
-        machine = machine.started_at(origin);
+/// Recorded less simulated position of one record; in closed loop where a law is given and the record has a reference.
+///
+/// The machine starts at rest where the record does, the controller with the memory that the first recorded commands ask for;
+/// what is left of the start is taken out as free motions of body or loop, by least squares.
+pub fn error(model: &Judged, run: &Run, closed: Option<&Law>) -> Result<Vec<f64>, LtiError> {
+    let mut machine = Machine::new(model.plant, &model.effects, model.scene)?.started_at(run.origin, run.before);
+    if let Some((bench, fit)) = model.fit.filter(|_| !run.rested && !model.effects.is_empty()) {
+        machine = machine.held_by(bench.constant_torque(run, fit)?, model.gain_at_rest());
     }
     let t = model.scene.sample_time_s;
-    let spindle = model.scene.spindle_hz.unwrap_or(0.0) * std::f64::consts::TAU;
+    let spindle = model.scene.spindle_hz.unwrap_or(0.0) * TAU;
     let n = run.len();
     let mut out = Vec::with_capacity(n);
-    let mut memory = closed.map_or(Vec::new(), |l| vec![[0.0; 2]; l.chain.len()]);
-    let reference = run.reference.as_deref().unwrap_or(&[]);
+    let mut loops = closed.zip(run.reference.as_deref()).map(|(law, reference)| {
+        let recorded: Vec<f64> = reference.iter().zip(&run.position).map(|(r, y)| r - y).collect();
+        (law, reference, law.memory(reference, &recorded, &run.command))
+    });
     for k in 0..n {
         let angle = run.spindle_rad.as_ref().map_or(spindle * k as f64 * t, |s| s[k]);
         let y = machine.measure(angle, run.temperature.as_ref().map_or(0.0, |c| c[k]));
         out.push(run.position[k] - y);
-        let u = match closed {
-            Some(l) if reference.len() == n => {
-                let mut s = reference[k] - y;
-                for (c, m) in l.chain.iter().zip(memory.iter_mut()) {
-                    let v = c.b0 * s + m[0];
-                    m[0] = c.b1 * s - c.a1 * v + m[1];
-                    m[1] = c.b2 * s - c.a2 * v;
-                    s = v;
-                }
-                if let Some(f) = &l.controller.feedforward {
-                    let (back, ahead) = (reference[k.saturating_sub(1)], reference[(k + 1).min(n - 1)]);
-                    s += f.factor
-                        * (f.velocity_s * (ahead - back) / (2.0 * t)
-                            + f.acceleration_s2 * (ahead - 2.0 * reference[k] + back) / (t * t));
-                }
-                let limit = l.controller.output_limit.unwrap_or(f64::INFINITY);
-                s.clamp(-limit, limit) + run.excitation[k]
+        let u = match &mut loops {
+            Some((law, reference, memory)) => {
+                let sum = step_chain(&law.chain, memory, reference[k] - y) + law.ahead(reference, k);
+                sum.clamp(-law.limit, law.limit) + run.excitation[k]
             }
-            _ => run.input[k],
+            None => run.input[k],
         };
         machine.command(u);
     }
-    if closed.is_none() {
-        take_out(&free_motions(&model.plant.body, t, n), &mut out);
+    let mut own = model.columns(run)?;
+    if let Some((law, ..)) = &loops {
+        let plant = DiscretePlant::of(model.plant, t)?;
+        own = own.iter().map(|d| in_loop(&plant, law, d)).collect();
     }
+    take_out(own, &mut out);
     Ok(out)
 }
 
-/// Takes the least-squares share of a few columns out of a series.
-fn take_out(columns: &[Vec<f64>], x: &mut [f64]) {
+/// What a disturbance of the position leaves in closed loop, no limit met.
+fn in_loop(plant: &DiscretePlant, law: &Law, disturbance: &[f64]) -> Vec<f64> {
+    let mut state = PlantState::at_rest(plant);
+    let mut memory = law.rest();
+    disturbance
+        .iter()
+        .map(|d| {
+            let y = d + state.position();
+            state.command(step_chain(&law.chain, &mut memory, -y));
+            state.advance(plant);
+            y
+        })
+        .collect()
+}
+
+/// Takes the least-squares share of a few columns out of a series. Columns start at a size near 1: one that runs away in a
+/// loop is no start.
+fn take_out(columns: Vec<Vec<f64>>, x: &mut [f64]) {
     if x.iter().any(|v| !v.is_finite()) {
         return;
     }
-    let (n, m) = (x.len(), columns.len());
-    let mut qr = Qr::default();
-    qr.factor(n, m, |a| a.chunks_exact_mut(n).zip(columns).for_each(|(a, c)| a.copy_from_slice(c)));
-    let mut b = x.to_vec();
-    let solved = qr.solve(&mut b);
-    for (column, s) in columns.iter().zip(solved) {
-        x.iter_mut().zip(column).for_each(|(x, c)| *x -= s * c);
+    let mut basis = Basis::default();
+    for c in columns.into_iter().filter(|c| c.iter().all(|v| v.abs() < 1e6)) {
+        basis.add_local(0, c);
     }
+    basis.project(x);
 }
 
 /// Errors of several records; infinite where the simulation cannot run or runs away.
-pub fn errors(model: &Judged, runs: &[&Run], closed: Option<&Loop>) -> Vec<Vec<f64>> {
+pub fn errors(model: &Judged, runs: &[&Run], closed: Option<&Law>) -> Vec<Vec<f64>> {
     runs.par_iter()
         .map(|run| {
             error(model, run, closed)
@@ -118,9 +170,10 @@ pub fn rms(series: &[Vec<f64>]) -> f64 {
     (sum / f64::max(n, 1.0)).sqrt()
 }
 
-/// The noise of one record as repeats show it: the spread of a series about its group's mean; none without repeats.
+/// The noise of one record as repeats show it: the spread of a series about its group's mean, the median over the groups; none
+/// without repeats.
 pub fn floor(series: &[Vec<f64>], runs: &[&Run]) -> Option<f64> {
-    let (mut sum, mut n) = (0.0, 0.0);
+    let mut each = Vec::new();
     for (i, run) in runs.iter().enumerate() {
         let group: Vec<usize> =
             (0..runs.len()).filter(|&j| runs[j].group == run.group && runs[j].len() == run.len()).collect();
@@ -133,8 +186,15 @@ pub fn floor(series: &[Vec<f64>], runs: &[&Run]) -> Option<f64> {
             let mean = members.iter().map(|m| m[k]).sum::<f64>() / r;
             members.iter().map(|m| (m[k] - mean).powi(2)).sum::<f64>()
         };
-        sum += (0..run.len()).map(spread).sum::<f64>();
-        n += run.len() as f64 * (r - 1.0);
+        each.push((0..run.len()).map(spread).sum::<f64>() / (run.len() as f64 * (r - 1.0)));
     }
-    (n > 0.0 && f64::is_finite(sum)).then(|| (sum / n).sqrt())
+    each.retain(|v| v.is_finite());
+    each.sort_by(f64::total_cmp);
+    let middle = each.len() / 2;
+    let median = if each.len() % 2 == 1 {
+        each[middle]
+    } else {
+        0.5 * (each.get(middle)? + each.get(middle.wrapping_sub(1))?)
+    };
+    Some(median.sqrt())
 }

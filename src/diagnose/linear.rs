@@ -2,7 +2,7 @@
 //!
 //! Parameters are relative to the plant that the case came with: 0 everywhere is that plant.
 
-use crate::lti::{Body, DiscretePlant, LtiError, Plant, PlantState};
+use crate::lti::{Body, DiscretePlant, LtiError, Plant};
 
 /// One parameter of the linear plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +48,13 @@ pub struct Carrier {
     pub spring: f64,
     /// Torque per velocity (command_unit s per position_unit).
     pub damper: f64,
+}
+
+impl Carrier {
+    /// The arm's own position over the recorded one, both at rest: 1 over the modes' gain at rest.
+    pub fn arm_over_record(&self) -> f64 {
+        self.plant.modes.iter().map(|m| (m.pole_rad_s / m.zero_rad_s).powi(2)).product()
+    }
 }
 
 impl LinearForm {
@@ -157,14 +164,11 @@ impl Sampled {
     }
 }
 
-/// The plant's answer from rest to an input held over each sample; `out` is added to.
-pub fn add_response(plant: &DiscretePlant, input: &[f64], out: &mut [f64]) {
-    let mut state = PlantState::at_rest(plant);
-    for (u, y) in input.iter().zip(out) {
-        *y += state.position();
-        state.command(*u);
-        state.advance(plant);
-    }
+/// Sizes of the free motions: position, velocity (1/s), acceleration (1/s²) at the start.
+pub fn free_scales(body: &Body, sample_time_s: f64, n: usize) -> [f64; 3] {
+    let (_, k, _) = body_numbers(body);
+    let rate = 1.0 / (n as f64 * sample_time_s);
+    [1.0, k.sqrt().max(rate), k.max(rate * rate)]
 }
 
 /// Free motions of the body over `n` samples: from a position, from a velocity, and under a constant torque. Each has a
@@ -173,7 +177,7 @@ pub fn free_motions(body: &Body, sample_time_s: f64, n: usize) -> [Vec<f64>; 3] 
     let (_, k, c) = body_numbers(body);
     let step = nalgebra::Matrix3::new(0.0, 1.0, 0.0, -k, -c, 1.0, 0.0, 0.0, 0.0) * sample_time_s;
     let step = step.exp();
-    let scale = [1.0, k.sqrt().max(1.0 / (n as f64 * sample_time_s)), k.max((n as f64 * sample_time_s).powi(-2))];
+    let scale = free_scales(body, sample_time_s, n);
     std::array::from_fn(|i| {
         let mut z = nalgebra::Vector3::zeros();
         z[i] = scale[i];

@@ -5,22 +5,23 @@ use super::columns::position_columns;
 use super::finding::{Diagnosis, Estimate, Finding, Verdict, Where};
 use super::linear::{Knob, LinearForm, Sampled, body_numbers};
 use super::place::place;
+use super::refit::Chosen;
 use super::run::Run;
 use super::scan::log_tail;
-use super::select::{Selection, Step};
-use crate::physics::{Parameter, Setting, facts, library};
+use super::select::Selection;
+use crate::physics::{Parameter, Setting, effect, facts, library};
 use std::collections::BTreeMap;
 
 /// Difference of the fit (twice the log-likelihood) below which two names are one family.
 const FAMILY: f64 = 20.0;
 /// The same as a share of what the effect explains: laws differ from any machine by more than noise.
-const FAMILY_SHARE: f64 = 0.01;
+const FAMILY_SHARE: f64 = 1e-3;
 
 /// Sliding length over the sensor's noise below which friction counts as dry.
 const DRY: f64 = 12.0;
 
 /// Whether two names are the two ends of one law, told apart by the sliding length alone.
-fn same_drag(a: &str, b: &str) -> bool {
+pub(super) fn same_drag(a: &str, b: &str) -> bool {
     let drag = ["pivot_friction", "coulomb_friction"];
     drag.contains(&a) && drag.contains(&b)
 }
@@ -37,19 +38,16 @@ pub(super) fn everywhere(runs: &[&Run]) -> Where {
     Where { records: runs.iter().map(|r| r.name.clone()).collect(), velocity_sign: "both", ..Where::default() }
 }
 
-/// The finding of one accepted step.
-pub(super) fn finding(bench: &Bench, selection: &Selection, step: &Step, index: usize) -> Finding {
-    let taken = step.taken.unwrap_or(0);
-    let (candidate, model) = &step.tried[taken];
+/// The finding about effect `at` of the final model; none where its step took nothing.
+pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option<Finding> {
+    let chosen = &selection.model.chosen[at];
+    let step = &selection.steps[chosen.step];
+    let (candidate, model) = &step.tried[step.taken?];
     let c = &step.candidates[*candidate];
-    let at = model.chosen.len() - 1;
-    let last = &selection.model;
-    let chosen = &last.chosen[at.min(last.chosen.len() - 1)];
-    let before = if index == 0 { selection.baseline.cost } else { cost_before(selection, index) };
-    let gain = before - model.cost;
+    let gain = step.before - model.cost;
     let spindle =
         |hz: f64| bench.scene.spindle_hz.is_some_and(|s| ((hz / s).round() - hz / s).abs() < 0.004 && hz > 0.9 * s);
-    let own = c.effect.facts().name;
+    let own = chosen.effect.facts().name;
     // A line at a multiple of the spindle is run-out, whichever law carried it.
     let inner = &chosen.setting.inner;
     let name = match own {
@@ -59,15 +57,14 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, step: &Step, index: 
         _ => own,
     };
     let mut family = vec![name.to_owned()];
-    for (j, other) in &step.tried {
-        let rival = step.candidates[*j].effect.facts().name;
-        if other.cost - model.cost < FAMILY.max(FAMILY_SHARE * gain * 0.1)
+    for (rival, cost) in &selection.rivals[at] {
+        if cost - selection.model.cost < FAMILY.max(FAMILY_SHARE * gain)
             && !family.iter().any(|f| f == rival)
-            && rival != own
+            && *rival != own
             && !same_drag(rival, name)
-            && !(name == "repeatable_runout" && rival == "line_disturbance" && bench.scene.spindle_hz.is_some())
+            && !(name == "repeatable_runout" && *rival == "line_disturbance" && bench.scene.spindle_hz.is_some())
         {
-            family.push(rival.to_owned());
+            family.push((*rival).to_owned());
         }
     }
     let log_p = log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library().len() as f64).ln();
@@ -79,7 +76,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, step: &Step, index: 
     }
     let place = place(bench, &bench.stack, &signal);
     let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
-    Finding {
+    Some(Finding {
         effect: name.into(),
         family,
         port,
@@ -87,12 +84,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, step: &Step, index: 
         says: format!("Between {:.3} and {:.3} Hz {says}.", band[0], band[1]),
         parameters,
         place,
-    }
-}
-
-fn cost_before(selection: &Selection, index: usize) -> f64 {
-    let step = &selection.steps[index - 1];
-    step.taken.map_or(selection.baseline.cost, |t| step.tried[t].1.cost)
+    })
 }
 
 /// What the effect adds, whitened and stacked.
@@ -101,17 +93,11 @@ fn effect_signal(bench: &Bench, selection: &Selection, at: usize) -> Vec<f64> {
     let chosen = &model.chosen[at];
     let plant = bench.form.carrier(&model.refitted.p).plant;
     let Ok(sampled) = Sampled::of(&plant, bench.scene.sample_time_s) else { return vec![0.0; bench.stack.total] };
-    let facts = chosen.effect.facts();
     let mut signal = bench.stack.series(|i| {
         let columns =
             position_columns(chosen.effect, &chosen.setting.inner, &bench.scene, &bench.trajectories[i], &sampled);
-        let own = if facts.per_record {
-            &chosen.setting.strengths[i * facts.columns..]
-        } else {
-            &chosen.setting.strengths[..]
-        };
         let mut y = vec![0.0; bench.means[i].len()];
-        for (c, s) in columns.iter().zip(own) {
+        for (c, s) in columns.iter().zip(chosen.own(i)) {
             y.iter_mut().zip(c).for_each(|(y, c)| *y += s * c);
         }
         bench.whitener.apply(&mut y);
@@ -252,17 +238,35 @@ fn statistic(name: &str, parameter: (&str, Estimate), p_value: f64, runs: &[&Run
     }
 }
 
-/// Sum of squares with only some of the linear parameters free.
-fn restricted(bench: &Bench, keep: impl Fn(Knob) -> bool, selection: &Selection) -> (f64, Vec<f64>, usize) {
+/// Sum of squares with only some of the linear parameters free, and with one effect more where it is given.
+fn restricted(
+    bench: &Bench,
+    keep: impl Fn(Knob) -> bool,
+    selection: &Selection,
+    more: Option<Chosen>,
+) -> (f64, Vec<f64>, usize) {
     let knobs: Vec<Knob> = bench.form.knobs.iter().copied().filter(|k| keep(*k)).collect();
     let form = LinearForm { knobs: knobs.clone(), ..bench.form.clone() };
     let start = vec![0.0; knobs.len()];
-    let mut fit = super::refit::Fit { form: &form, ..bench.fit(selection.model.chosen.clone()) };
+    let mut chosen = selection.model.chosen.clone();
+    chosen.extend(more);
+    let mut fit = super::refit::Fit { form: &form, ..bench.fit(chosen) };
     if knobs.is_empty() && fit.chosen.is_empty() {
         return (fit.cost(&start), start, 0);
     }
     let r = fit.refit(&start, 8);
     (r.cost, r.p, knobs.len())
+}
+
+/// Lags that fit as well as a delay of `delay_s` does, beside linear parameters as given: a lag far above the band is a delay.
+fn lags_like(bench: &Bench, selection: &Selection, delay_s: f64, cost: f64) -> Vec<String> {
+    let as_good = |name: &&str| {
+        let Some(lag) = effect(name) else { return false };
+        let setting = Setting { inner: vec![delay_s], strengths: vec![1.0] };
+        let more = Chosen { effect: lag, setting, continuous: vec![true], step: 0 };
+        restricted(bench, |_| false, selection, Some(more)).0 < cost + FAMILY
+    };
+    ["amplifier_lag", "sensor_lag"].into_iter().filter(as_good).map(str::to_owned).collect()
 }
 
 /// What happened to the linear parameters: nothing, the delay alone, one mode alone, or a refit.
@@ -277,12 +281,12 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
         let n = all - free as f64;
         n + 5.0 * (2.0 * n).sqrt() + 10.0
     };
-    let (fixed, _, _) = restricted(bench, |_| false, selection);
+    let (fixed, _, _) = restricted(bench, |_| false, selection, None);
     if fixed - full < allowed(0) {
         d.remarks.push("the linear parameters agree with the given plant".into());
         return;
     }
-    let (delay, p, free) = restricted(bench, |k| k == Knob::Delay, selection);
+    let (delay, p, free) = restricted(bench, |k| k == Knob::Delay, selection, None);
     if delay - full < allowed(free) {
         let t = bench.scene.sample_time_s;
         let value = p[0] * t;
@@ -290,9 +294,13 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
             bench.form.knobs.iter().position(|k| *k == Knob::Delay).map_or(0.0, |i| selection.model.refitted.spread[i])
                 * t;
         let (says, port) = text_of("extra_delay");
+        let mut family = vec!["extra_delay".to_owned()];
+        if value > 0.0 {
+            family.extend(lags_like(bench, selection, value, delay));
+        }
         let f = Finding {
             effect: "extra_delay".into(),
-            family: vec!["extra_delay".into()],
+            family,
             port,
             p_value: log_tail(fixed - delay, 1).min(0.0).exp().max(1e-300),
             says: format!("{says}: {:.2} microseconds.", value * 1e6),
@@ -303,7 +311,7 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
             place: everywhere(&bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect::<Vec<_>>()),
         };
         if d.verdict == Verdict::NoMismatch {
-            d.verdict = Verdict::Named;
+            d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
         }
         d.findings.push(f);
         return;

@@ -1,8 +1,9 @@
 //! All linear parameters fitted to all fit records at once, with the strengths and inner parameters of the effects that
 //! were chosen so far; by the whitened simulation error.
 
-use super::columns::raw_columns;
-use super::linear::{Carrier, LinearForm, Sampled, add_response, free_motions};
+use super::columns::{Drive, drive};
+use super::linear::{Carrier, LinearForm, Sampled, free_motions};
+use super::lines::Line;
 use super::run::Run;
 use super::stack::{Basis, Stack};
 use super::trajectory::Trajectory;
@@ -11,6 +12,7 @@ use crate::lti::Plant;
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
 use crate::physics::{Effect, Entry, Sample, Scene, Setting};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// An effect that is part of the model, with its numbers.
 #[derive(Clone)]
@@ -21,6 +23,17 @@ pub struct Chosen {
     pub setting: Setting,
     /// Which inner parameters may be refined.
     pub continuous: Vec<bool>,
+    /// The step of the search that found it.
+    pub step: usize,
+}
+
+impl Chosen {
+    /// The strengths in one segment of the stack.
+    pub fn own(&self, segment: usize) -> &[f64] {
+        let facts = self.effect.facts();
+        let from = if facts.per_record { segment * facts.columns } else { 0 };
+        self.setting.strengths.get(from..).unwrap_or(&[])
+    }
 }
 
 /// What a refit works on.
@@ -35,6 +48,8 @@ pub struct Fit<'a> {
     pub whitener: &'a Whitener,
     /// How they are stacked.
     pub stack: &'a Stack,
+    /// Lines of a phase of their own in every record.
+    pub lines: &'a [Line],
     /// Machine and size of its motion.
     pub scene: &'a Scene,
     /// Effects in the model.
@@ -68,6 +83,9 @@ struct Problem<'a, 'f> {
     inner: Vec<(usize, usize)>,
     /// Strengths: effect and place.
     strengths: Vec<(usize, usize)>,
+    /// What each effect's law gives along every mean run, for the inner parameters it was last asked for: most of what a
+    /// refit asks for differs in other numbers.
+    drives: Vec<(Vec<f64>, Drive)>,
 }
 
 impl Problem<'_, '_> {
@@ -83,57 +101,76 @@ impl Problem<'_, '_> {
         all
     }
 
-    /// Whitened error, one stacked vector, local directions taken out.
-    fn error(&self, x: &[f64]) -> Vec<f64> {
+    /// Makes the laws' columns for `x`, to be kept.
+    fn keep(&mut self, x: &[f64]) {
+        let fit = self.fit;
+        let settings = self.settings(x);
+        self.drives.resize_with(settings.len(), Default::default);
+        for ((s, c), kept) in settings.into_iter().zip(&fit.chosen).zip(&mut self.drives) {
+            if kept.1.segments.is_empty() || kept.0 != s.inner {
+                *kept = (s.inner.clone(), drive(c.effect, &s.inner, fit.scene, fit.trajectories));
+            }
+        }
+    }
+
+    /// Error of every mean run, or of those given instead.
+    fn raw(&self, x: &[f64], runs: &[Run]) -> Vec<Vec<f64>> {
         let fit = self.fit;
         let carrier = fit.form.carrier(&x[..fit.form.knobs.len()]);
         let Ok(sampled) = Sampled::of(&carrier.plant, fit.scene.sample_time_s) else {
-            return vec![f64::INFINITY; fit.stack.total];
+            return runs.iter().map(|r| vec![f64::INFINITY; r.len()]).collect();
         };
         let settings = self.settings(x);
-        let effects: Vec<(&dyn Effect, &Setting)> = fit.chosen.iter().map(|c| c.effect).zip(&settings).collect();
-        let mut all = fit.stack.series(|i| {
-            let mut e =
-                simulation_error(&sampled, &carrier, &effects, fit.scene, &fit.means[i], &fit.trajectories[i], i);
+        let drives: Vec<Cow<Drive>> = (fit.chosen.iter().zip(&settings).zip(&self.drives))
+            .map(|((c, s), (inner, kept))| match *inner == s.inner {
+                true => Cow::Borrowed(kept),
+                false => Cow::Owned(drive(c.effect, &s.inner, fit.scene, fit.trajectories)),
+            })
+            .collect();
+        let parts: Vec<(&Drive, &[f64])> =
+            drives.iter().map(|d| &**d).zip(settings.iter().map(|s| &s.strengths[..])).collect();
+        let error =
+            |(i, run): (usize, &Run)| simulation_error(&sampled, &carrier, &parts, run, &fit.trajectories[i], i);
+        runs.iter().enumerate().map(error).collect()
+    }
+
+    /// Whitened error, one stacked vector, local directions taken out.
+    fn error(&self, x: &[f64]) -> Vec<f64> {
+        let fit = self.fit;
+        let mut all = Vec::with_capacity(fit.stack.total);
+        for (s, mut e) in fit.stack.segments.iter().zip(self.raw(x, fit.means)) {
             fit.whitener.apply(&mut e);
-            e
-        });
+            all.extend(e.into_iter().map(|v| s.weight * v));
+        }
         self.local.project(&mut all);
         all
     }
 }
 
 /// Recorded position less the carrier's answer to the recorded command, with changes of the body and all effects driven by
-/// the recorded motion; `segment` picks the strengths of effects that differ from record to record.
+/// the recorded motion; `segment` picks the columns of the effects, and the strengths of those that differ from record to
+/// record.
 pub fn simulation_error(
     sampled: &Sampled,
     carrier: &Carrier,
-    effects: &[(&dyn Effect, &Setting)],
-    scene: &Scene,
+    effects: &[(&Drive, &[f64])],
     run: &Run,
     trajectory: &Trajectory,
     segment: usize,
 ) -> Vec<f64> {
-    let mut command = run.input.clone();
+    // From rest under the command that stood before: the body's answer to that constant is a free motion.
+    let mut command: Vec<f64> = run.input.iter().map(|u| u - run.before).collect();
     let mut torque: Option<Vec<f64>> = (carrier.spring != 0.0 || carrier.damper != 0.0).then(|| {
         // The mean over each interval, by the trapezium.
-        let by = scene.arm_over_record();
+        let by = carrier.arm_over_record();
         let at = |s: &Sample| by * (carrier.spring * s.x + carrier.damper * s.v);
         let samples = &trajectory.samples;
         (0..run.len()).map(|k| 0.5 * (at(&samples[k]) + at(&samples[(k + 1).min(run.len() - 1)]))).collect()
     });
     let mut y = vec![0.0; run.len()];
-    for (effect, setting) in effects {
-        let raw = raw_columns(*effect, &setting.inner, scene, trajectory);
-        let facts = effect.facts();
-        // Effects that differ from record to record have their strengths segment by segment.
-        let own = if facts.per_record {
-            setting.strengths.get(segment * facts.columns..).unwrap_or(&[])
-        } else {
-            &setting.strengths
-        };
-        for (column, s) in raw.iter().zip(own) {
-            let into = match facts.entry {
+    for (drive, strengths) in effects {
+        for (column, s) in drive.segments[segment].iter().zip(drive.own(strengths, segment)) {
+            let into = match drive.entry {
                 Entry::Command => &mut command,
                 Entry::Torque => torque.get_or_insert_with(|| vec![0.0; run.len()]),
                 Entry::Position => &mut y,
@@ -141,9 +178,9 @@ pub fn simulation_error(
             into.iter_mut().zip(column).for_each(|(o, v)| *o += s * v);
         }
     }
-    add_response(&sampled.delayed, &command, &mut y);
+    sampled.delayed.add_response(&command, &mut y);
     if let Some(w) = torque {
-        add_response(&sampled.direct, &w, &mut y);
+        sampled.direct.add_response(&w, &mut y);
     }
     run.position.iter().zip(&y).map(|(m, y)| m - y).collect()
 }
@@ -158,10 +195,12 @@ impl Residuals for Problem<'_, '_> {
     }
 
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) {
+        self.keep(x);
         r.copy_from_slice(&self.error(x));
     }
 
     fn jacobian(&mut self, x: &[f64], j: &mut [f64]) {
+        self.keep(x);
         let base = self.error(x);
         let p = self.fit.form.knobs.len();
         let this = &*self;
@@ -205,11 +244,13 @@ impl Residuals for Problem<'_, '_> {
 }
 
 impl Fit<'_> {
-    /// Directions of each record's own start and constant torque.
+    /// Directions of each record's own start, constant torque and lines.
     pub fn local_basis(&self) -> Basis {
         let mut basis = Basis::default();
-        for s in &self.stack.segments {
-            for mut column in free_motions(&self.form.given.body, self.scene.sample_time_s, s.len) {
+        for (s, run) in self.stack.segments.iter().zip(self.means) {
+            let t = self.scene.sample_time_s;
+            let lines = self.lines.iter().flat_map(|l| l.columns(run, t));
+            for mut column in free_motions(&self.form.given.body, t, s.len).into_iter().chain(lines) {
                 self.whitener.apply(&mut column);
                 basis.add_local(s.start, column);
             }
@@ -226,7 +267,7 @@ impl Fit<'_> {
             }
             inner.extend((0..c.setting.inner.len()).filter(|&i| c.continuous[i]).map(|i| (e, i)));
         }
-        Problem { fit: self, local: self.local_basis(), inner, strengths }
+        Problem { fit: self, local: self.local_basis(), inner, strengths, drives: Vec::new() }
     }
 
     fn start(&self, p: &[f64], problem: &Problem) -> Vec<f64> {
@@ -238,9 +279,24 @@ impl Fit<'_> {
 
     /// Sum of squares of the whitened error at `p`, each record's own start taken out.
     pub fn cost(&self, p: &[f64]) -> f64 {
-        let problem = self.problem();
-        let error = problem.error(&self.start(p, &problem));
+        let mut problem = self.problem();
+        let x = self.start(p, &problem);
+        problem.keep(&x);
+        let error = problem.error(&x);
         error.iter().map(|e| e * e).sum()
+    }
+
+    /// Error of every mean run at `p`.
+    pub fn errors(&self, p: &[f64]) -> Vec<Vec<f64>> {
+        self.errors_of(p, self.means)
+    }
+
+    /// Error of runs that stand in for the mean runs, one for each.
+    pub fn errors_of(&self, p: &[f64], runs: &[Run]) -> Vec<Vec<f64>> {
+        let mut problem = self.problem();
+        let x = self.start(p, &problem);
+        problem.keep(&x);
+        problem.raw(&x, runs)
     }
 
     /// Fits from `p` on; the chosen effects' numbers move with it.
@@ -273,6 +329,7 @@ impl Fit<'_> {
     pub fn screen_basis(&self, p: &[f64]) -> (Vec<f64>, Basis) {
         let mut problem = self.problem();
         let x = self.start(p, &problem);
+        problem.keep(&x);
         let mut error = problem.error(&x);
         let rows = self.stack.total;
         let mut jacobian = vec![0.0; rows * problem.cols()];

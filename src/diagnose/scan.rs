@@ -1,11 +1,16 @@
 //! Every effect of the library, every point of its grid: how much of the remaining error it explains.
+//!
+//! A column against the error costs no simulation: with T the plant and the filter, (T c)'r = c'(T'r), and T'r is made once.
+//! The columns' own energy changes slowly along a grid. So every tenth point is worked out in full, the others take their
+//! energy from these, and what then looks best is worked out in full too.
 
-use super::columns::white_columns;
+use super::columns::{raw_columns, white_columns};
 use super::linear::Sampled;
 use super::refit::Fit;
-use super::stack::{Basis, Explained, explain};
+use super::stack::{Basis, Explained, Normal};
 use crate::lti::Plant;
-use crate::physics::{Effect, Setting};
+use crate::numeric::least_squares::dot;
+use crate::physics::{Effect, Entry, Setting};
 use rayon::prelude::*;
 
 /// The best that one effect can do.
@@ -19,8 +24,6 @@ pub struct Candidate {
     pub gain: f64,
     /// Share of its columns that the linear parameters can imitate, at its best point.
     pub concealed: f64,
-    /// The smallest such share over the grid: 1 means that these records cannot show the effect at all.
-    pub least_concealed: f64,
     /// Points of the grid.
     pub points: usize,
     /// Free strengths.
@@ -45,17 +48,22 @@ pub fn log_tail(g: f64, m: usize) -> f64 {
     if g <= m { 0.0 } else { 0.5 * (m - g) + 0.5 * m * (g / m).ln() }
 }
 
-/// Inner parameters that take more than three magnitudes over the grid, not all whole: these may be refined, sign kept.
-fn continuous(grid: &[Vec<f64>]) -> Vec<bool> {
+/// Inner parameters that take more than three magnitudes over the grid, not all whole: neighbours differ little in these.
+fn swept(grid: &[Vec<f64>]) -> Vec<bool> {
     let count = grid.first().map_or(0, Vec::len);
     (0..count)
         .map(|i| {
             let mut values: Vec<f64> = grid.iter().map(|p| p[i].abs()).collect();
             values.sort_by(f64::total_cmp);
             values.dedup();
-            values.len() > 3 && values.iter().any(|v| v.fract() != 0.0) && values[0] > 0.0
+            values.len() > 3 && values.iter().any(|v| v.fract() != 0.0)
         })
         .collect()
+}
+
+/// Of these, the ones that are never 0: they may be refined, sign kept.
+fn continuous(grid: &[Vec<f64>]) -> Vec<bool> {
+    swept(grid).into_iter().enumerate().map(|(i, s)| s && grid.iter().all(|p| p[i] != 0.0)).collect()
 }
 
 fn range(grid: &[Vec<f64>]) -> Vec<[f64; 2]> {
@@ -64,26 +72,71 @@ fn range(grid: &[Vec<f64>]) -> Vec<[f64; 2]> {
     (0..count).map(|i| [over(i, f64::min, f64::INFINITY), over(i, f64::max, f64::NEG_INFINITY)]).collect()
 }
 
-/// A scan's ground: the error that is left, and what fits have used up.
-pub struct Ground<'a, 'f> {
-    /// Runs, filter, stack.
-    pub fit: &'a Fit<'f>,
-    /// The plant through which torques and commands are seen.
-    pub plant: &'a Plant,
-    /// The whitened error, basis taken out.
-    pub error: &'a [f64],
-    /// Directions used up.
-    pub basis: &'a Basis,
+/// Points that differ in swept parameters only, signs kept; in the order of these.
+fn classes(grid: &[Vec<f64>]) -> Vec<Vec<usize>> {
+    let free = swept(grid);
+    let mut all: Vec<Vec<usize>> = Vec::new();
+    let same = |a: &[f64], b: &[f64]| (0..a.len()).all(|i| a[i] == b[i] || (free[i] && (a[i] < 0.0) == (b[i] < 0.0)));
+    for (i, point) in grid.iter().enumerate() {
+        match all.iter_mut().find(|c| same(&grid[c[0]], point)) {
+            Some(c) => c.push(i),
+            None => all.push(vec![i]),
+        }
+    }
+    let along = |i: usize| free.iter().zip(&grid[i]).filter(|(f, _)| **f).map(|(_, v)| *v);
+    for class in &mut all {
+        class.sort_by(|&a, &b| along(a).partial_cmp(along(b)).unwrap_or(std::cmp::Ordering::Equal));
+    }
+    all
 }
 
-impl Ground<'_, '_> {
-    /// How well an effect does at one point.
-    pub fn explain(&self, sampled: &Sampled, effect: &'static dyn Effect, inner: &[f64]) -> Explained {
+/// A scan's ground: the error that is left, and what fits have used up.
+pub struct Ground<'a, 'f> {
+    fit: &'a Fit<'f>,
+    sampled: Sampled,
+    error: Vec<f64>,
+    basis: Basis,
+    /// The error seen from where columns enter: command, torque, position.
+    seen: [Vec<f64>; 3],
+}
+
+/// Points of a grid from one that is worked out in full to the next.
+const STRIDE: usize = 10;
+/// Points that are worked out in full because the others make them look best.
+const PROMISING: usize = 6;
+
+impl<'a, 'f> Ground<'a, 'f> {
+    /// The ground of a fit: `error` is whitened and has `basis` taken out; torques and commands are seen through `plant`.
+    pub fn new(fit: &'a Fit<'f>, plant: &Plant, error: Vec<f64>, basis: Basis) -> Option<Ground<'a, 'f>> {
+        let sampled = Sampled::of(plant, fit.scene.sample_time_s).ok()?;
+        // The adjoint of a filter from rest is the same filter backwards in time.
+        let back = |entry: Entry| {
+            let mut out = Vec::with_capacity(error.len());
+            for s in &fit.stack.segments {
+                let mut x: Vec<f64> = error[s.start..s.start + s.len].iter().rev().copied().collect();
+                fit.whitener.apply(&mut x);
+                let mut y = vec![0.0; x.len()];
+                match entry {
+                    Entry::Command => sampled.delayed.add_response(&x, &mut y),
+                    Entry::Torque => sampled.direct.add_response(&x, &mut y),
+                    Entry::Position => y = x,
+                }
+                out.extend(y.iter().rev().map(|v| v * s.weight));
+            }
+            out
+        };
+        let seen = [Entry::Command, Entry::Torque, Entry::Position].map(back);
+        Some(Ground { fit, sampled, error, basis, seen })
+    }
+
+    /// The normal equations of an effect at one point.
+    fn normal(&self, effect: &'static dyn Effect, inner: &[f64]) -> Normal {
         let facts = effect.facts();
         let fit = self.fit;
         let segments = &fit.stack.segments;
         let whole = |i: usize| {
-            let mut columns = white_columns(effect, inner, fit.scene, &fit.trajectories[i], sampled, fit.whitener);
+            let mut columns =
+                white_columns(effect, inner, fit.scene, &fit.trajectories[i], &self.sampled, fit.whitener);
             let weight = segments[i].weight;
             columns.iter_mut().flatten().for_each(|v| *v *= weight);
             columns
@@ -102,59 +155,98 @@ impl Ground<'_, '_> {
             }
             spans = vec![[0, fit.stack.total]; facts.columns];
         }
-        explain(self.basis, self.error, &columns, &spans, facts.fixed)
+        Normal::of(&self.basis, &self.error, &columns, &spans)
+    }
+
+    /// Its right-hand side alone.
+    fn right(&self, effect: &'static dyn Effect, inner: &[f64]) -> Vec<f64> {
+        let facts = effect.facts();
+        let fit = self.fit;
+        let seen = match facts.entry {
+            Entry::Command => &self.seen[0],
+            Entry::Torque => &self.seen[1],
+            Entry::Position => &self.seen[2],
+        };
+        let mut out = vec![0.0; if facts.per_record { 0 } else { facts.columns }];
+        for (s, trajectory) in fit.stack.segments.iter().zip(fit.trajectories) {
+            let raw = raw_columns(effect, inner, fit.scene, trajectory);
+            let each = raw.iter().map(|c| dot(c, &seen[s.start..s.start + s.len]));
+            if facts.per_record {
+                out.extend(each);
+            } else {
+                out.iter_mut().zip(each).for_each(|(o, v)| *o += v);
+            }
+        }
+        out
+    }
+
+    /// How well an effect does at one point.
+    fn explain(&self, effect: &'static dyn Effect, inner: &[f64]) -> Explained {
+        self.normal(effect, inner).explained(effect.facts().fixed)
     }
 
     /// The best point of every effect, one candidate for each combination of its discrete inner parameters; best first.
     pub fn scan(&self, effects: &[&'static dyn Effect]) -> Vec<Candidate> {
-        let Ok(sampled) = Sampled::of(self.plant, self.fit.scene.sample_time_s) else { return Vec::new() };
-        let grids: Vec<Vec<Vec<f64>>> = effects.iter().map(|e| e.grid(self.fit.scene)).collect();
-        let jobs: Vec<(usize, usize)> =
-            grids.iter().enumerate().flat_map(|(e, g)| (0..g.len()).map(move |i| (e, i))).collect();
-        let scores: Vec<Explained> =
-            jobs.par_iter().map(|&(e, i)| self.explain(&sampled, effects[e], &grids[e][i])).collect();
-        let mut all: Vec<Candidate> = Vec::new();
-        let mut at = 0;
-        for (e, effect) in effects.iter().enumerate() {
-            let grid = &grids[e];
-            let own = &scores[at..at + grid.len()];
-            at += grid.len();
-            let free = continuous(grid);
-            let least = own.iter().map(|s| s.concealed).fold(1.0, f64::min);
-            let first = all.len();
-            for (point, s) in grid.iter().zip(own) {
-                if !s.gain.is_finite() {
-                    continue;
-                }
-                let same = |c: &Candidate| {
-                    let at = &c.setting.inner;
-                    (0..at.len()).all(|i| at[i] == point[i] || (free[i] && at[i].signum() == point[i].signum()))
-                };
-                let setting = Setting { inner: point.clone(), strengths: s.strengths.clone() };
-                match all[first..].iter_mut().find(|c| same(c)) {
-                    Some(c) if s.gain > c.gain => (c.setting, c.gain, c.concealed) = (setting, s.gain, s.concealed),
-                    Some(_) => {}
-                    None => all.push(Candidate {
-                        effect: *effect,
-                        gain: s.gain,
-                        concealed: s.concealed,
-                        least_concealed: least,
-                        points: grid.len(),
-                        strengths: if effect.facts().fixed { 1 } else { s.strengths.len() },
-                        setting,
-                        continuous: free.clone(),
-                        range: range(grid),
-                    }),
-                }
-            }
-        }
+        let mut all: Vec<Candidate> = effects
+            .par_iter()
+            .flat_map(|e| {
+                let grid = e.grid(self.fit.scene);
+                let free = continuous(&grid);
+                classes(&grid).into_par_iter().map(move |class| self.best(*e, &grid, &free, &class)).flatten()
+            })
+            .collect();
         all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         all
     }
 
+    /// The best of some points of a grid, none where none can be worked out.
+    fn best(
+        &self,
+        effect: &'static dyn Effect,
+        grid: &[Vec<f64>],
+        free: &[bool],
+        class: &[usize],
+    ) -> Option<Candidate> {
+        let fixed = effect.facts().fixed;
+        let last = class.len() - 1;
+        let anchors: Vec<usize> = (0..last).step_by(if last < STRIDE { 1 } else { STRIDE }).chain([last]).collect();
+        let known: Vec<Normal> = anchors.par_iter().map(|&i| self.normal(effect, &grid[class[i]])).collect();
+        let mut worth: Vec<(f64, usize)> = (0..=last)
+            .into_par_iter()
+            .filter(|i| !anchors.contains(i))
+            .map(|i| {
+                let next = anchors.partition_point(|&a| a < i);
+                let (low, high) = (anchors[next - 1], anchors[next]);
+                let share = (i - low) as f64 / (high - low) as f64;
+                let right = self.right(effect, &grid[class[i]]);
+                (Normal::between(&known[next - 1], &known[next], share, right).explained(fixed).gain, i)
+            })
+            .collect();
+        worth.sort_by(|a, b| b.0.total_cmp(&a.0));
+        worth.truncate(PROMISING);
+        let promising: Vec<(usize, Normal)> =
+            worth.par_iter().map(|&(_, i)| (i, self.normal(effect, &grid[class[i]]))).collect();
+        let mut best: Option<Candidate> = None;
+        for (i, normal) in anchors.into_iter().zip(known).chain(promising) {
+            let s = normal.explained(fixed);
+            if s.gain.is_finite() && best.as_ref().is_none_or(|b| s.gain > b.gain) {
+                best = Some(Candidate {
+                    effect,
+                    gain: s.gain,
+                    concealed: s.concealed,
+                    points: grid.len(),
+                    strengths: if fixed { 1 } else { s.strengths.len() },
+                    setting: Setting { inner: grid[class[i]].clone(), strengths: s.strengths },
+                    continuous: free.to_vec(),
+                    range: range(grid),
+                });
+            }
+        }
+        best
+    }
+
     /// Moves the continuous inner parameters of a candidate to where it explains most: one at a time, by steps that shrink.
     pub fn refine(&self, candidate: &mut Candidate) {
-        let Ok(sampled) = Sampled::of(self.plant, self.fit.scene.sample_time_s) else { return };
         let mut step: Vec<f64> = candidate.continuous.iter().map(|&c| if c { 0.1 } else { 0.0 }).collect();
         for _ in 0..10 {
             let mut moved = false;
@@ -167,7 +259,7 @@ impl Ground<'_, '_> {
                     let mut inner = candidate.setting.inner.clone();
                     let [low, high] = candidate.range[i];
                     inner[i] = (inner[i].abs() * (way * step[i]).exp()).clamp(low, high).copysign(inner[i]);
-                    let s = self.explain(&sampled, candidate.effect, &inner);
+                    let s = self.explain(candidate.effect, &inner);
                     if s.gain > candidate.gain {
                         candidate.gain = s.gain;
                         candidate.concealed = s.concealed;

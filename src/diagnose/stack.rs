@@ -5,6 +5,7 @@
 
 use super::run::Run;
 use crate::numeric::least_squares::dot;
+use nalgebra::DMatrix;
 
 /// One stretch of the stacked vector.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,7 +16,7 @@ pub struct Segment {
     pub start: usize,
     /// Samples.
     pub len: usize,
-    /// Root of the number of repeats.
+    /// Root of the number of repeats, over the noise of this stretch relative to the filter's.
     pub weight: f64,
 }
 
@@ -163,37 +164,67 @@ pub struct Explained {
     pub concealed: f64,
 }
 
-/// Fits `residual` (basis already taken out) by `columns` (not yet); strengths are 1 where `fixed`. Each column is non-zero
-/// within `spans[i]` only.
-pub fn explain(basis: &Basis, residual: &[f64], columns: &[Vec<f64>], spans: &[[usize; 2]], fixed: bool) -> Explained {
-    let m = columns.len();
-    let part = |i: usize| &columns[i][..];
-    // What the basis takes of each column, as coordinates: the projected column itself is never needed.
-    let taken: Vec<Vec<f64>> = (0..m).map(|i| basis.coordinates(part(i), spans[i])).collect();
-    let inner = |i: usize, j: usize| {
-        let [low, high] = [spans[i][0].max(spans[j][0]), spans[i][1].min(spans[j][1])];
-        let own = if low < high {
-            dot(&part(i)[low - spans[i][0]..high - spans[i][0]], &part(j)[low - spans[j][0]..high - spans[j][0]])
-        } else {
-            0.0
+/// The normal equations of a fit by a few columns, basis taken out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Normal {
+    /// Columns against the residual.
+    pub right: Vec<f64>,
+    /// Columns against each other.
+    pub gram: DMatrix<f64>,
+    /// Squares of the columns before the basis was taken out.
+    pub squares: Vec<f64>,
+}
+
+impl Normal {
+    /// Of `columns`, each non-zero within `spans[i]` only, against `residual` (basis already taken out).
+    pub fn of(basis: &Basis, residual: &[f64], columns: &[Vec<f64>], spans: &[[usize; 2]]) -> Normal {
+        let m = columns.len();
+        let part = |i: usize| &columns[i][..];
+        // What the basis takes of each column, as coordinates: the projected column itself is never needed.
+        let taken: Vec<Vec<f64>> = (0..m).map(|i| basis.coordinates(part(i), spans[i])).collect();
+        let own = |i: usize, j: usize| {
+            let [low, high] = [spans[i][0].max(spans[j][0]), spans[i][1].min(spans[j][1])];
+            if low < high {
+                dot(&part(i)[low - spans[i][0]..high - spans[i][0]], &part(j)[low - spans[j][0]..high - spans[j][0]])
+            } else {
+                0.0
+            }
         };
-        (own, own - dot(&taken[i], &taken[j]))
-    };
-    let right: Vec<f64> = (0..m).map(|i| dot(part(i), &residual[spans[i][0]..spans[i][1]])).collect();
-    let squares: Vec<(f64, f64)> = (0..m).map(|i| inner(i, i)).collect();
-    let (before, after) = squares.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
-    let concealed = if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 1.0 };
-    if fixed {
-        let gain = (0..m).map(|i| 2.0 * right[i] - squares[i].1).sum();
-        return Explained { gain, strengths: vec![1.0; m], concealed };
+        let right = (0..m).map(|i| dot(part(i), &residual[spans[i][0]..spans[i][1]])).collect();
+        let mut gram = DMatrix::zeros(m, m);
+        for i in 0..m {
+            for j in 0..=i {
+                let v = own(i, j) - dot(&taken[i], &taken[j]);
+                (gram[(i, j)], gram[(j, i)]) = (v, v);
+            }
+        }
+        Normal { right, gram, squares: (0..m).map(|i| own(i, i)).collect() }
     }
-    // Scaled normal equations; directions that the others or the basis hold already are dropped.
-    let unit = |i: usize| {
-        let s = squares[i].1;
-        if s.is_finite() && s > 1e-9 * squares[i].0 && s > 0.0 { 1.0 / s.sqrt() } else { 0.0 }
-    };
-    let gram = nalgebra::DMatrix::from_fn(m, m, |i, j| inner(i, j).1 * unit(i) * unit(j));
-    let scaled = nalgebra::DVector::from_fn(m, |i, _| right[i] * unit(i));
-    let solved = gram.svd(true, true).solve(&scaled, 1e-8).unwrap_or_else(|_| nalgebra::DVector::zeros(m));
-    Explained { gain: solved.dot(&scaled), strengths: (0..m).map(|i| solved[i] * unit(i)).collect(), concealed }
+
+    /// The fit; strengths are 1 where `fixed`.
+    pub fn explained(&self, fixed: bool) -> Explained {
+        let m = self.right.len();
+        let (before, after) = (self.squares.iter().sum::<f64>(), self.gram.trace());
+        let concealed = if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 1.0 };
+        if fixed {
+            let gain = 2.0 * self.right.iter().sum::<f64>() - after;
+            return Explained { gain, strengths: vec![1.0; m], concealed };
+        }
+        // Scaled normal equations; directions that the others or the basis hold already are dropped.
+        let unit = |i: usize| {
+            let s = self.gram[(i, i)];
+            if s.is_finite() && s > 1e-9 * self.squares[i] && s > 0.0 { 1.0 / s.sqrt() } else { 0.0 }
+        };
+        let gram = DMatrix::from_fn(m, m, |i, j| self.gram[(i, j)] * unit(i) * unit(j));
+        let scaled = nalgebra::DVector::from_fn(m, |i, _| self.right[i] * unit(i));
+        let solved = gram.svd(true, true).solve(&scaled, 1e-8).unwrap_or_else(|_| nalgebra::DVector::zeros(m));
+        Explained { gain: solved.dot(&scaled), strengths: (0..m).map(|i| solved[i] * unit(i)).collect(), concealed }
+    }
+
+    /// The equations of a point between two others, `share` of the way from `a` to `b`, with its own right-hand side.
+    pub fn between(a: &Normal, b: &Normal, share: f64, right: Vec<f64>) -> Normal {
+        let mix = |x: f64, y: f64| (1.0 - share) * x + share * y;
+        let gram = a.gram.zip_map(&b.gram, mix);
+        Normal { right, gram, squares: a.squares.iter().zip(&b.squares).map(|(x, y)| mix(*x, *y)).collect() }
+    }
 }

@@ -20,16 +20,16 @@ pub struct Trajectory {
     pub unexplained: Vec<f64>,
 }
 
-/// The mean command that acts on the arm from each sample to the next.
-pub fn acting(plant: &DiscretePlant, input: &[f64]) -> Vec<f64> {
+/// The mean command that acts on the arm from each sample to the next; `before` stood before the first.
+pub fn acting(plant: &DiscretePlant, input: &[f64], before: f64) -> Vec<f64> {
     let (whole, share) = (plant.whole_delay_samples(), plant.fractional_delay_s() / plant.sample_time_s());
-    let at = |k: usize, back: usize| if k >= back { input[k - back] } else { 0.0 };
+    let at = |k: usize, back: usize| if k >= back { input[k - back] } else { before };
     (0..input.len()).map(|k| share * at(k, whole + 1) + (1.0 - share) * at(k, whole)).collect()
 }
 
 /// The acting command and a torque that is known beside it.
 fn pushed(sampled: &DiscretePlant, run: &Run, known: &[f64]) -> Vec<f64> {
-    let mut i = acting(sampled, &run.input);
+    let mut i = acting(sampled, &run.input, run.before);
     i.iter_mut().zip(known).for_each(|(i, w)| *i += w);
     i
 }
@@ -105,7 +105,7 @@ impl Smoother {
     /// Smooths a run; `spindle_hz` stands in for a spindle index that was not recorded.
     pub fn smooth(&self, run: &Run, known: &[f64], sampled: &DiscretePlant, spindle_hz: f64) -> Trajectory {
         let (y, n, t) = (&run.position, run.len(), sampled.sample_time_s());
-        let acts = acting(sampled, &run.input);
+        let acts = acting(sampled, &run.input, run.before);
         let i = pushed(sampled, run, known);
         let s = &self.steady;
         let mut ahead = Vec::with_capacity(n);

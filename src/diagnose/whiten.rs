@@ -32,20 +32,20 @@ struct Periodogram {
 }
 
 /// Periodograms of series (each of its own length), Hann-tapered, averaged into bands of growing width.
-fn periodogram(series: &[Vec<f64>], weight: &[f64], sample_time_s: f64) -> Periodogram {
+fn periodogram(series: &[Vec<f64>], sample_time_s: f64) -> Periodogram {
     let longest = series.iter().map(Vec::len).max().unwrap_or(0);
     let bands = band_edges(longest);
     let mut power = vec![0.0; bands.len()];
     let mut count = vec![0.0; bands.len()];
     let mut centre = vec![0.0; bands.len()];
-    for (x, &wt) in series.iter().zip(weight) {
+    for x in series {
         let n = x.len();
         let mean = x.iter().sum::<f64>() / n as f64;
         let taper = |i: usize| 1.0 - (TAU * (i as f64 + 0.5) / n as f64).cos();
         let tapered: Vec<f64> = x.iter().enumerate().map(|(i, v)| (v - mean) * taper(i)).collect();
         let bins = forward(&tapered);
         // The taper's mean square is 1.5.
-        let scale = wt / (1.5 * n as f64);
+        let scale = 1.0 / (1.5 * n as f64);
         for (k, bin) in bins.iter().enumerate().take(n / 2).skip(2) {
             let share = k as f64 / n as f64;
             let b = bands.partition_point(|&edge| edge <= share).min(bands.len() - 1);
@@ -79,15 +79,9 @@ fn band_edges(n: usize) -> Vec<f64> {
 
 impl NoiseLevels {
     /// Levels that fit the spectrum of pure-noise series best (Whittle's likelihood, scoring for the two powers, a grid for
-    /// the corner). `weight` undoes the scale of each series: 1/2 for a difference of two repeats.
-    pub fn fit(
-        series: &[Vec<f64>],
-        weight: &[f64],
-        body: &Body,
-        sample_time_s: f64,
-        from_repeats: bool,
-    ) -> NoiseLevels {
-        let p = periodogram(series, weight, sample_time_s);
+    /// the corner).
+    pub fn fit(series: &[Vec<f64>], body: &Body, sample_time_s: f64, from_repeats: bool) -> NoiseLevels {
+        let p = periodogram(series, sample_time_s);
         let (gain, k, c) = body_numbers(body);
         let through: Vec<f64> =
             p.w_rad_s.iter().map(|w| gain * gain / ((k - w * w).powi(2) + (c * w).powi(2))).collect();
@@ -226,12 +220,12 @@ impl Whitener {
 
     /// Adds the autoregression and the scale that pure-noise series, already filtered, still ask for; the order by the
     /// Bayesian information criterion.
-    pub fn refine(&mut self, filtered: &[Vec<f64>], weight: &[f64]) {
+    pub fn refine(&mut self, filtered: &[Vec<f64>]) {
         let mut r = [0.0; AR_ORDER + 1];
         let mut n = 0.0;
-        for (x, w) in filtered.iter().zip(weight) {
+        for x in filtered {
             for (lag, r) in r.iter_mut().enumerate() {
-                *r += w * x.iter().zip(&x[lag.min(x.len())..]).map(|(a, b)| a * b).sum::<f64>();
+                *r += x.iter().zip(&x[lag.min(x.len())..]).map(|(a, b)| a * b).sum::<f64>();
             }
             n += x.len() as f64;
         }

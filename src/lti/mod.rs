@@ -16,5 +16,5 @@ pub use modal::{ModalForm, ModalTerm};
 pub use plant::{Body, LtiError, Mode, PhysicsEntry, Plant};
 pub use plant_file::PlantFile;
 pub use response::FrequencyResponse;
-pub use section::{Section, SectionError, Sections};
+pub use section::{Section, SectionError, Sections, step_chain};
 pub use state::{PlantNumbers, PlantState};

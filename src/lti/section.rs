@@ -108,6 +108,19 @@ fn check_damping(
     Err(SectionError::Damping { filter, frequency_hz, key, found, expected })
 }
 
+/// One sample through a chain of sections (transposed direct form II); `memory` holds two numbers a section and moves on.
+#[inline]
+pub fn step_chain(chain: &[Section], memory: &mut [[f64; 2]], input: f64) -> f64 {
+    let mut signal = input;
+    for (s, m) in chain.iter().zip(memory.iter_mut()) {
+        let out = s.b0 * signal + m[0];
+        m[0] = s.b1 * signal - s.a1 * out + m[1];
+        m[1] = s.b2 * signal - s.a2 * out;
+        signal = out;
+    }
+    signal
+}
+
 /// Sections in the order the firmware runs them, with the sample time they run at.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sections {

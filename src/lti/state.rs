@@ -98,6 +98,46 @@ impl PlantState {
     }
 }
 
+/// Terms that are simulated side by side: their states stay in registers over the whole record.
+const LANES: usize = 4;
+
+impl DiscretePlant {
+    /// Adds the plant's answer, from rest, to an input held over each sample; `input` and `out` have one length.
+    pub fn add_response(&self, input: &[f64], out: &mut [f64]) {
+        let delayed = |k: usize, back: usize| if k >= back { input[k - back] } else { 0.0 };
+        let whole = self.whole;
+        for from in (0..self.lambda_re.len()).step_by(LANES) {
+            let pick =
+                |all: &[f64]| -> [f64; LANES] { std::array::from_fn(|j| all.get(from + j).copied().unwrap_or(0.0)) };
+            let (lr, li) = (pick(&self.lambda_re), pick(&self.lambda_im));
+            let (nr, ni) = (pick(&self.now_re), pick(&self.now_im));
+            let (br, bi) = (pick(&self.before_re), pick(&self.before_im));
+            let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
+            for (k, y) in out.iter_mut().enumerate().take(input.len()) {
+                *y += (re[0] + re[1]) + (re[2] + re[3]);
+                let (now, before) = (delayed(k, whole), delayed(k, whole + 1));
+                for j in 0..LANES {
+                    let (a, b) = (re[j], im[j]);
+                    re[j] = lr[j] * a - li[j] * b + (nr[j] * now + br[j] * before);
+                    im[j] = li[j] * a + lr[j] * b + (ni[j] * now + bi[j] * before);
+                }
+            }
+        }
+        if self.rigid2 != 0.0 {
+            let (d, h) = (self.rest_s, self.sample_time_s - self.rest_s);
+            let (mut position, mut velocity) = (0.0, 0.0);
+            for (k, y) in out.iter_mut().enumerate().take(input.len()) {
+                *y += position;
+                let (now, before) = (delayed(k, whole), delayed(k, whole + 1));
+                position += velocity * self.sample_time_s
+                    + before * (self.rigid2 * d * (h + 0.5 * d) + self.rigid1 * d)
+                    + now * (0.5 * self.rigid2 * h * h + self.rigid1 * h);
+                velocity += self.rigid2 * (before * d + now * h);
+            }
+        }
+    }
+}
+
 /// The numbers of a sampled plant and of one reading, for kernels that lay them out in their own way.
 #[derive(Clone, Copy, Debug)]
 pub struct PlantNumbers<'a> {

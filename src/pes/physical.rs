@@ -8,7 +8,7 @@
 use super::Profile;
 use super::simulation::{ClosedLoop, PesError, Scene};
 use crate::controller::Controller;
-use crate::lti::{DiscretePlant, Intersample};
+use crate::lti::{DiscretePlant, Intersample, step_chain};
 use crate::physics::{Context, Machine, Restored};
 use std::f64::consts::TAU;
 
@@ -61,13 +61,7 @@ pub fn simulate_physical(
     for k in 0..ticks {
         let y = machine.measure(turn * k as f64, 0.0);
         offsets.push(machine.head_offset());
-        let mut signal = scene.reference[k] - (y + scene.encoder[k]);
-        for (s, m) in sections.chain.iter().zip(memory.iter_mut()) {
-            let out = s.b0 * signal + m[0];
-            m[0] = s.b1 * signal - s.a1 * out + m[1];
-            m[1] = s.b2 * signal - s.a2 * out;
-            signal = out;
-        }
+        let signal = step_chain(&sections.chain, &mut memory, scene.reference[k] - (y + scene.encoder[k]));
         let sum = signal + forward[0] * scene.velocity[k] + forward[1] * scene.acceleration[k];
         let u = sum.clamp(-limit, limit);
         run.limited |= u != sum;

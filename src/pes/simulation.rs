@@ -5,7 +5,7 @@
 
 use super::{Profile, ProfileError, Reference, noise};
 use crate::controller::{Controller, ControllerError, Feedforward};
-use crate::lti::{DiscretePlant, Intersample, LtiError, Plant, PlantState, Section};
+use crate::lti::{DiscretePlant, Intersample, LtiError, Plant, PlantState, Section, step_chain};
 use thiserror::Error;
 
 /// Why a write cannot be simulated.
@@ -183,13 +183,7 @@ impl Scene {
         }
         for k in self.first..self.reference.len() {
             let y = state.position();
-            let mut signal = self.reference[k] - (y + self.encoder[k]);
-            for (s, m) in chain.iter().zip(memory.iter_mut()) {
-                let out = s.b0 * signal + m[0];
-                m[0] = s.b1 * signal - s.a1 * out + m[1];
-                m[1] = s.b2 * signal - s.a2 * out;
-                signal = out;
-            }
+            let signal = step_chain(chain, memory, self.reference[k] - (y + self.encoder[k]));
             let sum = signal + ff_velocity * self.velocity[k] + ff_acceleration * self.acceleration[k];
             let u = sum.clamp(-limit, limit);
             free &= u == sum;

@@ -36,7 +36,10 @@ impl Effect for CurrentSaturation {
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        (1..24).map(|i| vec![scene.command * (1.0 - f64::from(i) / 26.0)]).collect()
+        // Dense towards the largest command: there few samples are touched, and each point touches others.
+        let near = (0..8).map(|i| 1.0 - 0.12 * 0.7f64.powi(i));
+        let far = (3..23).map(|i| f64::from(i) / 26.0);
+        far.chain(near).map(|s| vec![scene.command * s]).collect()
     }
 
     fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {

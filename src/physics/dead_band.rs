@@ -38,7 +38,7 @@ impl Effect for DeadBand {
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        logarithmic(1e-3 * scene.command, 0.5 * scene.command, 16).into_iter().map(|d| vec![d]).collect()
+        logarithmic(2e-5 * scene.command, 0.5 * scene.command, 20).into_iter().map(|d| vec![d]).collect()
     }
 
     fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {

@@ -1,22 +1,23 @@
 //! The encoder's error within one period of its grating: a line in position, not in time.
 //!
-//! m = x + a cos(2 pi x/P) + b sin(2 pi x/P); offsets of the two photocurrents give the first harmonic (Heydemann 1981).
+//! m = x + sum over h = 1, 2 of a_h cos(2 pi h x/P + phi_h): offsets of the two photocurrents give the first harmonic, unequal
+//! amplitudes and a phase that is not 90 degrees the second (Heydemann 1981).
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene};
 use std::f64::consts::TAU;
 
-/// Inner: the period. Strengths: cosine and sine.
+/// Inner: the period, the number of harmonics (1 or 2). Strengths: cosine and sine of each.
 pub struct EncoderCyclicError;
 
 static FACTS: Facts = Facts {
     name: "encoder_cyclic_error",
     port: Port::Sensor,
     entry: Entry::Position,
-    columns: 2,
+    columns: 4,
     fixed: false,
     per_record: false,
-    equation: "m = x + a cos(2 pi x/P + phi)",
+    equation: "m = x + sum_h a_h cos(2 pi h x/P + phi_h), h = 1, 2",
     says: "the encoder reads wrong by a wave that repeats with the position: its lines are not evenly interpolated",
     confused_with: &["torque_ripple", "unmodelled_resonance", "line_disturbance"],
     experiment: "constant-velocity moves at three speeds: the line moves with the speed",
@@ -25,12 +26,15 @@ static FACTS: Facts = Facts {
 
 struct Wave {
     period: f64,
+    second: bool,
 }
 
 impl Law for Wave {
     fn columns(&self, _from: &Sample, to: &Sample, out: &mut [f64]) {
         let (sin, cos) = (TAU * to.x / self.period).sin_cos();
         (out[0], out[1]) = (cos, sin);
+        let second = if self.second { (cos * cos - sin * sin, 2.0 * sin * cos) } else { (0.0, 0.0) };
+        (out[2], out[3]) = second;
     }
 }
 
@@ -47,25 +51,35 @@ impl Effect for EncoderCyclicError {
         let coarse = 0.6 * scene.travel;
         let step = 0.35 / scene.travel;
         let count = (((1.0 / finest - 1.0 / coarse) / step).ceil() as usize).clamp(1, 700);
-        (0..count).map(|i| vec![1.0 / (1.0 / coarse + step * i as f64)]).collect()
+        let periods = (0..count).map(|i| 1.0 / (1.0 / coarse + step * i as f64));
+        periods.flat_map(|p| [vec![p, 1.0], vec![p, 2.0]]).collect()
     }
 
     fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Wave { period: inner[0] })
+        Box::new(Wave { period: inner[0], second: inner[1] > 1.5 })
     }
 
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        let [a, b] = [setting.strengths[0], setting.strengths[1]];
-        vec![
-            Parameter::new("amplitude", a.hypot(b), Unit::Position),
+        let at = |i: usize| setting.strengths.get(i).copied().unwrap_or(0.0);
+        let pair = |i: usize| (at(i).hypot(at(i + 1)), (-at(i + 1)).atan2(at(i)).to_degrees());
+        let (first, second) = (pair(0), pair(2));
+        let mut all = vec![
+            Parameter::new("amplitude", first.0, Unit::Position),
             Parameter::new("period", setting.inner[0], Unit::Position),
-            Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
-        ]
+            Parameter::new("phase_deg", first.1, Unit::Degree),
+        ];
+        if setting.inner[1] > 1.5 {
+            all.push(Parameter::new("amplitude_2", second.0, Unit::Position));
+            all.push(Parameter::new("phase_2_deg", second.1, Unit::Degree));
+        }
+        all
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        let (amplitude, phase) = (given.need("amplitude")?, given.or("phase_deg", 0.0).to_radians());
-        let strengths = vec![amplitude * phase.cos(), -amplitude * phase.sin()];
-        Ok(Setting { inner: vec![given.positive("period")?], strengths })
+        let pair = |amplitude: f64, phase: f64| [amplitude * phase.cos(), -amplitude * phase.sin()];
+        let first = pair(given.need("amplitude")?, given.or("phase_deg", 0.0).to_radians());
+        let second = pair(given.or("amplitude_2", 0.0), given.or("phase_2_deg", 0.0).to_radians());
+        let harmonics = if given.has("amplitude_2") { 2.0 } else { 1.0 };
+        Ok(Setting { inner: vec![given.positive("period")?, harmonics], strengths: [first, second].concat() })
     }
 }

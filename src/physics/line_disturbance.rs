@@ -54,7 +54,8 @@ impl Effect for LineDisturbance {
         }
         if scene.duration_s > 0.0 {
             let step = 0.8 / scene.duration_s;
-            let first = 1.0 / scene.duration_s;
+            // A line shows at least three times in a record; what is slower is a drift.
+            let first = 3.0 / scene.duration_s;
             all.extend((0..POINTS).map(|i| first + step * i as f64).take_while(|&f| f < high).map(|f| vec![f]));
         }
         all

@@ -48,6 +48,8 @@ pub struct Machine {
     w: f64,
     k: usize,
     origin: f64,
+    /// Command behind the amplifier and torque under which it stood at `origin`: only what differs from them moves it.
+    standing: [f64; 2],
     /// The arm's own position over the recorded one.
     arm: f64,
 }
@@ -58,10 +60,26 @@ const STEPS: usize = 3;
 const BISECTIONS: usize = 60;
 
 impl Machine {
-    /// The same machine, started at rest at `origin` instead of at 0 (a free inertia stays wherever it is put).
-    pub fn started_at(mut self, origin: f64) -> Machine {
+    /// The same machine, at rest at `origin` under a standing command, springs and cables in balance, instead of at 0.
+    pub fn started_at(mut self, origin: f64, command: f64) -> Machine {
         self.origin = origin;
         self.x = [origin; 3];
+        let still = Sample { x: origin, u: command, i: command, ..Sample::default() };
+        (self.last, self.now) = (still, still);
+        let value = |parts: &[Part], at: &Sample| parts.iter().map(|p| p.value(at, at)).sum::<f64>();
+        self.standing[0] = command + value(&self.command, &still);
+        let arm = still.scaled(self.arm);
+        self.standing[1] = value(&self.torque, &arm);
+        self.w = self.standing[1];
+        self.history.fill(self.standing[0]);
+        self
+    }
+
+    /// The same machine, started at rest but not in balance: beside command and laws a constant torque acts (command_unit).
+    pub fn held_by(mut self, torque: f64, gain_at_rest: f64) -> Machine {
+        let spring = if gain_at_rest.is_finite() && gain_at_rest != 0.0 { self.origin / gain_at_rest } else { 0.0 };
+        self.standing = [spring - torque, 0.0];
+        self.w = 0.0;
         self
     }
 
@@ -107,6 +125,7 @@ impl Machine {
             w: 0.0,
             k: 0,
             origin: 0.0,
+            standing: [0.0; 2],
             arm: scene.arm_over_record(),
         })
     }
@@ -144,7 +163,7 @@ impl Machine {
     ///
     /// Exact for the command. The torque is taken at its mean over the interval: second order in the sample time.
     pub fn between(&self, at: [&Intersample; 2]) -> f64 {
-        self.held[0].between(at[0]) + self.held[1].between(at[1])
+        self.origin + self.held[0].between(at[0]) + self.held[1].between(at[1])
     }
 
     /// Takes the command of this sample (controller plus excitation) and moves on to the next.
@@ -160,13 +179,13 @@ impl Machine {
         self.history[n - 1] = acting;
         let share = self.delayed.fractional_delay_s() / self.delayed.sample_time_s();
         self.now.i = share * self.history[0] + (1.0 - share) * self.history[1];
-        self.pushed.command(acting);
+        self.pushed.command(acting - self.standing[0]);
         self.held[0].clone_from(&self.pushed);
         self.pushed.advance(&self.delayed);
         if !self.torque.is_empty() {
             self.w = self.solve();
         }
-        self.torqued.command(self.w);
+        self.torqued.command(self.w - self.standing[1]);
         self.held[1].clone_from(&self.torqued);
         self.torqued.advance(&self.direct);
         if !self.torque.is_empty() {
@@ -188,7 +207,7 @@ impl Machine {
 
     fn solve(&mut self) -> f64 {
         self.trial.clone_from(&self.torqued);
-        self.trial.command(0.0);
+        self.trial.command(-self.standing[1]);
         self.trial.advance(&self.direct);
         let free = self.origin + self.pushed.position() + self.trial.position();
         let from = self.now.scaled(self.arm);

@@ -58,7 +58,8 @@ impl Effect for ParametricGain {
         }
         if scene.duration_s > 0.0 {
             let high = 0.2 * scene.nyquist_hz();
-            let (first, step) = (1.0 / scene.duration_s, 0.8 / scene.duration_s);
+            // A swing shows at least three times in a record; what is slower is a drift.
+            let (first, step) = (3.0 / scene.duration_s, 0.8 / scene.duration_s);
             all.extend((0..POINTS).map(|i| first + step * i as f64).take_while(|&f| f < high).map(|f| vec![f, 0.0]));
         }
         all

@@ -53,7 +53,9 @@ impl Effect for SlewLimit {
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
         // A limit above the largest step that occurs does nothing.
         let largest = scene.command_step / scene.sample_time_s;
-        super::logarithmic(0.02 * largest, 0.95 * largest, 20).into_iter().map(|s| vec![s]).collect()
+        // Dense towards it: there few samples are touched, and each point touches others.
+        let near = (0..9).map(|i| 1.0 - 0.4 * 0.7f64.powi(i));
+        super::logarithmic(0.02, 0.55, 12).into_iter().chain(near).map(|s| vec![s * largest]).collect()
     }
 
     fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {

@@ -1,13 +1,13 @@
-//! A torque that repeats with the position: cogging of magnets, or the balls of the bearing.
+//! A torque that repeats with the position: cogging of magnets or the balls of the bearing, or a torque factor that waves.
 //!
-//! tau = a cos(2 pi x/P) + b sin(2 pi x/P); the mean over an interval by Simpson's rule along the straight path.
+//! tau = a cos(2 pi x/P) + b sin(2 pi x/P), times the current where the torque factor waves; the mean over an interval by Simpson's rule along the straight path.
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::encoder_cyclic_error::EncoderCyclicError;
 use super::sample::{Sample, Scene};
 use std::f64::consts::TAU;
 
-/// Inner: the period. Strengths: cosine and sine.
+/// Inner: the period; 0 for a torque of its own, 1 for a factor of the current. Strengths: cosine and sine.
 pub struct TorqueRipple;
 
 static FACTS: Facts = Facts {
@@ -17,7 +17,7 @@ static FACTS: Facts = Facts {
     columns: 2,
     fixed: false,
     per_record: false,
-    equation: "tau = a cos(2 pi x/P + phi)",
+    equation: "tau = a cos(2 pi x/P + phi), or i a cos(2 pi x/P + phi)",
     says: "the torque has a wave that repeats with the position: the arm is pulled towards certain places",
     confused_with: &["encoder_cyclic_error", "nonlinear_spring", "cable_spring"],
     experiment: "constant-velocity moves at three speeds: the line moves with the speed and weakens with its square",
@@ -26,6 +26,7 @@ static FACTS: Facts = Facts {
 
 struct Ripple {
     wave: f64,
+    factor: bool,
 }
 
 impl Law for Ripple {
@@ -33,7 +34,9 @@ impl Law for Ripple {
         let (s0, c0) = (self.wave * from.x).sin_cos();
         let (s1, c1) = (self.wave * 0.5 * (from.x + to.x)).sin_cos();
         let (s2, c2) = (self.wave * to.x).sin_cos();
-        (out[0], out[1]) = ((c0 + 4.0 * c1 + c2) / 6.0, (s0 + 4.0 * s1 + s2) / 6.0);
+        // The acting command is the mean over the interval already.
+        let by = if self.factor { from.i } else { 1.0 } / 6.0;
+        (out[0], out[1]) = (by * (c0 + 4.0 * c1 + c2), by * (s0 + 4.0 * s1 + s2));
     }
 }
 
@@ -44,25 +47,32 @@ impl Effect for TorqueRipple {
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
         // The same question as for the encoder's wave: no period over the travel may fall between two points.
-        EncoderCyclicError.grid(scene)
+        let periods = EncoderCyclicError.grid(scene).into_iter().map(|p| p[0]).step_by(2);
+        periods.flat_map(|p| [vec![p, 0.0], vec![p, 1.0]]).collect()
     }
 
     fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Ripple { wave: TAU / inner[0] })
+        Box::new(Ripple { wave: TAU / inner[0], factor: inner[1] > 0.5 })
     }
 
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         let [a, b] = [setting.strengths[0], setting.strengths[1]];
+        let amplitude = match setting.inner[1] > 0.5 {
+            true => Parameter::new("amplitude_relative", a.hypot(b), Unit::Ratio),
+            false => Parameter::new("amplitude_command", a.hypot(b), Unit::Command),
+        };
         vec![
-            Parameter::new("amplitude_command", a.hypot(b), Unit::Command),
+            amplitude,
             Parameter::new("period", setting.inner[0], Unit::Position),
             Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
         ]
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        let (amplitude, phase) = (given.need("amplitude_command")?, given.or("phase_deg", 0.0).to_radians());
+        let factor = given.has("amplitude_relative");
+        let amplitude = given.need(if factor { "amplitude_relative" } else { "amplitude_command" })?;
+        let phase = given.or("phase_deg", 0.0).to_radians();
         let strengths = vec![amplitude * phase.cos(), -amplitude * phase.sin()];
-        Ok(Setting { inner: vec![given.positive("period")?], strengths })
+        Ok(Setting { inner: vec![given.positive("period")?, f64::from(factor)], strengths })
     }
 }

@@ -19,6 +19,7 @@ mod words;
 
 pub mod bode;
 pub mod boxplot;
+pub mod certificate;
 pub mod confusion;
 pub mod curve;
 pub mod diagnosis;

@@ -41,6 +41,10 @@ pub enum StudyError {
     #[error(transparent)]
     Tune(#[from] TuneError),
     #[error(transparent)]
+    Table(#[from] crate::tune::GainTableError),
+    #[error(transparent)]
+    Verify(#[from] crate::verify::VerifyError),
+    #[error(transparent)]
     Recording(#[from] RecordingError),
     #[error(transparent)]
     Pes(#[from] PesError),

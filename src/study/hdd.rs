@@ -19,7 +19,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 /// Controller rate: 420 sectors at 7200 rpm (Hz).
-const RATE_HZ: f64 = 50_400.0;
+pub(super) const RATE_HZ: f64 = 50_400.0;
 /// Gain of the main actuator in the benchmark.
 const VCM_GAIN: f64 = 3.7976e7;
 /// The fixed lag of the second actuator's loop: gain at rest (ratio) and corner (Hz).
@@ -29,14 +29,14 @@ const LAG: (f64, f64) = (4.0, 120.0);
 type ModeRow = (f64, f64, f64);
 
 /// A case of the benchmark.
-struct Case {
-    name: String,
+pub(super) struct Case {
+    pub name: String,
     /// The main actuator with the second one's loop closed, at the controller's rate, hold included.
-    frf: Frf,
+    pub frf: Frf,
 }
 
-/// Makes the study from the folder of published parameters.
-pub fn hdd(data: &Path) -> Result<Study, StudyError> {
+/// The nine cases from the folder of published parameters.
+pub(super) fn cases(data: &Path) -> Result<Vec<Case>, StudyError> {
     let read = |name: &str| -> Result<Vec<ModeRow>, StudyError> {
         let file = data.join("hdd_benchmark_model").join(name);
         if !file.exists() {
@@ -58,12 +58,26 @@ pub fn hdd(data: &Path) -> Result<Study, StudyError> {
             cases.push(Case { name, frf: response(&main, &fine, gain / at_rest)? });
         }
     }
+    Ok(cases)
+}
+
+/// One controller for all cases.
+pub(super) fn joint(cases: &[Case]) -> Result<Outcome, StudyError> {
     let spec = Spec::parse(include_str!("specs/hdd.toml"), include_str!("specs/hdd_profile.toml"))?;
     let settings = TuneSettings { sample_time_s: 1.0 / RATE_HZ, ..TuneSettings::default() };
     let machines: Vec<Machine<'_>> =
         cases.iter().map(|c| Machine::Response { frf: &c.frf, hold: Hold::Included, continuation: None }).collect();
-    let alone = tune(&machines[0], &spec, None, &settings)?;
-    let jointly = tune_jointly(&machines, &spec, None, &settings)?;
+    Ok(tune_jointly(&machines, &spec, None, &settings)?)
+}
+
+/// Makes the study from the folder of published parameters.
+pub fn hdd(data: &Path) -> Result<Study, StudyError> {
+    let cases = cases(data)?;
+    let spec = Spec::parse(include_str!("specs/hdd.toml"), include_str!("specs/hdd_profile.toml"))?;
+    let settings = TuneSettings { sample_time_s: 1.0 / RATE_HZ, ..TuneSettings::default() };
+    let first = Machine::Response { frf: &cases[0].frf, hold: Hold::Included, continuation: None };
+    let alone = tune(&first, &spec, None, &settings)?;
+    let jointly = joint(&cases)?;
     let mut study = Study::default();
     study.page("hdd_benchmark.md", page(&cases, &alone, &jointly)?);
     let curves: Vec<(Vec<f64>, &Case)> =

@@ -3,6 +3,10 @@
 //! In: built-in machines, seeds, and where a study needs them measured records. Out: a [`Study`], pages and pictures as text.
 //! Nothing is written here; the command line does that.
 
+mod certificate;
+mod certificate_loops;
+mod certificate_mutations;
+mod certificate_sweeps;
 mod classes;
 mod error;
 mod fleet_source;
@@ -16,7 +20,9 @@ mod mirror;
 mod mismatch;
 mod motor;
 mod plants;
+mod recordings;
 
+pub use certificate::certificate;
 pub use classes::classes;
 pub use error::StudyError;
 pub use fleet_source::TwinSource;
@@ -29,6 +35,7 @@ pub use mirror::mirror;
 pub use mismatch::mismatch;
 pub use motor::motor;
 pub use plants::plants;
+pub use recordings::recordings;
 
 /// What a study hands over: files by name, relative to the results' folder.
 #[derive(Clone, Debug, Default, PartialEq)]

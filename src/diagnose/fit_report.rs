@@ -1,0 +1,92 @@
+//! The figures of a diagnosis: error of the given model, of the linear refit and of the corrected model, by role and by record.
+
+use super::bench::Bench;
+use super::corrected::Corrected;
+use super::finding::{FitFigures, FitReport, RecordFigures};
+use super::judge::{Judged, Simulation, errors, floor, rms};
+use super::run::Run;
+use super::select::Selection;
+use crate::controller::Law;
+use crate::lti::Plant;
+use crate::physics::{Effect, Scene, Setting};
+use crate::recording::Role;
+
+/// Errors of all runs under a model, as the report shows them.
+pub(super) fn fit_report(
+    bench: &Bench,
+    selection: &Selection,
+    given: &Plant,
+    refitted: &Corrected,
+    fixed: &Corrected,
+    closed: Option<&Law>,
+) -> (FitReport, [Vec<Vec<f64>>; 3]) {
+    let every: Vec<&Run> = bench.runs.iter().collect();
+    let scene = Scene { plant: given.clone(), ..bench.scene.clone() };
+    let none: Vec<(&'static dyn Effect, Setting)> = Vec::new();
+    let under = |plant: &Plant, effects: &[(&'static dyn Effect, Setting)], closed: Option<&Law>| {
+        let effects = effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
+        errors(&Judged { plant, effects, own: Vec::new(), lines: &[], fit: None, scene: &scene }, &every, closed)
+    };
+    let three = |closed: Option<&Law>| {
+        [
+            under(given, &none, closed),
+            under(&refitted.plant, &refitted.effects, closed),
+            errors(&fixed.judged(bench, selection), &every, closed),
+        ]
+    };
+    let open = three(None);
+    let chosen = if closed.is_some() { three(closed) } else { open.clone() };
+    let of_role = |e: &[Vec<Vec<f64>>; 3], role: Role| -> Option<FitFigures> {
+        let which: Vec<usize> = (0..every.len()).filter(|&i| every[i].role == role).collect();
+        if which.is_empty() {
+            return None;
+        }
+        let pick = |m: usize| -> Vec<Vec<f64>> { which.iter().map(|&i| e[m][i].clone()).collect() };
+        let [before, refit, after] = [rms(&pick(0)), rms(&pick(1)), rms(&pick(2))];
+        // The floor from repeats of the fit records, under the model that fits best; it is the same for every record.
+        let noise = floor(&e[2], &every).unwrap_or_else(|| fallback_floor(bench, after));
+        let room = before * before - noise * noise;
+        let explained_share =
+            if room > 0.0 { (1.0 - (after * after - noise * noise).max(0.0) / room).clamp(-1.0, 1.0) } else { 1.0 };
+        Some(FitFigures {
+            rms_before: before,
+            rms_refit_linear: refit,
+            rms_after: after,
+            noise_floor: noise,
+            explained_share,
+        })
+    };
+    let records = every
+        .iter()
+        .enumerate()
+        .map(|(i, run)| {
+            let single = |m: usize| rms(std::slice::from_ref(&chosen[m][i]));
+            RecordFigures {
+                record: run.name.clone(),
+                role: if run.role == Role::Fit { "fit" } else { "holdout" },
+                amplitude: run.position.iter().map(|y| (y - run.position[0]).abs()).fold(0.0, f64::max),
+                rms_before: single(0),
+                rms_refit_linear: single(1),
+                rms_after: single(2),
+            }
+        })
+        .collect();
+    let zero =
+        FitFigures { rms_before: 0.0, rms_refit_linear: 0.0, rms_after: 0.0, noise_floor: 0.0, explained_share: 0.0 };
+    let report = FitReport {
+        simulation: if closed.is_some() { Simulation::ClosedLoop } else { Simulation::OpenLoop },
+        holdout: of_role(&chosen, Role::Holdout),
+        fit: of_role(&chosen, Role::Fit).unwrap_or(zero),
+        // A loop can hold a model that runs away on its own; its open-loop figures then say nothing.
+        open_loop: of_role(&open, Role::Holdout)
+            .or_else(|| of_role(&open, Role::Fit))
+            .filter(|f| f.rms_after.is_finite() && f.rms_after < 10.0 * f.rms_before),
+        records,
+    };
+    (report, chosen)
+}
+
+/// Without repeats the floor is the sensor's noise as the spectrum shows it, never more than what the best model leaves.
+fn fallback_floor(bench: &Bench, after: f64) -> f64 {
+    bench.levels.sensor_rms.min(after)
+}

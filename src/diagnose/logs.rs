@@ -1,0 +1,92 @@
+//! What the logs of a case say before any model is fitted: sound, slipped, in other units, or made by another controller.
+
+use super::bench::scene;
+use super::finding::Finding;
+use super::hygiene::{Replay, SampleFault, replay_records, sample_faults, slip};
+use super::judge::{Judged, error};
+use super::run::Run;
+use crate::controller::Law;
+use crate::lti::{LtiError, Plant};
+use crate::recording::Case;
+
+/// What the logs are worth.
+pub(super) struct Hygiene {
+    pub replay: Option<Replay>,
+    pub faults: Vec<SampleFault>,
+    /// Verdict on the logs, where it is not "sound".
+    pub finding: Option<Finding>,
+    /// Whether the controller's law holds, so that the loop can be closed in simulation.
+    pub closed: bool,
+}
+
+/// What the logs say; positions that turn out to be shifted are moved back.
+pub(super) fn check(
+    case: &Case,
+    runs: &mut [Run],
+    given: &Plant,
+    law: Option<&Law>,
+    sample_time_s: f64,
+) -> Result<Hygiene, LtiError> {
+    let mut faults: Vec<SampleFault> = case
+        .records
+        .iter()
+        .zip(runs.iter())
+        .flat_map(|((_, record), run)| sample_faults(run, &record.gaps, sample_time_s))
+        .collect();
+    let mut hygiene = Hygiene { replay: None, faults: Vec::new(), finding: None, closed: false };
+    if let Some(law) = law {
+        let smooth = smooth(given, runs, sample_time_s)?;
+        let all: Vec<&Run> = runs.iter().collect();
+        hygiene.closed = all.iter().all(|r| r.reference.is_some());
+        hygiene.replay = replay_records(law, &all, &smooth);
+    }
+    if let (Some(r), Some(law)) = (&hygiene.replay, law)
+        && !r.failing.is_empty()
+    {
+        let failing: Vec<usize> = (0..runs.len()).filter(|&i| r.failing.contains(&runs[i].name)).collect();
+        let slips: Vec<SampleFault> = failing.iter().filter_map(|&i| slip(law, &runs[i], sample_time_s)).collect();
+        let named: Vec<&Run> = failing.iter().map(|&i| &runs[i]).collect();
+        let helps = |e: f64| e < 0.3 * r.error;
+        if !slips.is_empty() {
+            faults.extend(slips);
+            hygiene.closed = false;
+        } else if faults.is_empty() {
+            if helps(r.error_shifted) && r.shift_samples.abs() > 0.05 && r.error_shifted <= 1.1 * r.error_scaled {
+                hygiene.finding = Some(super::log_finding::misalignment(r, sample_time_s, &named));
+                let by = r.shift_samples;
+                failing.iter().for_each(|&i| shift(&mut runs[i], by));
+            } else if helps(r.error_scaled) {
+                hygiene.finding = Some(super::log_finding::scale(r, &named));
+                hygiene.closed = false;
+            } else {
+                hygiene.finding = Some(super::log_finding::controller_mismatch(r, &named));
+                hygiene.closed = false;
+            }
+        }
+    }
+    if !faults.is_empty() {
+        hygiene.finding = Some(super::log_finding::samples(&faults));
+        hygiene.closed = hygiene.closed && hygiene.replay.as_ref().is_some_and(|r| r.failing.is_empty());
+    }
+    hygiene.faults = faults;
+    Ok(hygiene)
+}
+
+/// The given plant's answer to each record's command, its free motions fitted to the position: the motion without the noise.
+fn smooth(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Vec<Vec<f64>>, LtiError> {
+    let scene = scene(given, runs, sample_time_s, None);
+    let model = Judged { plant: given, effects: Vec::new(), own: Vec::new(), lines: &[], fit: None, scene: &scene };
+    let smooth = |run: &Run| Ok(run.position.iter().zip(error(&model, run, None)?).map(|(y, e)| y - e).collect());
+    runs.iter().map(smooth).collect()
+}
+
+/// Moves the position log against the others by a real number of samples.
+fn shift(run: &mut Run, samples: f64) {
+    let y = run.position.clone();
+    let last = y.len() - 1;
+    for (k, p) in run.position.iter_mut().enumerate() {
+        let at = (k as f64 + samples).clamp(0.0, last as f64);
+        let (i, f) = (at.floor() as usize, at.fract());
+        *p = if f == 0.0 { y[i] } else { y[i] + f * (y[(i + 1).min(last)] - y[i]) };
+    }
+}

@@ -1,0 +1,110 @@
+//! A certificate for a terminal: limits with their bounds, margins, and what was found.
+
+use super::ReportError;
+use super::number::NumberFormat;
+use super::table::{Column, Table};
+use crate::verify::{Bounded, Certificate, Finding, Stability, Verdict};
+
+/// One table a machine, then the findings and the verdict.
+pub fn certificate_text(c: &Certificate) -> Result<String, ReportError> {
+    let digits = NumberFormat::Significant(6);
+    let mut text = String::new();
+    for (i, case) in c.cases.iter().enumerate() {
+        let stability = match case.bounds.stability {
+            Stability::Stable => "stable",
+            Stability::Unstable => "UNSTABLE",
+            Stability::Undecided => "not proved stable",
+        };
+        let count = case.bounds.encirclements.map_or("not counted".to_owned(), |n| n.to_string());
+        text += &format!(
+            "Machine {} ({}): {stability}; encirclements of -1: {count}; {} cells.\n",
+            i + 1,
+            case.sha256.get(..12).unwrap_or_default(),
+            case.bounds.cells
+        );
+        let mut table = Table::new(
+            "Bounds that hold at every frequency",
+            vec![
+                Column::words("figure"),
+                Column::words("required"),
+                Column::numbers("proven low", "", digits),
+                Column::numbers("proven high", "", digits),
+                Column::numbers("at", "Hz", digits),
+                Column::words("unit"),
+                Column::words("verdict"),
+            ],
+        );
+        for l in &case.limits {
+            let side = if l.side == "at_least" { "at least" } else { "at most" };
+            let verdict = match l.verdict {
+                Verdict::Proved => "proved",
+                Verdict::Violated => "VIOLATED",
+                Verdict::NotProved => "NOT PROVED",
+            };
+            table.push(vec![
+                l.name.as_str().into(),
+                format!("{side} {}", l.required).as_str().into(),
+                l.proven.low.into(),
+                l.proven.high.into(),
+                l.proven.hz.into(),
+                l.unit.as_str().into(),
+                verdict.into(),
+            ])?;
+        }
+        let b = &case.bounds;
+        let us = |x: Bounded| Bounded { low: x.low.map(|s| s * 1e6), high: x.high.map(|s| s * 1e6), hz: x.hz };
+        for (name, x, unit) in [
+            ("modulus margin", b.modulus_margin, "ratio"),
+            ("delay margin", us(b.delay_margin_s), "us"),
+            ("disk margin", b.disk_margin, "ratio"),
+        ] {
+            table.push(vec![
+                name.into(),
+                "".into(),
+                x.low.into(),
+                x.high.into(),
+                x.hz.into(),
+                unit.into(),
+                "".into(),
+            ])?;
+        }
+        text += &table.text();
+        for s in &case.sweep_again {
+            text += &format!(
+                "Too coarse to promise: sweep {:.1} to {:.1} Hz again, points at most {:.3} Hz apart.\n",
+                s.low_hz, s.high_hz, s.spacing_hz
+            );
+        }
+        text.push('\n');
+    }
+    for f in &c.findings {
+        text += &format!("{}\n", sentence(f));
+    }
+    text += if c.proved { "Proved.\n" } else { "NOT PROVED.\n" };
+    Ok(text)
+}
+
+/// A finding in words.
+pub fn sentence(f: &Finding) -> String {
+    let number = |x: &Option<f64>| x.map_or("none".to_owned(), |x| x.to_string());
+    match f {
+        Finding::Count { found, expected } => {
+            format!("Changed: {found} [[section]] rows, but the gains make {expected}.")
+        }
+        Finding::Section { index, key, found, expected } => {
+            format!("Changed: [[section]] {index}: {key} = {found}, but the gains make {expected}.")
+        }
+        Finding::Figure { name, stated, proven } => format!(
+            "Changed: [after] {name} = {}, but {} to {} is proved.",
+            number(stated),
+            number(&proven.low),
+            number(&proven.high)
+        ),
+        Finding::Digest { role, stated } => {
+            format!("Another {role}: the table was made from the one with SHA-256 {stated}.")
+        }
+        Finding::Certificate { path, stated, proven } => {
+            format!("The certificate does not hold: {path} = {stated}, the proof gives {proven}.")
+        }
+    }
+}

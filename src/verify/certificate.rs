@@ -1,0 +1,335 @@
+//! The certificate: every requirement of a spec with its proven bounds, on every machine given, and what does not fit.
+
+use super::bounds::{Bounded, Bounds, Stability};
+use super::table::{self, Finding};
+use super::write::{WriteFigures, write};
+use super::{SweepAgain, SweepAssumption, Uncertainty, VerifyError, VerifySettings, Word, prove_loop, prove_sweep};
+use crate::document::{parse_toml, read_text, sha256_hex};
+use crate::frf::Sweep;
+use crate::lti::{Plant, PlantFile};
+use crate::tune::{GainTable, Requirement, Side, Spec, What};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Ms taken for the search for bands where the spec names none.
+const MS_UNSAID: f64 = 2.5;
+
+/// Name of the document's form.
+pub const SCHEMA: &str = "servotune.certificate/1";
+
+/// What one requirement came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The bounds lie on the good side of the limit.
+    Proved,
+    /// The bounds lie on the bad side.
+    Violated,
+    /// The limit lies between the bounds, or there are none.
+    NotProved,
+}
+
+/// One requirement with its bounds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProvenLimit {
+    /// The quantity, named as in the spec.
+    pub name: String,
+    /// Which side of the limit is good: "at_least" or "at_most".
+    pub side: String,
+    /// The limit.
+    pub required: f64,
+    /// Its unit.
+    pub unit: String,
+    /// What is proved.
+    pub proven: Bounded,
+    /// Whether that is enough.
+    pub verdict: Verdict,
+}
+
+/// One machine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CaseProof {
+    /// SHA-256 of the plant's file.
+    pub sha256: String,
+    /// Margins.
+    pub bounds: Bounds,
+    /// The write, of the plant as it stands: uncertainty is not in it. A sweep alone tells too little of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub write: Option<WriteFigures>,
+    /// Requirements.
+    pub limits: Vec<ProvenLimit>,
+    /// Bands to sweep again before more can be proved.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sweep_again: Vec<SweepAgain>,
+}
+
+/// The document.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Certificate {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Version of this program.
+    pub program: String,
+    /// SHA-256 of the gain table's bytes.
+    pub gains_sha256: String,
+    /// SHA-256 of the spec's and of the profile's bytes.
+    pub spec_sha256: String,
+    /// See above.
+    pub profile_sha256: String,
+    /// How the firmware holds the coefficients that are certified.
+    pub word: Word,
+    /// What was uncertain.
+    pub uncertainty: Uncertainty,
+    /// How sweeps were taken; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sweep: Option<SweepAssumption>,
+    /// What the proof takes for granted.
+    pub assumptions: Vec<String>,
+    /// Every machine.
+    pub cases: Vec<CaseProof>,
+    /// What in the table does not fit its inputs.
+    pub findings: Vec<Finding>,
+    /// Everything is proved and nothing was found.
+    pub proved: bool,
+}
+
+/// A file and its text.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Source {
+    /// Named in errors.
+    pub file: PathBuf,
+    /// What stands in it.
+    pub text: String,
+}
+
+impl Source {
+    /// The file as it stands on disk.
+    pub fn read(file: &Path) -> Result<Source, VerifyError> {
+        Ok(Source { file: file.into(), text: read_text(file)? })
+    }
+
+    fn sha256(&self) -> String {
+        sha256_hex(self.text.as_bytes())
+    }
+}
+
+/// Files and choices of a proof.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inputs<'a> {
+    /// The gain table.
+    pub gains: &'a Source,
+    /// Plants: the machine itself, and its temperature or other cases.
+    pub plants: &'a [Source],
+    /// Sweeps, each a case like a plant.
+    pub sweeps: &'a [Sweep],
+    /// How the sweeps are taken.
+    pub assumption: SweepAssumption,
+    /// The spec, and the profile that it names.
+    pub spec: &'a Source,
+    /// See above.
+    pub profile: &'a Source,
+    /// How the firmware holds the coefficients.
+    pub word: Word,
+    /// Box around every plant.
+    pub uncertainty: Uncertainty,
+}
+
+/// Proves a gain table from its files.
+pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate, VerifyError> {
+    for (key, found) in [
+        ("gain", i.uncertainty.gain),
+        ("frequency", i.uncertainty.frequency),
+        ("damping", i.uncertainty.damping),
+        ("delay", i.uncertainty.delay),
+    ] {
+        if !(0.0..1.0).contains(&found) {
+            return Err(VerifyError::Uncertainty { key, found });
+        }
+    }
+    // The table's own reader would refuse what is to be reported here.
+    let table: GainTable = parse_toml(&i.gains.file, &i.gains.text)?;
+    let c = table.controller();
+    c.check().map_err(crate::tune::GainTableError::from)?;
+    let spec = Spec::parse(&i.spec.text, &i.profile.text)?;
+    let spec_sha256 = i.spec.sha256();
+    let mut findings = table::sections(&c, table.sections());
+    let held = i.word.hold(table.sections())?;
+    let wanted = Requirement::list(&spec.margins, &spec.limits);
+    let (mut cases, mut unfit) = (Vec::new(), Vec::new());
+    let t = c.sample_time_s;
+    let none = Uncertainty::default();
+    let plain = i.word == Word::Double && !i.uncertainty.any();
+    for source in i.plants {
+        let file = &source.file;
+        let plant = Plant::try_from(parse_toml::<PlantFile>(file, &source.text)?)
+            .map_err(|source| VerifyError::PlantFile { file: file.clone(), source })?;
+        if let Some(p) = plant.physics.first() {
+            return Err(VerifyError::Physics { file: file.clone(), effect: p.effect.clone() });
+        }
+        let bounds = prove_loop(&plant, &held, t, &i.uncertainty, settings)?;
+        let figures = write(&plant, &held, &c, &spec.profile);
+        // The table states figures of its own coefficients on the plant as it stands.
+        unfit.push(if plain {
+            table::figures(&table.after, &bounds, Some(&figures))
+        } else {
+            let bounds = prove_loop(&plant, table.sections(), t, &none, settings)?;
+            let figures = write(&plant, table.sections(), &c, &spec.profile);
+            table::figures(&table.after, &bounds, Some(&figures))
+        });
+        let limits = limits(&wanted, &bounds, Some(&figures));
+        cases.push(CaseProof { sha256: source.sha256(), bounds, write: Some(figures), limits, sweep_again: vec![] });
+    }
+    // Without a limit on Ms, a hidden mode that brings L this near to -1 is one to look for.
+    let away = 1.0 / spec.margins.max_sensitivity.unwrap_or(MS_UNSAID);
+    for sweep in i.sweeps {
+        let prove = |sections, u| prove_sweep(&sweep.frf, sections, t, i.assumption, u, away, settings);
+        let (bounds, sweep_again) = prove(&held[..], &i.uncertainty)?;
+        let of_table = if plain { bounds.clone() } else { prove(table.sections(), &none)?.0 };
+        unfit.push(table::figures(&table.after, &of_table, None));
+        let limits = limits(&wanted, &bounds, None);
+        cases.push(CaseProof { sha256: sweep.source_digest.clone(), bounds, write: None, limits, sweep_again });
+    }
+    // The figures must be those of one of the machines.
+    findings.extend(unfit.into_iter().min_by_key(Vec::len).unwrap_or_default());
+    let machines: Vec<String> = cases.iter().map(|c| c.sha256.clone()).collect();
+    findings.extend(table::digests(&table, &spec_sha256, &machines));
+    let all = cases
+        .iter()
+        .all(|c| c.bounds.stability == Stability::Stable && c.limits.iter().all(|l| l.verdict == Verdict::Proved));
+    Ok(Certificate {
+        schema: SCHEMA.into(),
+        program: env!("CARGO_PKG_VERSION").into(),
+        gains_sha256: i.gains.sha256(),
+        spec_sha256,
+        profile_sha256: i.profile.sha256(),
+        word: i.word,
+        uncertainty: i.uncertainty,
+        sweep: (!i.sweeps.is_empty()).then_some(i.assumption),
+        assumptions: assumptions(i),
+        proved: all && findings.is_empty(),
+        cases,
+        findings,
+    })
+}
+
+fn assumptions(i: &Inputs<'_>) -> Vec<String> {
+    let mut all = vec![
+        "each plant is the linear model of its file, or any in the box around it".to_owned(),
+        "DFT figures and command peak are those of the profile's one draw of the noise, on the plant as it stands"
+            .to_owned(),
+        "the firmware computes its sections without overflow; rounding inside a section is not in the bounds"
+            .to_owned(),
+    ];
+    if !i.sweeps.is_empty() {
+        all.push(format!(
+            "each sweep is of a stable plant: around every interval a cubic in ln w and at most one mode, of damping at least {}; |L| > 1 below the sweep and < 1 above it, no crossing there",
+            i.assumption.least_damping
+        ));
+    }
+    if i.uncertainty.any() {
+        all.push("no parameter moves further than its share; every mode and the body may move on their own".to_owned());
+    }
+    all
+}
+
+fn limits(wanted: &[Requirement], b: &Bounds, w: Option<&WriteFigures>) -> Vec<ProvenLimit> {
+    let around = |x: f64, e: f64| Bounded { low: Some(x - e), high: Some(x + e), hz: None };
+    wanted
+        .iter()
+        .map(|r| {
+            let proven = match r.what {
+                What::PhaseMargin => b.phase_margin_deg,
+                What::GainMargin => b.gain_margin_db,
+                What::MaxSensitivity => b.max_sensitivity,
+                What::GainCrossover => b.gain_crossover_hz,
+                what => w.map_or(Bounded::default(), |w| match what {
+                    What::DftLow => around(w.dft_low, w.error),
+                    What::DftHigh => around(w.dft_high, w.error),
+                    What::Harmonic { k } => w.harmonics.get(k - 1).map_or(Bounded::default(), |a| around(*a, w.error)),
+                    _ => around(w.command_peak, 1e-7 * w.command_peak),
+                }),
+            };
+            let unlimited = matches!(r.what, What::PhaseMargin | What::GainMargin) && proven.low.is_none();
+            let (good, bad) = match r.side {
+                Side::AtLeast => {
+                    (unlimited || proven.low.is_some_and(|x| x >= r.limit), proven.high.is_some_and(|x| x < r.limit))
+                }
+                Side::AtMost => (proven.high.is_some_and(|x| x <= r.limit), proven.low.is_some_and(|x| x > r.limit)),
+            };
+            // A margin of an unstable loop is a number without a meaning.
+            let stable = b.stability == Stability::Stable;
+            let verdict = match (good && stable, bad || b.stability == Stability::Unstable) {
+                (true, _) => Verdict::Proved,
+                (_, true) => Verdict::Violated,
+                _ => Verdict::NotProved,
+            };
+            let side = if r.side == Side::AtLeast { "at_least" } else { "at_most" };
+            ProvenLimit {
+                name: r.what.to_string(),
+                side: side.into(),
+                required: r.limit,
+                unit: r.what.unit().into(),
+                proven,
+                verdict,
+            }
+        })
+        .collect()
+}
+
+impl Certificate {
+    /// The document's text, JSON.
+    pub fn text(&self) -> Result<String, VerifyError> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+
+    /// Lines of an older certificate, `text`, that this proof does not repeat.
+    pub fn compare(&self, file: &Path, text: &str) -> Result<Vec<Finding>, VerifyError> {
+        let old: serde_json::Value =
+            serde_json::from_str(text).map_err(|source| VerifyError::CertificateText { file: file.into(), source })?;
+        let new = serde_json::to_value(self)?;
+        let mut all = Vec::new();
+        differences("", &old, &new, &mut all);
+        // Spaces and keys given twice are no numbers, but a certificate is its bytes.
+        if all.is_empty() && text != self.text()? {
+            all.push(Finding::Certificate { path: "the text".into(), stated: String::new(), proven: String::new() });
+        }
+        Ok(all)
+    }
+}
+
+fn differences(path: &str, old: &serde_json::Value, new: &serde_json::Value, all: &mut Vec<Finding>) {
+    use serde_json::Value;
+    match (old, new) {
+        (Value::Object(a), Value::Object(b)) => {
+            let mut keys: Vec<&String> = a.keys().chain(b.keys()).collect();
+            keys.sort();
+            keys.dedup();
+            for k in keys {
+                let none = Value::Null;
+                differences(&format!("{path}/{k}"), a.get(k).unwrap_or(&none), b.get(k).unwrap_or(&none), all);
+            }
+        }
+        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
+            for (i, (a, b)) in a.iter().zip(b).enumerate() {
+                differences(&format!("{path}/{i}"), a, b, all);
+            }
+        }
+        _ if old == new => {}
+        _ => all.push(Finding::Certificate { path: path.into(), stated: old.to_string(), proven: new.to_string() }),
+    }
+}
+
+/// Word and uncertainty of an older certificate.
+pub fn choices(file: &Path, text: &str) -> Result<(Word, Uncertainty), VerifyError> {
+    #[derive(Deserialize)]
+    struct Choices {
+        word: Word,
+        uncertainty: Uncertainty,
+    }
+    let c: Choices =
+        serde_json::from_str(text).map_err(|source| VerifyError::CertificateText { file: file.into(), source })?;
+    Ok((c.word, c.uncertainty))
+}

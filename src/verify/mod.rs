@@ -1,0 +1,80 @@
+//! The second opinion: proves a gain table again from the raw files, by algorithms that the search and the margins do not use.
+//!
+//! In: a gain table, plants or a sweep, a spec, what is uncertain. Out: a certificate of bounds that hold at every frequency, or
+//! a refusal that says what to measure again. Shared with the rest are the readers of files and the seeded generator only.
+//! Convention: L = P C, negative feedback; spec: `specs/certificate.md`.
+
+mod bounds;
+mod certificate;
+mod chain;
+mod clusters;
+mod error;
+mod expansion;
+mod hidden;
+mod model;
+mod patch;
+mod plant;
+mod prove;
+mod range;
+mod settings;
+mod swept;
+mod table;
+mod uncertain;
+mod word;
+mod write;
+
+pub use bounds::{Bounded, Bounds, ProvenCrossing, Stability};
+pub use certificate::{CaseProof, Certificate, Inputs, ProvenLimit, SCHEMA, Source, Verdict, certify, choices};
+pub use error::VerifyError;
+pub use range::Range;
+pub use settings::VerifySettings;
+pub use swept::{SweepAgain, SweepAssumption};
+pub use table::Finding;
+pub use uncertain::Uncertainty;
+pub use word::Word;
+pub use write::WriteFigures;
+
+use crate::frf::Frf;
+use crate::lti::{Plant, Section};
+use model::Sampled;
+use patch::Patch;
+use swept::Swept;
+
+/// Proves the loop of a plant model under the firmware's sections, over a box of parameters.
+pub fn prove_loop(
+    plant: &Plant,
+    sections: &[Section],
+    sample_time_s: f64,
+    uncertainty: &Uncertainty,
+    settings: &VerifySettings,
+) -> Result<Bounds, VerifyError> {
+    plant.check()?;
+    prove::prove(&Sampled::new(plant, sections, sample_time_s, uncertainty)?, settings)
+}
+
+/// Proves the loop of a sweep, as far as its points allow: bounds, and the bands to sweep again where what may hide between them
+/// could bring L closer to -1 than `away`.
+pub fn prove_sweep(
+    frf: &Frf,
+    sections: &[Section],
+    sample_time_s: f64,
+    assumption: SweepAssumption,
+    uncertainty: &Uncertainty,
+    away: f64,
+    settings: &VerifySettings,
+) -> Result<(Bounds, Vec<SweepAgain>), VerifyError> {
+    let found = assumption.least_damping;
+    if !(found > 0.0 && found < 1.0) {
+        return Err(VerifyError::LeastDamping { found });
+    }
+    for (key, x) in
+        [("frequency", uncertainty.frequency), ("damping", uncertainty.damping), ("delay", uncertainty.delay)]
+    {
+        if x > 0.0 {
+            return Err(VerifyError::SweepBox { key });
+        }
+    }
+    let swept = Swept::new(frf, sections, sample_time_s, assumption, uncertainty)?;
+    let bounds = prove::prove(&swept, settings)?;
+    Ok((bounds, swept.again(away)))
+}

@@ -1,0 +1,351 @@
+//! The sampled plant as the sum of its aliases: Poisson's formula on the product form, no partial fractions.
+//!
+//! With the hold, P(e^{j a}) = Σ_k (1 - e^{-j a})/(j (a + 2 pi k)) P(j (a + 2 pi k)/T), a = w T. Every alias is a product of
+//! factors whose roots are known; the aliases beyond the last one summed are bounded by an integral (`specs/certificate.md`).
+
+use super::expansion::{Expansion, Jet};
+use crate::lti::{Body, Plant};
+use nalgebra::Complex;
+use std::f64::consts::{PI, TAU};
+
+/// s² + 2 d w0 s + w0², with its roots' place: one over the squared distance is the bend.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Quadratic {
+    pub w0: f64,
+    pub damping: f64,
+    /// Roots: real part (two values where real) and imaginary part.
+    re: [f64; 2],
+    im: f64,
+}
+
+impl Quadratic {
+    pub fn new(w0: f64, damping: f64) -> Quadratic {
+        let under = (1.0 - damping) * (1.0 + damping);
+        if under >= 0.0 {
+            let re = -damping * w0;
+            return Quadratic { w0, damping, re: [re, re], im: w0 * under.sqrt() };
+        }
+        let far = -w0 * (damping + damping.signum() * (-under).sqrt());
+        Quadratic { w0, damping, re: [far, w0 * w0 / far], im: 0.0 }
+    }
+
+    /// The factor at s = j w over w ± half, per sample: `t` turns rad/s into angle.
+    #[inline]
+    pub fn expand(&self, w: f64, half: f64, t: f64) -> Expansion {
+        let value = Complex::new((self.w0 - w) * (self.w0 + w), 2.0 * self.damping * self.w0 * w);
+        let slope = Complex::new(-2.0 * w, 2.0 * self.damping * self.w0) / value;
+        let distance = |re: f64, im: f64| {
+            let off = ((w - im).abs() - half).max(0.0);
+            re * re + off * off
+        };
+        let bend = 1.0 / distance(self.re[0], self.im) + 1.0 / distance(self.re[1], -self.im);
+        let scale = 1.0 / t;
+        Expansion {
+            value,
+            slope: slope * scale,
+            bend: bend * scale * scale,
+            rounding: f64::EPSILON * (4.0 + 2.0 * w.abs() * slope.norm()),
+            zeros: None,
+        }
+    }
+
+    /// The factor as a zero: carried plainly where its root lies in or beside the cell.
+    #[inline]
+    pub fn expand_zero(&self, w: f64, half: f64, t: f64) -> Expansion {
+        let beside =
+            (w.abs() - self.im).abs() < 3.0 * half + 1e-9 * self.w0 && self.re[0].abs() < 3.0 * half + 1e-9 * self.w0;
+        if !beside {
+            return self.expand(w, half, t);
+        }
+        let value = Complex::new((self.w0 - w) * (self.w0 + w), 2.0 * self.damping * self.w0 * w);
+        let first = Complex::new(-2.0 * w, 2.0 * self.damping * self.w0);
+        let rounding = f64::EPSILON * (4.0 * value.norm() + 2.0 * w.abs() * first.norm());
+        Expansion::plain(Jet::of(value, first / t, 2.0 / (t * t), half * t, rounding))
+    }
+
+    /// Real and imaginary part of the upper root, of two real ones the nearer to rest.
+    pub fn root(&self) -> (f64, f64) {
+        (if self.re[0].abs() < self.re[1].abs() { self.re[0] } else { self.re[1] }, self.im)
+    }
+
+    /// The slowest decay or nearest place of a root (rad/s).
+    fn nearest(&self) -> f64 {
+        if self.im > 0.0 { self.w0 } else { self.re[0].abs().min(self.re[1].abs()) }
+    }
+}
+
+/// The plant's factors.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Product {
+    /// Gain of the high-frequency asymptote, with sign (position_unit/s² per command_unit).
+    pub gain: f64,
+    pub body: RigidBody,
+    /// Zeros and poles of each mode.
+    pub modes: Vec<[Quadratic; 2]>,
+    pub delay_s: f64,
+    /// Sample time (s).
+    pub t: f64,
+    /// Aliases summed whole on each side: the last lies three times above every mode.
+    pub whole: usize,
+    /// e^{-2 pi j k delay/T} for k = 1, 2, ...: the far aliases' delay.
+    far: Vec<Complex<f64>>,
+}
+
+/// The denominator of the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum RigidBody {
+    /// s² + 2 d w0 s + w0².
+    Spring(Quadratic),
+    /// s (s + rate).
+    Free(f64),
+}
+
+/// Relative size below which far aliases are not worth summing, and the most that are.
+const LEFT_OUT: f64 = 1e-8;
+const FAR: usize = 64;
+
+impl Product {
+    pub fn of(plant: &Plant, t: f64) -> Product {
+        let body = match plant.body {
+            Body::SecondOrder { natural_frequency_rad_s, damping_ratio, .. } => {
+                RigidBody::Spring(Quadratic::new(natural_frequency_rad_s, damping_ratio))
+            }
+            Body::FreeInertia { viscous_rate_per_s, .. } => RigidBody::Free(viscous_rate_per_s),
+        };
+        let gain = plant.resonance_gain
+            * match plant.body {
+                Body::SecondOrder { dc_gain, natural_frequency_rad_s: w, .. } => dc_gain * w * w,
+                Body::FreeInertia { acceleration_gain, .. } => acceleration_gain,
+            };
+        let modes: Vec<[Quadratic; 2]> = plant
+            .modes
+            .iter()
+            .map(|m| {
+                [Quadratic::new(m.zero_rad_s, m.zero_damping_ratio), Quadratic::new(m.pole_rad_s, m.pole_damping_ratio)]
+            })
+            .collect();
+        let top = modes.iter().flatten().map(|q| q.w0 * q.damping.abs().max(1.0)).fold(0.0, f64::max);
+        let whole = (3.0 * top * t / TAU + 0.5).ceil().max(2.0) as usize;
+        let turns = plant.delay_s / t;
+        let far = (1..=FAR).map(|k| Complex::from_polar(1.0, -TAU * (k as f64 * turns).fract())).collect();
+        Product { gain, body, modes, delay_s: plant.delay_s, t, whole, far }
+    }
+
+    /// Poles at rest: integrators in z = 1.
+    pub fn integrators(&self) -> usize {
+        match self.body {
+            RigidBody::Free(rate) if rate > 0.0 => 1,
+            RigidBody::Free(_) => 2,
+            RigidBody::Spring(_) => 0,
+        }
+    }
+
+    /// Bound of the slope of ln P without its integrators near rest, per unit of angle.
+    pub fn restlessness(&self) -> f64 {
+        let body = match self.body {
+            RigidBody::Spring(q) => 2.0 / q.nearest(),
+            RigidBody::Free(rate) if rate > 0.0 => 1.0 / rate,
+            RigidBody::Free(_) => 0.0,
+        };
+        let modes: f64 = self.modes.iter().flatten().map(|q| 2.0 / q.nearest()).sum();
+        (body + modes + self.delay_s) / self.t
+    }
+
+    /// P(s) at s = j (angle + 2 pi k)/T over the cell angle ± half.
+    pub fn alias(&self, angle: f64, half: f64, k: i64) -> Expansion {
+        let t = self.t;
+        let x = angle + TAU * k as f64;
+        let (w, reach) = (x / t, half / t);
+        let mut e = Expansion { value: Complex::new(self.gain, 0.0), ..Expansion::ONE };
+        e = match self.body {
+            RigidBody::Spring(q) => e.over(q.expand(w, reach, t)),
+            RigidBody::Free(rate) => {
+                let value = Complex::new(-w * w, rate * w);
+                let off = (x.abs() - half).max(0.0);
+                let (rate, one) = (rate * t, Complex::new(1.0, 0.0));
+                // d ln(j x (j x + rate))/dx = 1/x + j/(j x + rate), x and rate per sample.
+                let slope = one / x + Complex::new(0.0, 1.0) / Complex::new(rate, x);
+                let bend = 1.0 / (off * off) + 1.0 / (off * off + rate * rate);
+                e.over(Expansion { value, slope, bend, rounding: 8.0 * f64::EPSILON, zeros: None })
+            }
+        };
+        for [zero, pole] in &self.modes {
+            e = e.times(zero.expand_zero(w, reach, t).over(pole.expand(w, reach, t)));
+        }
+        // The delay's angle is k-dependent only through whole turns of delay/T: reduced before it is rounded.
+        let turns = self.delay_s / t;
+        let whole = (k as f64 * turns).fract() * TAU;
+        e.value *= Complex::from_polar(1.0, -(angle * turns + whole));
+        e.slope -= Complex::new(0.0, turns);
+        e.rounding += f64::EPSILON * 4.0 * (1.0 + angle * turns + k.unsigned_abs() as f64 * turns);
+        e
+    }
+
+    /// (1 - e^{-j a})/(j a), the hold, over the cell.
+    pub fn hold(angle: f64) -> Expansion {
+        let x = 0.5 * angle;
+        let (value, cot) = if x < 1e-4 {
+            // Series: the next terms lie below the last bit.
+            (1.0 - x * x / 6.0, -x / 3.0)
+        } else {
+            (x.sin() / x, 1.0 / x.tan() - 1.0 / x)
+        };
+        // d ln H/da = (cot(a/2) - 2/a)/2 - j/2; its slope lies between -0.149 (at pi) and -0.083 (at 0).
+        Expansion {
+            value: Complex::from_polar(value, -x),
+            slope: Complex::new(0.5 * cot, -0.5),
+            bend: 0.15,
+            rounding: 8.0 * f64::EPSILON,
+            zeros: None,
+        }
+    }
+
+    /// The factor a/(a + 2 pi k), which turns the hold of alias 0 into that of alias k.
+    pub fn share(angle: f64, half: f64, k: i64) -> Expansion {
+        let x = angle + TAU * k as f64;
+        let (near, far) = ((angle - half).max(0.0), x.abs() - half);
+        Expansion {
+            value: Complex::new(angle / x, 0.0),
+            slope: Complex::new(1.0 / angle - 1.0 / x, 0.0),
+            bend: 1.0 / (near * near) + 1.0 / (far * far),
+            rounding: 4.0 * f64::EPSILON,
+            zeros: None,
+        }
+    }
+
+    /// The far aliases, Σ P(s_k) a/(a + 2 pi k) over |k| > `whole`, and the bound of their error over the cell.
+    ///
+    /// They are taken as P = -gain/w² e^{-jw delay}; what that leaves out is bounded by [`Product::off`], and what lies beyond the last one by
+    /// an integral.
+    pub fn far(&self, angle: f64, half: f64) -> (Expansion, f64) {
+        let n = self.whole;
+        let enough = ((angle / TAU).powi(3) / LEFT_OUT).sqrt().ceil() as usize;
+        let last = enough.clamp(n, FAR.max(n));
+        let (mut value, mut first) = (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0));
+        for k in n + 1..=last {
+            let turn = self.far[k - 1];
+            let (up, down) = (1.0 / (angle + TAU * k as f64), 1.0 / (angle - TAU * k as f64));
+            let (up3, down3) = (up * up * up, down * down * down);
+            value += turn * up3 + turn.conj() * down3;
+            first -= 3.0 * (turn * (up3 * up) + turn.conj() * (down3 * down));
+        }
+        // 12 Σ 1/|a + 2 pi k|^5 <= 12 · 2 Σ (pi (2 k - 1))^-5 over the cell, whose angle is at most pi.
+        let second = 24.0 / (PI * (2 * n + 1) as f64).powi(5) * 2.0;
+        let scale = -self.gain * self.t * self.t;
+        let turns = self.delay_s / self.t;
+        // a e^{-j a delay/T}: the factor common to all.
+        let lag = Expansion {
+            value: Complex::from_polar(angle * scale, -angle * turns),
+            slope: Complex::new(1.0 / angle, -turns),
+            bend: 1.0 / (angle - half).powi(2),
+            rounding: 16.0 * f64::EPSILON * (1.0 + turns),
+            zeros: None,
+        };
+        let jet = Jet::of(value, first, second, half, 1e-14 / (n * n) as f64);
+        let off = self.off(n);
+        let error = (off * cubes(n) + (1.0 + off) * cubes(last)) * scale.abs() * (angle + half);
+        (lag.times(Expansion::plain(jet)), error)
+    }
+
+    /// Bound of |P w²/gain| - 1| from w = 2 pi (n + 1/2)/T on: every factor is 1 + d with |d| known, and |Π(1 + d) - 1| <= e^{Σ|d|} - 1.
+    fn off(&self, n: usize) -> f64 {
+        let w = TAU * (n as f64 + 0.5) / self.t;
+        let over = |q: &Quadratic| 1.0 / (1.0 - 2.0 * (q.w0 / w).powi(2)).max(0.25).sqrt();
+        let body = match &self.body {
+            RigidBody::Spring(q) => (q.w0 * q.w0 / w + 2.0 * (q.damping * q.w0).abs()) / w * over(q),
+            RigidBody::Free(rate) => rate / w,
+        };
+        let modes: f64 = self
+            .modes
+            .iter()
+            .map(|[z, p]| {
+                let apart = (z.w0 - p.w0).abs() * (z.w0 + p.w0) / w;
+                (apart + 2.0 * (z.damping * z.w0 - p.damping * p.w0).abs()) / w * over(p)
+            })
+            .sum();
+        (body + modes).exp_m1()
+    }
+}
+
+/// Bound of Σ 1/|a + 2 pi k|³ over |k| > n: the sums are below their integrals, for 1/k³ is convex.
+fn cubes(n: usize) -> f64 {
+    let n = n as f64;
+    (0.5 / ((n + 0.5) * (n + 0.5)) + 0.5 / (n * n)) / (TAU * TAU * TAU)
+}
+
+/// Half the circle.
+pub(super) const END: f64 = PI;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::lti::{DiscretePlant, FrequencyResponse, Mode};
+
+    fn sum(p: &Product, a: f64) -> (Complex<f64>, f64) {
+        let n = p.whole as i64;
+        let aliases: Complex<f64> = (-n..=n)
+            .map(|k| p.alias(a, 0.0, k).value * if k == 0 { 1.0.into() } else { Product::share(a, 0.0, k).value })
+            .sum();
+        let (far, error) = p.far(a, 0.0);
+        let hold = Product::hold(a).value;
+        ((aliases + far.term(0.0).value) * hold, error * hold.norm())
+    }
+
+    /// Partial fractions and aliases share nothing but the plant's numbers; they agree within the bound of the rest.
+    #[test]
+    fn aliases_and_partial_fractions_agree_within_the_bound() {
+        let mode = |z: f64, p: f64, d: f64| Mode {
+            zero_rad_s: z,
+            zero_damping_ratio: d,
+            pole_rad_s: p,
+            pole_damping_ratio: d,
+        };
+        let t = 39.6e-6;
+        for body in [
+            Body::SecondOrder { dc_gain: 75.0, natural_frequency_rad_s: 369.0, damping_ratio: 0.22 },
+            Body::FreeInertia { acceleration_gain: 1e7, viscous_rate_per_s: 0.0 },
+            Body::FreeInertia { acceleration_gain: -1e7, viscous_rate_per_s: 40.0 },
+        ] {
+            let plant = Plant {
+                position_unit: "track".into(),
+                command_unit: "V".into(),
+                body,
+                delay_s: 65e-6,
+                resonance_gain: 1.1,
+                modes: vec![mode(7483.0, 7681.0, 0.03), mode(95e3, 97e3, 0.004)],
+                physics: vec![],
+            };
+            let (p, exact) = (Product::of(&plant, t), DiscretePlant::of(&plant, t).unwrap());
+            for i in 1..60 {
+                let a = END * f64::from(i) / 60.0;
+                let ((ours, error), theirs) = (sum(&p, a), exact.at(a / t));
+                // Partial fractions keep some ten digits here.
+                assert!((ours - theirs).norm() <= error + 1e-9 * theirs.norm(), "{a}");
+                // And the bound is worth something: 1e-4 of the asymptote's first alias.
+                assert!(error < 1e-4 * p.gain.abs() * (t / a).powi(2), "{a} {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_remainder_bounds_every_point_of_a_cell() {
+        let q = Quadratic::new(7000.0, 0.01);
+        for (w, half) in [(7000.0, 20.0), (6900.0, 60.0), (500.0, 100.0)] {
+            let e = q.expand(w, half, 1.0);
+            for i in -20..=20 {
+                let d = half * f64::from(i) / 20.0;
+                let truth = q.expand(w + d, 0.0, 1.0).value;
+                let off = |e: Expansion, truth: Complex<f64>| {
+                    let t = e.term(half);
+                    assert!(truth.norm() <= t.most);
+                    assert!((truth - t.value - t.first * d).norm() <= t.remainder * (1.0 + 1e-9));
+                };
+                off(e, truth);
+                off(Expansion::ONE.over(e), 1.0 / truth);
+                off(q.expand_zero(w, half, 1.0), truth);
+                off(q.expand_zero(w, half, 1.0).over(e), Complex::new(1.0, 0.0));
+            }
+        }
+    }
+}

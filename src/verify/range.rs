@@ -1,0 +1,48 @@
+//! A closed range of real numbers, low to high.
+
+use serde::{Deserialize, Serialize};
+
+/// Everything from `low` to `high`, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl Range {
+    /// Nothing but 0.
+    pub const ZERO: Range = Range { low: 0.0, high: 0.0 };
+
+    /// The range between two numbers, in whichever order.
+    pub fn between(a: f64, b: f64) -> Range {
+        Range { low: a.min(b), high: a.max(b) }
+    }
+
+    /// The smallest range that holds both.
+    pub fn hull(self, other: Range) -> Range {
+        Range { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    /// Every sum of one number of each.
+    pub fn plus(self, other: Range) -> Range {
+        Range { low: self.low + other.low, high: self.high + other.high }
+    }
+
+    /// Both ends moved outward.
+    pub fn widened(self, by: f64) -> Range {
+        Range { low: self.low - by, high: self.high + by }
+    }
+
+    /// High less low.
+    pub fn width(self) -> f64 {
+        self.high - self.low
+    }
+
+    /// Whether `x` lies in it.
+    pub fn holds(self, x: f64) -> bool {
+        self.low <= x && x <= self.high
+    }
+}

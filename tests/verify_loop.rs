@@ -1,0 +1,93 @@
+//! The proof of a loop against the margins and the eigenvalues: algorithms that share no code.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use servotune::controller::{Controller, Lowpass, Notch, Pid};
+use servotune::feedback::{ModelLoop, closed_loop_poles, margins};
+use servotune::lti::{DiscretePlant, FrequencyResponse, Plant};
+use servotune::numeric::random::Random;
+use servotune::twin::plants::random_plant;
+use servotune::twin::{MachineClass, nominal_controller, paper_machine};
+use servotune::verify::{Stability, Uncertainty, VerifySettings, prove_loop};
+use std::f64::consts::TAU;
+
+fn agree(plant: &Plant, c: &Controller, name: &str) {
+    let t = c.sample_time_s;
+    let (sampled, sections) = (DiscretePlant::of(plant, t).unwrap(), c.sections().unwrap());
+    let l = ModelLoop::new(&sampled, &sections).unwrap();
+    let m = margins(&l);
+    let b = prove_loop(plant, &sections.chain, t, &Uncertainty::default(), &VerifySettings::default()).unwrap();
+    assert_eq!(b.unstable_poles, Some(m.unstable_poles), "{name}");
+    assert_eq!(b.stability == Stability::Stable, m.stable, "{name}");
+    let outside = closed_loop_poles(&l).unwrap().iter().filter(|z| z.norm() > 1.0).count() as i64;
+    assert_eq!(b.unstable_poles, Some(outside), "{name}");
+    // The margins are refined to some nine digits.
+    let holds = |what: &str, b: servotune::verify::Bounded, x: f64| {
+        let (low, high) = (b.low.unwrap(), b.high.unwrap());
+        assert!(low <= x * (1.0 + 1e-7) && x * (1.0 - 1e-7) <= high, "{name}: {what} {low} {x} {high}");
+        // Relative widths asked for, and the width asked of angles: 0.003 deg on each side of the crossing, as an angle or as a delay.
+        let slack = if what == "delay" { 1e-4 / (TAU * m.gain_crossover_hz.unwrap()) } else { 0.012 };
+        assert!(high - low <= 3e-4 * high + slack, "{name}: {what} is loose: {low} {high}");
+    };
+    holds("Ms", b.max_sensitivity, m.max_sensitivity);
+    if let Some(x) = m.phase_margin_deg {
+        holds("phase", b.phase_margin_deg, x.abs());
+        holds("crossover", b.gain_crossover_hz, m.gain_crossover_hz.unwrap());
+    }
+    if let Some(x) = m.gain_margin_db {
+        let (low, x) = (b.gain_margin_db.low.unwrap(), x.abs());
+        // The end of the curve, half the sample rate, is a crossing here and none there.
+        assert!(low <= x + 1e-6, "{name}: gain {low} {x}");
+    }
+    if m.stable {
+        holds("disk", b.disk_margin, m.disk_margin);
+        if let Some(x) = m.delay_margin_s {
+            holds("delay", b.delay_margin_s, x);
+        }
+    }
+}
+
+#[test]
+fn the_four_machines_agree_with_margins_and_eigenvalues() {
+    let c = nominal_controller().unwrap();
+    for class in MachineClass::ALL {
+        agree(&paper_machine(class).unwrap(), &c, class.name());
+    }
+}
+
+#[test]
+fn random_loops_stable_or_not_agree() {
+    let mut r = Random::new(11);
+    let t = 39.6e-6;
+    let mut unstable = 0;
+    for i in 0..150 {
+        let plant = random_plant(&mut r, 6);
+        let hz = r.between(200.0, 1500.0);
+        let mut c = Controller {
+            sample_time_s: t,
+            output_limit: None,
+            pid: Pid {
+                kp: 1.0,
+                ki_per_s: r.between(0.0, 400.0),
+                kd_s: r.between(0.3, 2.0) / (TAU * hz),
+                derivative_filter_s: 12e-6,
+            },
+            lowpass: vec![Lowpass { frequency_hz: r.between(2000.0, 10_000.0), damping_ratio: 0.7 }],
+            notch: vec![Notch {
+                frequency_hz: r.between(800.0, 5000.0),
+                zero_damping_ratio: 0.05,
+                pole_damping_ratio: 0.4,
+            }],
+            feedforward: None,
+        };
+        let size =
+            DiscretePlant::of(&plant, t).unwrap().at(TAU * hz).norm() * c.sections().unwrap().at(TAU * hz).norm();
+        for k in [&mut c.pid.kp, &mut c.pid.ki_per_s, &mut c.pid.kd_s] {
+            *k /= size;
+        }
+        let sections = c.sections().unwrap();
+        let sampled = DiscretePlant::of(&plant, t).unwrap();
+        unstable += usize::from(!margins(&ModelLoop::new(&sampled, &sections).unwrap()).stable);
+        agree(&plant, &c, &format!("loop {i}"));
+    }
+    assert!((10..140).contains(&unstable), "{unstable} unstable loops: both kinds are wanted");
+}

@@ -1,0 +1,77 @@
+//! `servotune verify` as a person runs it: a table that holds, and what happens when a digit of it changes.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use assert_cmd::Command;
+use servotune::document::sha256_hex;
+use servotune::lti::{Plant, PlantFile};
+use servotune::tune::{GainTable, InputDigest, Machine, Spec, TuneSettings, tune};
+use servotune::twin::nominal_controller;
+use std::path::{Path, PathBuf};
+
+const PLANT: &str = include_str!("../specs/machines/tunable.toml");
+const SPEC: &str = include_str!("../specs/limits/paper.toml");
+const PROFILE: &str = include_str!("../specs/profiles/spiral.toml");
+
+/// A folder with plant, spec, profile and a tuned table.
+fn folder(name: &str) -> PathBuf {
+    let dir = std::env::temp_dir().join(format!("servotune_verify_{name}_{}", std::process::id()));
+    std::fs::create_dir_all(&dir).unwrap();
+    let spec_text = SPEC.replace("../profiles/spiral.toml", "spiral.toml");
+    let read: PlantFile = servotune::document::parse_toml(Path::new("plant"), PLANT).unwrap();
+    let plant = Plant::try_from(read).unwrap();
+    let spec = Spec::parse(&spec_text, PROFILE).unwrap();
+    let settings = TuneSettings { starts: 4, ..TuneSettings::default() };
+    let outcome = tune(&Machine::Model(&plant), &spec, Some(&nominal_controller().unwrap()), &settings).unwrap();
+    let inputs = vec![InputDigest { role: "plant".into(), sha256: sha256_hex(PLANT.as_bytes()) }];
+    let table = GainTable::of(&outcome, 1, sha256_hex(spec_text.as_bytes()), inputs).unwrap();
+    table.write(&dir.join("gains.toml")).unwrap();
+    for (file, text) in [("plant.toml", PLANT), ("spec.toml", spec_text.as_str()), ("spiral.toml", PROFILE)] {
+        std::fs::write(dir.join(file), text).unwrap();
+    }
+    dir
+}
+
+fn verify(dir: &Path, more: &[&str]) -> (i32, String) {
+    let out = Command::cargo_bin("servotune")
+        .unwrap()
+        .current_dir(dir)
+        .args(["verify", "gains.toml", "--plant", "plant.toml", "--spec", "spec.toml"])
+        .args(more)
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
+    (out.status.code().unwrap(), text)
+}
+
+#[test]
+fn a_table_is_proved_and_every_change_is_seen() {
+    let dir = folder("table");
+    let (code, text) = verify(&dir, &["--out", "gains.certificate.json"]);
+    assert_eq!(code, 0, "{text}");
+    // Again, now with the certificate beside it.
+    let (code, text) = verify(&dir, &[]);
+    assert_eq!(code, 0, "{text}");
+    let gains = std::fs::read_to_string(dir.join("gains.toml")).unwrap();
+    let line = gains.lines().find(|l| l.starts_with("b0 =")).unwrap();
+    let value: f64 = line[4..].trim().parse().unwrap();
+    std::fs::write(dir.join("gains.toml"), gains.replacen(line, &format!("b0 = {:?}", value * 1.001), 1)).unwrap();
+    let (code, text) = verify(&dir, &[]);
+    assert!(code == 1 && text.contains("[[section]] 0: b0"), "{text}");
+    // The last digit of a figure: nothing but the certificate sees it.
+    let line = gains.lines().rfind(|l| l.starts_with("dft_low =")).unwrap();
+    let last = line.chars().last().unwrap().to_digit(10).unwrap();
+    let changed = format!("{}{}", &line[..line.len() - 1], (last + 1) % 10);
+    std::fs::write(dir.join("gains.toml"), gains.replace(line, &changed)).unwrap();
+    let (code, text) = verify(&dir, &[]);
+    assert!(code == 1 && text.contains("gains_sha256"), "{text}");
+    // Another plant.
+    std::fs::write(dir.join("gains.toml"), &gains).unwrap();
+    std::fs::write(dir.join("plant.toml"), PLANT.replace("63.75", "63.76")).unwrap();
+    let (code, text) = verify(&dir, &[]);
+    assert!(code == 1 && text.contains("Another plant"), "{text}");
+    // Physics is refused by name.
+    std::fs::write(dir.join("plant.toml"), format!("{PLANT}\n[[plant.physics]]\neffect = \"slew_limit\"\n")).unwrap();
+    let (code, text) = verify(&dir, &[]);
+    assert!(code == 2 && text.contains("slew_limit"), "{text}");
+    std::fs::remove_dir_all(dir).unwrap();
+}
