@@ -232,8 +232,8 @@ pub(super) fn model_row(plant: &Plant, rms_relative_error: f64, near: bool) -> M
 
 /// What every candidate scores, and those that serve.
 ///
-/// A candidate that the grid sees inside the guarded limits keeps the guard to the limits themselves, many times what the grid can be wrong by
-/// (`specs/fleet.md`, "Proof"); closer to a limit the exact judgement decides.
+/// A candidate that the grid sees inside the guarded limits counts as serving: the guard stands for the grid's error (`specs/fleet.md`, "Proof").
+/// Closer to a limit the exact judgement decides.
 fn covered(
     context: &Context,
     library: &Library,
