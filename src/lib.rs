@@ -55,6 +55,7 @@ pub mod pes;
 pub mod diagnose;
 pub mod tune;
 
+pub mod fleet;
 pub mod twin;
 pub mod verify;
 

@@ -18,16 +18,18 @@ const RANKS: [&[&str]; 10] = [
 ];
 
 /// Outside crates and the places where they may be named.
-const HOMES: [(&str, &[&str]); 10] = [
+const HOMES: [(&str, &[&str]); 12] = [
     ("clarabel", &["src/tune/limit/cone.rs"]),
     ("argmin", &["src/tune/search.rs"]),
     ("rustfft", &["src/numeric/spectrum.rs"]),
-    ("rayon", &["src/tune/search.rs", "src/gate/", "src/twin/", "src/study/", "src/diagnose/"]),
+    ("rayon", &["src/tune/search.rs", "src/gate/", "src/twin/", "src/study/", "src/diagnose/", "src/fleet/"]),
+    ("rusqlite", &["src/fleet/"]),
+    ("parquet", &["src/fleet/parquet.rs"]),
     ("pulp", &["src/gate/wide.rs"]),
     ("clap", &["src/cli/"]),
     ("maud", &["src/report/"]),
     ("sha2", &["src/document/digest.rs", "src/frf/"]),
-    ("csv", &["src/frf/", "src/recording/", "src/gate/table.rs", "src/gate/error.rs"]),
+    ("csv", &["src/frf/", "src/recording/", "src/gate/table.rs", "src/gate/error.rs", "src/fleet/"]),
     ("flate2", &["src/frf/", "src/recording/"]),
 ];
 

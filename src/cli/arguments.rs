@@ -1,6 +1,7 @@
 //! The words of the command line.
 
 pub(super) use super::diagnose_arguments::DiagnoseArguments;
+pub(super) use super::fleet_arguments::{FleetArguments, TwinFleetArguments};
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
 pub(super) use super::limit_arguments::{BudgetArguments, LimitArguments, NextSweepArguments, ParetoArguments};
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
@@ -28,6 +29,7 @@ pub(super) enum Command {
     Demo(DemoArguments),
     Diagnose(Box<DiagnoseArguments>),
     Features(FeaturesArguments),
+    Fleet(FleetArguments),
     Identify(Box<IdentifyArguments>),
     Limit(LimitArguments),
     Pareto(ParetoArguments),
@@ -262,6 +264,7 @@ pub(super) struct TwinArguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum TwinCommand {
     Line(TwinLineArguments),
+    Fleet(TwinFleetArguments),
 }
 
 /// Machine folders of a production line
@@ -316,6 +319,12 @@ pub(super) struct StudyArguments {
     /// Folder to write to
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Sizes of the floor (study `fleet-scale`)
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [1_000, 10_000, 100_000])]
+    pub sizes: Vec<usize>,
+    /// Kills (study `fleet-kills`)
+    #[arg(long, value_name = "N", default_value_t = 500)]
+    pub kills: usize,
     /// Folder with the measured records (studies `mirror`, `motor`, `hdd`)
     #[arg(long, value_name = "DIR", default_value = "../shared/data")]
     pub data: PathBuf,
@@ -344,6 +353,14 @@ pub(super) enum StudyName {
     Plants,
     /// The nine measured responses of a fast steering mirror
     Mirror,
+    /// 64 testers of 16 slots from raw files, three times
+    Fleet,
+    /// A run killed 500 times
+    FleetKills,
+    /// Slots per second and memory over the size of the floor
+    FleetScale,
+    /// Coverage over the number of shared tables for 1000 slots
+    FleetShared,
     /// Diagnoses of the cases in the folder --data, beside their answers
     Mismatch,
     /// Real recordings: EMPS, Silverbox, motor bench, mirror, diagnosed from a linear model

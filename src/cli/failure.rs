@@ -4,6 +4,7 @@ use crate::controller::ControllerError;
 use crate::diagnose::DiagnoseError;
 use crate::document::DocumentError;
 use crate::feedback::FeedbackError;
+use crate::fleet::FleetError;
 use crate::frf::{FrfError, FrfShapeError};
 use crate::gate::GateError;
 use crate::gate::features::FeatureError;
@@ -76,6 +77,12 @@ pub enum Failure {
     Sweep(#[from] FrfShapeError),
     #[error(transparent)]
     Gate(#[from] GateError),
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
+    #[error("cannot {what}: {source}")]
+    Child { what: String, source: std::io::Error },
+    #[error("{}: no such store; `servotune fleet run` makes one", file.display())]
+    NoStore { file: PathBuf },
     #[error(transparent)]
     Study(#[from] StudyError),
     /// Two algorithms that share no code disagree: no answer can be trusted.

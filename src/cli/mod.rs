@@ -12,6 +12,14 @@ mod diagnose;
 mod diagnose_arguments;
 mod failure;
 mod features;
+mod fleet;
+mod fleet_arguments;
+mod fleet_page;
+mod fleet_progress;
+mod fleet_slot;
+mod fleet_store;
+mod fleet_study;
+mod fleet_twin;
 mod gate_arguments;
 mod gated;
 mod identify;
@@ -65,6 +73,7 @@ pub fn main() -> ExitCode {
         Command::Demo(a) => demo::run(&a, &mut screen),
         Command::Diagnose(a) => diagnose::run(&a, &mut screen),
         Command::Features(a) => features::run(&a, &mut screen),
+        Command::Fleet(a) => fleet::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
         Command::Limit(a) => limit::run(&a, &mut screen),
         Command::Pareto(a) => pareto::run(&a, &mut screen),

@@ -1,7 +1,7 @@
 //! `servotune study`: the tables and pictures of `results/`, made again.
 
 use super::arguments::{StudyArguments, StudyName};
-use super::{Ending, Failure, Screen};
+use super::{Ending, Failure, Screen, fleet_study};
 use crate::document::write_text;
 use crate::study;
 use serde::Serialize;
@@ -12,6 +12,19 @@ struct Written {
 }
 
 pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    // Those of the fleet run this program as other processes and write their own pages.
+    let own = match a.study {
+        StudyName::Fleet => Some(fleet_study::floor(&a.out, screen)?),
+        StudyName::FleetKills => Some(fleet_study::kills(&a.out, a.kills, screen)?),
+        StudyName::FleetScale => Some(fleet_study::scale(&a.out, &a.sizes, screen)?),
+        StudyName::FleetShared => Some(fleet_study::shared(&a.out, screen)?),
+        _ => None,
+    };
+    if let Some(files) = own {
+        let written = Written { files: files.iter().map(|f| f.display().to_string()).collect() };
+        screen.result(&written, &format!("{}\n", written.files.join("\n")))?;
+        return Ok(Ending::Accepted);
+    }
     let made = match a.study {
         StudyName::Classes => study::classes()?,
         StudyName::Gate => study::gate()?,
@@ -27,6 +40,9 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::Recordings => study::recordings(&a.data)?,
         StudyName::Motor => study::motor(&a.data)?,
         StudyName::Hdd => study::hdd(&a.data)?,
+        StudyName::Fleet | StudyName::FleetKills | StudyName::FleetScale | StudyName::FleetShared => {
+            study::Study::default()
+        }
     };
     let mut written = Written { files: Vec::new() };
     for (name, content) in &made.files {

@@ -18,6 +18,7 @@ const UNKNOWN: usize = 40;
 pub(super) fn run(a: &TwinArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     match &a.what {
         TwinCommand::Line(a) => run_line(a, screen),
+        TwinCommand::Fleet(a) => super::fleet_twin::run(a, screen),
     }
 }
 

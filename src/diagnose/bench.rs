@@ -174,7 +174,7 @@ impl Bench {
         let mut errors: Vec<(usize, Vec<f64>)> =
             (fit_runs.iter()).map(|&r| (r, simulation_error(&sampled, &plain, &[], &runs[r], &still, 0))).collect();
         let body = &carrier.plant.body;
-        let mut white = |errors: &[(usize, Vec<f64>)]| {
+        let white = |errors: &[(usize, Vec<f64>)]| {
             let series = noise_series(&in_laps(errors, &runs), &runs);
             let levels = NoiseLevels::fit(&values(&without_start(&series, &free, &|_| {})), body, sample_time_s, true);
             let whitener = Whitener::new(&levels, body, sample_time_s);
@@ -182,7 +182,7 @@ impl Bench {
             (values(&filtered), series.iter().map(|s| runs[s.0].group).collect())
         };
         let recorded = errors.clone();
-        let lines = take_lines(&mut errors, &runs, &free, sample_time_s, spindle_hz, &mut white);
+        let lines = take_lines(&mut errors, &runs, &free, sample_time_s, spindle_hz, &white);
         let mut cleaned = runs.clone();
         for ((r, before), (_, after)) in recorded.iter().zip(&errors) {
             let position = &mut cleaned[*r].position;

@@ -68,10 +68,12 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> Vec<Finding
         let mut parameters = BTreeMap::from([("base_hz".to_owned(), plain(first.hz, "Hz"))]);
         for l in &orders {
             let harmonic = l.order.unwrap_or(1) as f64 / first.order.unwrap_or(1) as f64;
-            let name = match harmonic {
-                h if h == 1.0 => "amplitude".to_owned(),
-                h if h.fract() == 0.0 => format!("amplitude_{h:.0}"),
-                _ => format!("amplitude_of_order_{}", l.order.unwrap_or(0)),
+            let name = if l.order == first.order {
+                "amplitude".to_owned()
+            } else if harmonic.fract() == 0.0 {
+                format!("amplitude_{harmonic:.0}")
+            } else {
+                format!("amplitude_of_order_{}", l.order.unwrap_or(0))
             };
             parameters.insert(name, estimate(&amplitudes(bench, selection, l), 1.0, &given.position_unit));
         }

@@ -127,6 +127,9 @@ pub fn strongest(series: &[Vec<f64>], groups: &[usize], sample_time_s: f64, spin
     })
 }
 
+/// White series of noise, and the group of repeats that each belongs to.
+pub type NoiseSeries = (Vec<Vec<f64>>, Vec<usize>);
+
 /// Finds lines one after the other and takes them out of `errors` (run and its error, free motions of the body still in it);
 /// `noise` makes white noise series of them, with their groups.
 pub fn take_lines(
@@ -135,7 +138,7 @@ pub fn take_lines(
     free: &dyn Fn(usize) -> Vec<Vec<f64>>,
     sample_time_s: f64,
     spindle_hz: Option<f64>,
-    noise: &mut dyn FnMut(&[(usize, Vec<f64>)]) -> (Vec<Vec<f64>>, Vec<usize>),
+    noise: &dyn Fn(&[(usize, Vec<f64>)]) -> NoiseSeries,
 ) -> Vec<Line> {
     let mut lines: Vec<Line> = Vec::new();
     while lines.len() < MOST {

@@ -19,6 +19,10 @@ pub(super) struct Hygiene {
     pub closed: bool,
 }
 
+/// Deviation of a factor from 1 above which a position counts as logged in other units; a factor of the command alone is the
+/// controller's.
+const UNIT: f64 = 0.02;
+
 /// What the logs say; positions that turn out to be shifted are moved back.
 pub(super) fn check(
     case: &Case,
@@ -55,7 +59,7 @@ pub(super) fn check(
                 hygiene.finding = Some(super::log_finding::misalignment(r, sample_time_s, &named));
                 let by = r.shift_samples;
                 failing.iter().for_each(|&i| shift(&mut runs[i], by));
-            } else if helps(r.error_scaled) {
+            } else if helps(r.error_scaled) && (r.position_factor - 1.0).abs() > UNIT {
                 hygiene.finding = Some(super::log_finding::scale(r, &named));
                 hygiene.closed = false;
             } else {

@@ -263,7 +263,13 @@ fn lags_like(bench: &Bench, selection: &Selection, delay_s: f64, cost: f64) -> V
     let as_good = |name: &&str| {
         let Some(lag) = effect(name) else { return false };
         let setting = Setting { inner: vec![delay_s], strengths: vec![1.0] };
-        let more = Chosen { effect: lag, setting, continuous: vec![true], step: 0 };
+        let more = Chosen {
+            effect: lag,
+            setting,
+            continuous: vec![true],
+            range: vec![[0.1 * delay_s, 10.0 * delay_s]],
+            step: 0,
+        };
         restricted(bench, |_| false, selection, Some(more)).0 < cost + FAMILY
     };
     ["amplifier_lag", "sensor_lag"].into_iter().filter(as_good).map(str::to_owned).collect()

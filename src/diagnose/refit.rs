@@ -23,6 +23,8 @@ pub struct Chosen {
     pub setting: Setting,
     /// Which inner parameters may be refined.
     pub continuous: Vec<bool>,
+    /// Range of each inner parameter's magnitude.
+    pub range: Vec<[f64; 2]>,
     /// The step of the search that found it.
     pub step: usize,
 }
@@ -223,8 +225,9 @@ impl Residuals for Problem<'_, '_> {
         let p = self.fit.form.knobs.len();
         if i >= p + self.strengths.len() {
             let (e, k) = self.inner[i - p - self.strengths.len()];
-            let at = self.fit.chosen[e].setting.inner[k].abs().ln();
-            return Limit { low: at - 3.0, high: at + 3.0, step: 0.3 };
+            // A law far outside its range is another law.
+            let [low, high] = self.fit.chosen[e].range[k];
+            return Limit { low: low.ln(), high: high.ln(), step: 0.3 };
         }
         if i >= p {
             return Limit { low: f64::NEG_INFINITY, high: f64::INFINITY, step: f64::INFINITY };

@@ -163,6 +163,7 @@ pub fn select(
                     && (other != name || again(name, &m.setting, &c.setting))
             });
             if new
+                && c.effect.possible(&c.setting)
                 && c.log_p_value(library.len()) < limit
                 && c.concealed < 0.9995
                 && seen < 1 + usize::from(leads)
@@ -179,10 +180,13 @@ pub fn select(
                 effect: c.effect,
                 setting: c.setting.clone(),
                 continuous: c.continuous.clone(),
+                range: c.range.clone(),
                 step: steps.len(),
             });
             let tried = fitted_from_both(bench, &chosen, &model.refitted.p, settings.iterations);
-            step.tried.push((i, tried));
+            if tried.chosen.iter().all(|c| c.effect.possible(&c.setting)) {
+                step.tried.push((i, tried));
+            }
         }
         // Each number of a law is paid for (Schwarz 1978): of two that fit alike, the one with fewer.
         let price = (bench.stack.total as f64).ln();

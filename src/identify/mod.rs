@@ -13,6 +13,7 @@ mod groups;
 mod growth;
 mod held_out;
 mod ladder;
+mod near;
 mod noise;
 mod prune;
 mod result;
@@ -25,6 +26,7 @@ mod trust;
 
 pub use error::IdentifyError;
 pub use finish::identify;
+pub use near::{Near, identify_near};
 pub use result::{BodyEvidence, HeldOut, Identified, Interval, Intervals, LadderRung, ModeIntervals, Work};
 pub use settings::{BodyChoice, Hold, IdentifySettings, OrderChoice, ZeroSide};
 pub use trust::{BandEdge, BandReason, TrustedBand};

@@ -14,6 +14,7 @@ mod quick;
 mod reference;
 mod simulation;
 mod spectral;
+mod window_frame;
 
 pub use budget::{Budget, PredictSettings, Prediction, Range, Source, SourceShare, budget, predict};
 pub use dft::{Harmonic, WindowDft};

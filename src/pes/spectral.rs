@@ -5,12 +5,14 @@
 //! of one move that the next one still sees. Noise enters as expected power. Spec: `specs/tuning.md`, "The measured route".
 
 use super::expected::dot;
+use super::window_frame::{FrameKey, WindowFrame, frame, kernel};
 use super::{PesError, Profile, Reference, WindowDft};
 use crate::controller::{Controller, Feedforward};
 use crate::feedback::{LoopOnGrid, ResponseCurve, SampledPlant};
 use crate::lti::{FrequencyResponse, Section};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 /// Everything of a write that does not depend on the gains.
 #[derive(Clone, Debug)]
@@ -22,7 +24,7 @@ pub struct SpectralPes {
     /// Run-out of every bin, added at the head.
     runout: Vec<Complex<f64>>,
     /// For every bin, the share of every line's noise density that falls into it, leakage of the window included.
-    leak: Vec<Vec<f64>>,
+    frame: Arc<WindowFrame>,
     /// Densities (per hertz, both signs) of the encoder noise, and of the windage on every line.
     encoder: f64,
     windage: Vec<f64>,
@@ -93,13 +95,20 @@ impl SpectralPes {
         let (n, rate) = (last - first, profile.pes.sample_rate_hz);
         let from_s = (profile.first_servo_sample() + first) as f64 / rate;
         let dft = WindowDft::new(n, rate, bins);
+        let spacing_hz = 2.0 / period;
+        let frame = frame(FrameKey {
+            w_rad_s: w.clone(),
+            rate_hz: rate,
+            samples: n,
+            from_s,
+            bins: dft.bins().to_vec(),
+            spacing_hz,
+        });
         let mut weight = Vec::with_capacity(dft.bins().len());
-        for &k in dft.bins() {
-            let bin = TAU * k as f64 / n as f64;
+        for turned in &frame.turned {
             let mut rows: [Vec<f64>; 4] = std::array::from_fn(|_| Vec::with_capacity(w.len()));
-            for (w, e) in w.iter().zip(&error) {
-                let a = e * Complex::from_polar(1.0, w * from_s) * kernel(w / rate - bin, n);
-                let b = e.conj() * Complex::from_polar(1.0, -w * from_s) * kernel(-w / rate - bin, n);
+            for ([there, back], e) in turned.iter().zip(&error) {
+                let (a, b) = (e * there, e.conj() * back);
                 let (sum, difference) = (a + b, (a - b) * Complex::i());
                 rows[0].push(sum.re);
                 rows[1].push(difference.re);
@@ -113,12 +122,6 @@ impl SpectralPes {
         let coloured = |w: f64| {
             let back = Complex::new(1.0, 0.0) - keep * Complex::from_polar(1.0, -w * t);
             noise.windage_rms.powi(2) * t * (1.0 - keep * keep) / back.norm_sqr()
-        };
-        let spacing_hz = 2.0 / period;
-        let leak_into = |k: &usize| -> Vec<f64> {
-            let bin = TAU * *k as f64 / n as f64;
-            let share = |w: &f64| kernel(w / rate - bin, n).norm_sqr() + kernel(-w / rate - bin, n).norm_sqr();
-            w.iter().map(|w| share(w) * spacing_hz).collect()
         };
         let runout = runout(profile, &dft, from_s, n);
         let command = command.then(|| {
@@ -140,7 +143,7 @@ impl SpectralPes {
         let windage = w.iter().map(|w| coloured(*w)).collect();
         Ok(SpectralPes {
             outside: w.iter().map(|w| !plant.covers(*w)).collect(),
-            leak: dft.bins().iter().map(leak_into).collect(),
+            frame,
             encoder: noise.encoder_rms.powi(2) * t,
             windage,
             lines: SampledPlant::of_points(t, plant.integrators(), w, &p),
@@ -170,7 +173,7 @@ impl SpectralPes {
             let [a, b, c, d] = rows;
             let re = dot(a, &work.s_re) + dot(b, &work.s_im) + self.runout[k].re;
             let im = dot(c, &work.s_re) + dot(d, &work.s_im) + self.runout[k].im;
-            let noise = dot(&self.leak[k], &work.density);
+            let noise = dot(&self.frame.leak[k], &work.density);
             amplitude.push((re * re + im * im + noise).sqrt());
         }
         self.command.as_ref().map_or(0.0, |c| self.command_peak(c, chain, work))
@@ -236,15 +239,6 @@ impl SpectralPes {
         let peak = c.instants.iter().map(|t| at(*t)).fold(0.0, f64::max);
         peak + (power * 2.0 * c.samples.max(2.0).ln()).sqrt()
     }
-}
-
-/// Mean of exp(j angle i) over i = 0..n.
-fn kernel(angle: f64, n: usize) -> Complex<f64> {
-    let half = 0.5 * angle;
-    let n = n as f64;
-    let size =
-        if half.sin().abs() < 1e-12 { (n * half).cos() / half.cos() } else { (n * half).sin() / (n * half.sin()) };
-    Complex::from_polar(1.0, (n - 1.0) * half) * size
 }
 
 /// The feed-forward's response: central differences of the reference.

@@ -48,6 +48,10 @@ impl Effect for AerodynamicDrag {
         vec![Parameter::new("coefficient", setting.strengths[0], Unit::CommandSecondSquaredPerPositionSquared)]
     }
 
+    fn possible(&self, setting: &Setting) -> bool {
+        setting.strengths.first().is_some_and(|s| *s > 0.0)
+    }
+
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting { inner: vec![], strengths: vec![given.need("coefficient")?] })
     }

@@ -86,6 +86,10 @@ impl Effect for CoulombFriction {
         all
     }
 
+    fn possible(&self, setting: &Setting) -> bool {
+        setting.strengths.first().is_some_and(|s| *s > 0.0)
+    }
+
     fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let length = if given.has("sliding_length") {
             given.positive("sliding_length")?

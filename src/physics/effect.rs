@@ -267,6 +267,11 @@ pub trait Effect: Sync {
     /// The parameters as reports name them.
     fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter>;
 
+    /// Whether a machine can be so: a drag takes energy, it gives none.
+    fn possible(&self, _setting: &Setting) -> bool {
+        true
+    }
+
     /// Its part in the loop's response at `w_rad_s`, sampled as the law samples it.
     fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Cycle

@@ -138,6 +138,10 @@ impl Effect for PivotFriction {
         ]
     }
 
+    fn possible(&self, setting: &Setting) -> bool {
+        setting.strengths.first().is_some_and(|s| *s > 0.0)
+    }
+
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let inner = vec![given.positive("sliding_length")?, given.or("shape", 0.0)];
         Ok(Setting { inner, strengths: vec![given.need("level_command")?] })

@@ -23,6 +23,8 @@ static FACTS: Facts = Facts {
 };
 
 struct Rolloff {
+    /// Whether slope, quartic and sextic are there beside the curvature.
+    whole: bool,
     travel: f64,
 }
 
@@ -32,8 +34,11 @@ impl Law for Rolloff {
         let (a, c) = (from.x / self.travel, to.x / self.travel);
         let b = 0.5 * (a + c);
         let mean = |f: fn(f64) -> f64| -from.i * (f(a) + 4.0 * f(b) + f(c)) / 6.0;
-        (out[0], out[1]) = (mean(|z| z), mean(|z| z * z));
-        (out[2], out[3]) = (mean(|z| z.powi(4)), mean(|z| z.powi(6)));
+        out.fill(0.0);
+        out[1] = mean(|z| z * z);
+        if self.whole {
+            (out[0], out[2], out[3]) = (mean(|z| z), mean(|z| z.powi(4)), mean(|z| z.powi(6)));
+        }
     }
 }
 
@@ -48,12 +53,13 @@ impl Effect for TorqueFactorRolloff {
     }
 
     fn grid(&self, _scene: &Scene) -> Vec<Vec<f64>> {
-        vec![vec![]]
+        // The curvature alone first: most magnets ask for no more.
+        vec![vec![1.0], vec![4.0]]
     }
 
-    fn law(&self, _inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
         // The magnet's zones are told by the position as recorded.
-        Box::new(Rolloff { travel: scene.travel * scene.arm_over_record() })
+        Box::new(Rolloff { whole: inner[0] > 1.5, travel: scene.travel * scene.arm_over_record() })
     }
 
     fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {
@@ -82,6 +88,6 @@ impl Effect for TorqueFactorRolloff {
             given.or("quartic", 0.0) * l.powi(4),
             given.or("sextic", 0.0) * l.powi(6),
         ];
-        Ok(Setting { inner: vec![], strengths })
+        Ok(Setting { inner: vec![4.0], strengths })
     }
 }

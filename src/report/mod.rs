@@ -25,6 +25,7 @@ pub mod confusion;
 pub mod curve;
 pub mod diagnosis;
 pub mod figure;
+pub mod fleet;
 pub mod histogram;
 pub mod identified;
 pub mod limit;

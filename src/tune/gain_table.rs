@@ -231,6 +231,28 @@ impl GainTable {
         Ok(table)
     }
 
+    /// The table of a controller that was found and judged elsewhere, such as by a run over a fleet.
+    pub fn new(
+        controller: &Controller,
+        before: Option<Summary>,
+        after: Summary,
+        provenance: Provenance,
+    ) -> Result<GainTable, GainTableError> {
+        let c = controller.clone();
+        Ok(GainTable {
+            section: c.sections()?.chain,
+            sample_time_s: c.sample_time_s,
+            output_limit: c.output_limit,
+            pid: c.pid,
+            lowpass: c.lowpass,
+            notch: c.notch,
+            feedforward: c.feedforward,
+            before,
+            after,
+            provenance,
+        })
+    }
+
     /// The controller of the table.
     pub fn controller(&self) -> Controller {
         Controller {

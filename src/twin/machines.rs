@@ -37,6 +37,8 @@ pub enum TwinError {
     Sweep(#[from] FrfShapeError),
     #[error(transparent)]
     Frf(#[from] FrfError),
+    #[error("the gains of a slot cannot be written as TOML: {0}")]
+    Toml(#[from] toml::ser::Error),
 }
 
 impl MachineClass {

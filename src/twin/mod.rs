@@ -2,6 +2,7 @@
 //!
 //! In: a class or a seed. Out: plants, controllers, profiles, measured responses. Truth: `specs/machines/`, `specs/paper.md`.
 
+pub mod fleet;
 pub mod line;
 mod machines;
 pub mod plants;

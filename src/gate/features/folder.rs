@@ -54,17 +54,21 @@ pub fn read_machines(folders: &[PathBuf]) -> Vec<(RawMachine, Vec<Problem>)> {
 /// Reads one machine folder. What is missing or broken is `None` and reported; the log is optional.
 pub fn read_machine(folder: &Path) -> (RawMachine, Vec<Problem>) {
     let id = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    read_files(id, &folder.join(RESPONSE), &folder.join(PES), &folder.join(LOG))
+}
+
+/// Reads one machine from files wherever they lie, as [`read_machine`] does.
+pub fn read_files(id: String, response_file: &Path, pes_file: &Path, log_file: &Path) -> (RawMachine, Vec<Problem>) {
     let mut reasons = Vec::new();
-    let response = response(&folder.join(RESPONSE)).map_err(|r| reasons.push(r)).ok();
-    let pes = pes(&folder.join(PES)).map_err(|r| reasons.push(r)).ok();
+    let response = response(response_file).map_err(|r| reasons.push(r)).ok();
+    let pes = pes(pes_file).map_err(|r| reasons.push(r)).ok();
     if let Some(record) = &pes {
         let found = record.moving().len();
         if found < WINDOW[1] {
-            reasons.push(Reason::Short { file: folder.join(PES), found, needed: WINDOW[1] });
+            reasons.push(Reason::Short { file: pes_file.into(), found, needed: WINDOW[1] });
         }
     }
-    let log_file = folder.join(LOG);
-    let log = if log_file.exists() { read_log(&log_file, &mut reasons) } else { super::log::Log::default() };
+    let log = if log_file.exists() { read_log(log_file, &mut reasons) } else { super::log::Log::default() };
     let problems = reasons.into_iter().map(|reason| Problem { id: id.clone(), reason }).collect();
     (RawMachine { id, response, pes, log: log.entries, label: log.label }, problems)
 }

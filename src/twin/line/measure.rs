@@ -19,7 +19,7 @@ const SAMPLES: usize = 1200;
 const LONGEST_LOSS: f64 = 6.0;
 
 /// Measures a machine.
-pub(super) fn measured(id: String, truth: Truth, random: &mut Random) -> Result<LineMachine, TwinError> {
+pub(in crate::twin) fn measured(id: String, truth: Truth, random: &mut Random) -> Result<LineMachine, TwinError> {
     let frf = measure(&truth.plant, &log_grid(SWEEP.0, SWEEP.1, SWEEP.2), truth.sweep_noise, random)?;
     let sampled = DiscretePlant::of(&truth.plant, truth.controller.sample_time_s)?;
     let chain = truth.controller.sections()?.chain;

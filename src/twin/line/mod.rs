@@ -14,6 +14,8 @@ pub use files::{MachineFiles, machine_files};
 pub use truth::Truth;
 pub use unknown::UnknownKind;
 
+pub(super) use measure::measured;
+
 use super::{MachineClass, TwinError};
 use crate::gate::features::RawMachine;
 use crate::numeric::random::Random;

@@ -1,0 +1,80 @@
+//! A table of slots: CSV with a header, a row a slot.
+//!
+//! In: columns `tester`, `slot`, `response`, `pes`, and where there are any `log`, `controller`, `temperature_c`. Out: a [`FileSource`].
+//! Paths are relative to the table's folder; an empty field is absent. A Parquet table has the same columns.
+
+use super::FleetError;
+use super::source::{FileSource, SlotFiles, SlotName};
+use crate::document::read_text;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Columns that every table has.
+const NEEDED: [&str; 4] = ["tester", "slot", "response", "pes"];
+
+/// Reads a table of slots, in its own order.
+pub(super) fn read(file: &Path) -> Result<FileSource, FleetError> {
+    let parquet = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+    let (header, rows) = if parquet { parquet_rows(file)? } else { csv_rows(file)? };
+    of_rows(file, &header, rows)
+}
+
+type Rows = (Vec<String>, Vec<Vec<String>>);
+
+#[cfg(feature = "parquet")]
+fn parquet_rows(file: &Path) -> Result<Rows, FleetError> {
+    super::parquet::read_words(file)
+}
+
+#[cfg(not(feature = "parquet"))]
+fn parquet_rows(file: &Path) -> Result<Rows, FleetError> {
+    Err(FleetError::NoParquet { file: file.into() })
+}
+
+fn csv_rows(file: &Path) -> Result<Rows, FleetError> {
+    let text = read_text(file)?;
+    let fail = |source| FleetError::Csv { file: file.into(), source };
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let header = reader.headers().map_err(fail)?.iter().map(str::to_owned).collect();
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        rows.push(record.map_err(fail)?.iter().map(str::to_owned).collect());
+    }
+    Ok((header, rows))
+}
+
+fn of_rows(file: &Path, header: &[String], rows: Vec<Vec<String>>) -> Result<FileSource, FleetError> {
+    let place = |name: &str| header.iter().position(|h| h == name);
+    for column in NEEDED {
+        if place(column).is_none() {
+            return Err(FleetError::Column { file: file.into(), column, found: header.join(", ") });
+        }
+    }
+    let base = file.parent().unwrap_or(Path::new("."));
+    let mut slots = Vec::with_capacity(rows.len());
+    let mut seen: BTreeMap<String, u64> = BTreeMap::new();
+    for (i, row) in rows.iter().enumerate() {
+        let field = |name: &str| place(name).and_then(|p| row.get(p)).map(String::as_str).unwrap_or_default();
+        let path = |name: &str| base.join(if field(name).is_empty() { "-" } else { field(name) });
+        let name = SlotName { tester: field("tester").to_owned(), slot: field("slot").to_owned() };
+        // The header is line 1.
+        let line = i as u64 + 2;
+        if let Some(first) = seen.insert(name.id(), line) {
+            return Err(FleetError::TwiceSlot { file: file.into(), line, first, slot: name.id() });
+        }
+        let files = SlotFiles {
+            response: path("response"),
+            pes: path("pes"),
+            log: path("log"),
+            controller: path("controller"),
+            controller_named: !field("controller").is_empty(),
+            temperature_c: field("temperature_c").parse().ok().filter(|c: &f64| c.is_finite()),
+        };
+        slots.push((name, files));
+    }
+    if slots.is_empty() {
+        return Err(FleetError::NoSlot { folder: file.into() });
+    }
+    Ok(FileSource { slots })
+}

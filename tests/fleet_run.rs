@@ -1,0 +1,216 @@
+//! Runs of a fleet: equal bytes whoever does them and whatever interrupts them, and a store that loses nothing.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use servotune::fleet::{
+    Action, Asked, Context, Effort, Fleet, FleetError, Job, Loaded, SlotName, SlotSource, Stage, Stamp, Store,
+    TwinInput, Verdict, Watch, Worker, run, write_tables,
+};
+use servotune::study::TwinSource;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Slots of the floor in these tests: enough for several chunks, few enough for a debug build.
+const SLOTS: usize = 8;
+
+/// A folder of its own, emptied.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fleet").join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// A floor without a gate: two pilots, three cases.
+fn fleet(folder: &Path, slots: usize) -> PathBuf {
+    let specs = Path::new(env!("CARGO_MANIFEST_DIR")).join("specs");
+    let text = format!(
+        "spec = {:?}\ncontroller = {:?}\n[input]\ntwin = {{ slots = {slots}, seed = 3 }}\n[robust]\ndraws = 1\n\
+         [temperature]\ncases_c = [18.0, 30.0]\ngain_per_c = -1.2e-3\nfrequency_per_c = -2.5e-4\n\
+         [tables]\npilots = 2\ncandidates = 6\nmost = 4\n[untunable]\nexplained = 0\n",
+        specs.join("limits/floor.toml"),
+        specs.join("controllers/nominal.toml"),
+    );
+    let file = folder.join("FLEET.toml");
+    std::fs::write(&file, text).unwrap();
+    file
+}
+
+struct Quiet;
+
+impl Watch for Quiet {
+    fn step(&self, _: Stage, _: usize, _: usize) {}
+}
+
+fn stamp() -> Stamp {
+    Stamp { who: "tester".into(), at: "2026-01-01T00:00:00Z".into() }
+}
+
+/// Runs a source and gives the files' bytes by name.
+fn outcome(
+    folder: &Path,
+    context: &Context,
+    source: &dyn SlotSource,
+    effort: Effort,
+) -> Result<Vec<(String, Vec<u8>)>, FleetError> {
+    let store = folder.join("fleet.db");
+    let worker = Worker::at(&store, "test")?;
+    let job = Job { source, context, store: &store, run: Some("one"), stamp: stamp(), worker: &worker, effort };
+    let name = run(&job, &Quiet)?;
+    let files = write_tables(
+        &Store::open(&store)?,
+        &name,
+        context,
+        &folder.join("out"),
+        &Asked { gains: true, before: vec![] },
+    )?;
+    Ok(files
+        .iter()
+        .map(|f| (f.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(f).unwrap()))
+        .collect())
+}
+
+fn floor(slots: usize) -> (TwinSource, PathBuf, Context) {
+    let folder = folder(&format!("floor{slots}-{:?}", std::thread::current().id()).replace(['(', ')'], ""));
+    let context = Context::of(&Fleet::read(&fleet(&folder, slots)).unwrap()).unwrap();
+    (TwinSource::of(&TwinInput { slots, seed: 3, run: 0 }), folder, context)
+}
+
+/// A source that counts how often each slot is loaded, and breaks one.
+struct Counted<'a> {
+    inner: &'a TwinSource,
+    loads: AtomicUsize,
+    broken: Option<usize>,
+}
+
+impl SlotSource for Counted<'_> {
+    fn count(&self) -> usize {
+        self.inner.count()
+    }
+
+    fn name(&self, index: usize) -> SlotName {
+        self.inner.name(index)
+    }
+
+    fn load(&self, index: usize) -> Loaded {
+        self.loads.fetch_add(1, Ordering::Relaxed);
+        let mut loaded = self.inner.load(index);
+        if self.broken == Some(index) {
+            loaded.machine.response = None;
+            loaded.problems.push("response.bod:7: no number".into());
+        }
+        loaded
+    }
+}
+
+#[test]
+fn threads_chunks_a_full_disk_and_a_power_cut_leave_the_bytes_as_they_are() {
+    let (source, place, context) = floor(SLOTS);
+    let effort = |threads, chunk| Effort { threads, chunk, limit_pages: None };
+    let undisturbed = outcome(&folder("undisturbed"), &context, &source, effort(1, 64)).unwrap();
+    assert_eq!(outcome(&folder("threads"), &context, &source, effort(3, 3)).unwrap(), undisturbed);
+
+    // A disk that is full after so many pages: each time a few more, until the run ends.
+    let full = folder("full");
+    let mut pages = Store::open(&full.join("fleet.db")).unwrap().pages().unwrap() + 2;
+    let mut refused = 0;
+    loop {
+        let effort = Effort { threads: 2, chunk: 2, limit_pages: Some(pages) };
+        match outcome(&full, &context, &source, effort) {
+            Ok(files) => {
+                assert_eq!(files, undisturbed);
+                break;
+            }
+            Err(FleetError::Full { file, .. }) => assert_eq!(file, full.join("fleet.db")),
+            Err(other) => panic!("{other}"),
+        }
+        assert!(Store::open(&full.join("fleet.db")).unwrap().sound().unwrap());
+        refused += 1;
+        pages += 12;
+        assert!(refused < 100, "the limit rises by twelve pages a time");
+    }
+    assert!(refused >= 2, "the disk was never full");
+
+    // A power cut: what had not reached the disk is gone from the end of the log. An open connection keeps the log from being folded in.
+    let (before, after) = (folder("cut"), folder("after_the_cut"));
+    let open = Store::open(&before.join("fleet.db")).unwrap();
+    let limited = Effort { threads: 1, chunk: 1, limit_pages: Some(pages - 12) };
+    outcome(&before, &context, &source, limited).unwrap_err();
+    let log = std::fs::read(before.join("fleet.db-wal")).unwrap();
+    std::fs::copy(before.join("fleet.db"), after.join("fleet.db")).unwrap();
+    std::fs::write(after.join("fleet.db-wal"), &log[..log.len() * 2 / 3 + 17]).unwrap();
+    drop(open);
+    assert_eq!(outcome(&after, &context, &source, effort(2, 2)).unwrap(), undisturbed);
+    assert!(place.exists());
+}
+
+#[test]
+fn two_workers_share_a_store_and_a_finished_run_is_not_done_again() {
+    let (source, _place, context) = floor(6);
+    let alone =
+        outcome(&folder("alone"), &context, &source, Effort { threads: 1, chunk: 1, limit_pages: None }).unwrap();
+    let together = folder("together");
+    let counted = Counted { inner: &source, loads: AtomicUsize::new(0), broken: None };
+    let one = || outcome(&together, &context, &counted, Effort { threads: 1, chunk: 1, limit_pages: None }).unwrap();
+    let both = std::thread::scope(|s| {
+        let (a, b) = (s.spawn(one), s.spawn(one));
+        [a.join().unwrap(), b.join().unwrap()]
+    });
+    assert_eq!(both, [alone.clone(), alone.clone()]);
+    let loads = counted.loads.load(Ordering::Relaxed);
+    assert_eq!(one(), alone);
+    assert_eq!(counted.loads.load(Ordering::Relaxed), loads, "a finished run loads nothing");
+}
+
+#[test]
+fn a_bad_slot_is_a_row_and_revisions_keep_everything() {
+    let (source, _place, context) = floor(4);
+    let place = folder("bad");
+    let source = Counted { inner: &source, loads: AtomicUsize::new(0), broken: Some(2) };
+    outcome(&place, &context, &source, Effort { threads: 2, chunk: 2, limit_pages: None }).unwrap();
+    let file = place.join("fleet.db");
+    let mut store = Store::open(&file).unwrap();
+    let mut rows = Vec::new();
+    let gather = |r| {
+        rows.push(r);
+        Ok(())
+    };
+    store.each_row("one", None, gather).unwrap();
+    assert_eq!(rows.len(), 4);
+    assert_eq!((rows[2].verdict, rows[2].error.as_deref()), (Verdict::Failed, Some("response.bod:7: no number")));
+    let tuned = rows.iter().find(|r| r.verdict == Verdict::Tuned).expect("the floor has slots to be tuned");
+    let slot = tuned.id();
+    assert!(tuned.table.as_ref().unwrap().proved.passes);
+
+    // What is out of order is refused, with what was found.
+    let refused = store.revise(&slot, Action::Apply, &stamp(), "too early").unwrap_err();
+    assert!(
+        matches!(&refused, FleetError::Revision { slot: s, expected: "approved", found } if *s == slot && found.starts_with("propose"))
+    );
+    store.revise(&slot, Action::Approve, &stamp(), "looked at").unwrap();
+    let applied = store.revise(&slot, Action::Apply, &stamp(), "installed").unwrap();
+    let back = store.revise(&slot, Action::Rollback, &stamp(), "PES rose").unwrap();
+    let all = store.history(&slot).unwrap();
+    let words: Vec<&str> = all.iter().map(|r| r.action.as_str()).collect();
+    assert_eq!(words, ["found", "propose", "approve", "apply", "rollback"]);
+    assert_eq!((&back.sha256, &applied.sha256), (&all[0].sha256, &all[1].sha256));
+    assert!(all.windows(2).all(|w| w[1].previous == Some(w[0].id)));
+    assert_ne!(store.table(&back.sha256).unwrap(), store.table(&applied.sha256).unwrap());
+    assert!(matches!(store.history("T999/S01"), Err(FleetError::NoSuchSlot { slot }) if slot == "T999/S01"));
+
+    // Not even another program on the same file can change or delete a table or a revision.
+    let other = rusqlite::Connection::open(&file).unwrap();
+    for words in [
+        "UPDATE gain_tables SET gains = ''",
+        "DELETE FROM gain_tables",
+        "UPDATE revisions SET who = ''",
+        "DELETE FROM revisions",
+    ] {
+        assert!(other.execute(words, []).is_err(), "{words}");
+    }
+    // Another spec under the same name is refused; without a name it is a new run.
+    assert!(matches!(
+        store.begin(Some("one"), "other", 4, &stamp()),
+        Err(FleetError::OtherInputs { key: "settings", .. })
+    ));
+    assert_eq!(store.begin(None, "other", 4, &stamp()).unwrap().run, "run-0002");
+}
