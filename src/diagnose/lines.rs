@@ -127,18 +127,20 @@ pub fn strongest(series: &[Vec<f64>], groups: &[usize], sample_time_s: f64, spin
     })
 }
 
+/// A run and its error.
+pub type RunError = (usize, Vec<f64>);
 /// White series of noise, and the group of repeats that each belongs to.
 pub type NoiseSeries = (Vec<Vec<f64>>, Vec<usize>);
 
 /// Finds lines one after the other and takes them out of `errors` (run and its error, free motions of the body still in it);
 /// `noise` makes white noise series of them, with their groups.
 pub fn take_lines(
-    errors: &mut [(usize, Vec<f64>)],
+    errors: &mut [RunError],
     runs: &[Run],
     free: &dyn Fn(usize) -> Vec<Vec<f64>>,
     sample_time_s: f64,
     spindle_hz: Option<f64>,
-    noise: &dyn Fn(&[(usize, Vec<f64>)]) -> NoiseSeries,
+    noise: &dyn Fn(&[RunError]) -> NoiseSeries,
 ) -> Vec<Line> {
     let mut lines: Vec<Line> = Vec::new();
     while lines.len() < MOST {

@@ -33,7 +33,7 @@ const BISECTIONS: usize = 54;
 
 impl Patch {
     /// Distance of `point` from the segment.
-    fn to_segment(&self, point: Complex<f64>) -> f64 {
+    fn to_segment(self, point: Complex<f64>) -> f64 {
         let to = point - self.centre;
         let size = self.half.norm_sqr();
         let t = if size > 0.0 { ((to.re * self.half.re + to.im * self.half.im) / size).clamp(-1.0, 1.0) } else { 0.0 };
