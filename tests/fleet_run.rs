@@ -27,7 +27,7 @@ fn fleet(folder: &Path, slots: usize) -> PathBuf {
         "spec = {:?}\ncontroller = {:?}\n[input]\ntwin = {{ slots = {slots}, seed = 3 }}\n[robust]\ndraws = 1\n\
          [temperature]\ncases_c = [18.0, 30.0]\ngain_per_c = -1.2e-3\nfrequency_per_c = -2.5e-4\n\
          [tables]\npilots = 2\ncandidates = 6\nmost = 4\n[untunable]\nexplained = 0\n",
-        specs.join("limits/floor.toml"),
+        specs.join("limits/paper.toml"),
         specs.join("controllers/nominal.toml"),
     );
     let file = folder.join("FLEET.toml");
@@ -125,8 +125,8 @@ fn threads_chunks_a_full_disk_and_a_power_cut_leave_the_bytes_as_they_are() {
         }
         assert!(Store::open(&full.join("fleet.db")).unwrap().sound().unwrap());
         refused += 1;
-        pages += 12;
-        assert!(refused < 100, "the limit rises by twelve pages a time");
+        pages += 4;
+        assert!(refused < 100, "the limit rises by four pages a time");
     }
     assert!(refused >= 2, "the disk was never full");
 

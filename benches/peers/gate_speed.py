@@ -67,6 +67,7 @@ def keras_once() -> float:
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--out", type=Path, default=Path("results"))
+    arguments.add_argument("--repeats", type=int, default=REPEATS, help="runs of each (default %(default)s)")
     a = arguments.parse_args()
     words = ["cargo", "bench", "--quiet", "--bench", "gate"]
     ran = subprocess.run(words, check=True, capture_output=True, text=True)
@@ -75,14 +76,14 @@ def main() -> None:
         for flush in (False, True):
             name = f"PyTorch {torch.__version__}, {threads} thread{'s' if threads > 1 else ''}"
             name += ", denormals flushed" if flush else ""
-            found[name] = [torch_once(threads, flush) for _ in range(REPEATS)]
+            found[name] = [torch_once(threads, flush) for _ in range(a.repeats)]
     if keras is not None:
-        found[f"Keras {keras.__version__}, {keras.backend.backend()}"] = [keras_once() for _ in range(REPEATS)]
+        found[f"Keras {keras.__version__}, {keras.backend.backend()}"] = [keras_once() for _ in range(a.repeats)]
     lines = [
         "# Training time of the published network",
         "",
         f"Made by `python benches/peers/gate_speed.py`, Python {platform.python_version()}, {platform.processor() or platform.machine()}.",
-        "10-200-500-200-4, 291 rows, 200 epochs, batch 10, Adam 0.01; servotune also judges 97 validation rows each epoch, the peers do not.",
+        f"Median of {a.repeats} runs of each peer. 10-200-500-200-4, 291 rows, 200 epochs, batch 10, Adam 0.01; servotune also judges 97 validation rows each epoch, the peers do not.",
         "",
         "| what | median (s) | fastest (s) |",
         "|---|---|---|",

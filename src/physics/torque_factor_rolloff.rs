@@ -64,16 +64,21 @@ impl Effect for TorqueFactorRolloff {
 
     fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {
         let (s, l) = (&setting.strengths, scene.travel);
+        let only = [0.0, s[1], 0.0, 0.0];
+        let s: &[f64] = if setting.inner[0] > 1.5 { s } else { &only };
         let at = |x: f64| 0.5 * (drop(s, x / l) + drop(s, -x / l));
         // What a reader can picture first; the polynomial after it, from which the law is made again.
-        vec![
+        let mut all = vec![
             Parameter::new("drop_at_15", at(15.0), Unit::Ratio),
             Parameter::new("drop_at_travel", at(l), Unit::Ratio),
-            Parameter::new("slope", s[0] / l, Unit::PerPosition),
             Parameter::new("curvature", s[1] / l.powi(2), Unit::PerPositionSquared),
-            Parameter::new("quartic", s[2] / l.powi(4), Unit::Named("1/position^4")),
-            Parameter::new("sextic", s[3] / l.powi(6), Unit::Named("1/position^6")),
-        ]
+        ];
+        if setting.inner[0] > 1.5 {
+            all.push(Parameter::new("slope", s[0] / l, Unit::PerPosition));
+            all.push(Parameter::new("quartic", s[2] / l.powi(4), Unit::Named("1/position^4")));
+            all.push(Parameter::new("sextic", s[3] / l.powi(6), Unit::Named("1/position^6")));
+        }
+        all
     }
 
     fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
@@ -88,6 +93,7 @@ impl Effect for TorqueFactorRolloff {
             given.or("quartic", 0.0) * l.powi(4),
             given.or("sextic", 0.0) * l.powi(6),
         ];
-        Ok(Setting { inner: vec![4.0], strengths })
+        let terms = if ["slope", "quartic", "sextic"].iter().any(|p| given.has(p)) { 4.0 } else { 1.0 };
+        Ok(Setting { inner: vec![terms], strengths })
     }
 }

@@ -235,6 +235,10 @@ fn assumptions(i: &Inputs<'_>) -> Vec<String> {
     all
 }
 
+/// Share of a limit by which it may be missed: a search that ends on a limit stands on it, and no bound of finite width lies on
+/// the right side of a point.
+const TOUCH: f64 = 1e-4;
+
 fn limits(wanted: &[Requirement], b: &Bounds, w: Option<&WriteFigures>) -> Vec<ProvenLimit> {
     let around = |x: f64, e: f64| Bounded { low: Some(x - e), high: Some(x + e), hz: None };
     wanted
@@ -255,9 +259,13 @@ fn limits(wanted: &[Requirement], b: &Bounds, w: Option<&WriteFigures>) -> Vec<P
             let unlimited = matches!(r.what, What::PhaseMargin | What::GainMargin) && proven.low.is_none();
             let (good, bad) = match r.side {
                 Side::AtLeast => {
-                    (unlimited || proven.low.is_some_and(|x| x >= r.limit), proven.high.is_some_and(|x| x < r.limit))
+                    let least = r.limit - TOUCH * r.limit.abs();
+                    (unlimited || proven.low.is_some_and(|x| x >= least), proven.high.is_some_and(|x| x < least))
                 }
-                Side::AtMost => (proven.high.is_some_and(|x| x <= r.limit), proven.low.is_some_and(|x| x > r.limit)),
+                Side::AtMost => {
+                    let most = r.limit + TOUCH * r.limit.abs();
+                    (proven.high.is_some_and(|x| x <= most), proven.low.is_some_and(|x| x > most))
+                }
             };
             // A margin of an unstable loop is a number without a meaning.
             let stable = b.stability == Stability::Stable;
