@@ -34,7 +34,7 @@ struct Cascade {
     output: DVector<f64>,
 }
 
-/// Rounding of the recursion as a share of the travel; two algorithms were seen to agree to a thousandth of it.
+/// Rounding of the recursion as a share of the travel; an assumption, set far above the digits that a record of this length can lose.
 const ROUNDING: f64 = 1e-9;
 
 impl Cascade {
