@@ -99,7 +99,6 @@ fn record(name: &str, role: Role, group: &str, command: &[f64], position: Vec<f6
         gaps: vec![],
         reference: None,
         excitation: vec![0.0; N],
-        excited: false,
         command: command.to_vec(),
         position,
         pes: None,

@@ -53,7 +53,6 @@ fn record(role: Role, group: Option<&str>, phase: f64, seed: u64, limit: f64) ->
         gaps: Vec::new(),
         reference: None,
         excitation: vec![0.0; n],
-        excited: false,
         command,
         position,
         pes: None,

@@ -1,6 +1,7 @@
 //! Which effects the model lacks: scan, refit with each of the best, keep the best, scan again.
 
 use super::bench::Bench;
+use super::name::same_drag;
 use super::refit::{Chosen, Refitted};
 use super::scan::{Candidate, Ground, log_tail};
 use crate::physics::{Effect, Setting};
@@ -158,9 +159,7 @@ pub fn select(
             let leads = worth.first().is_none_or(|&j| step.candidates[j].effect.facts().name == name);
             let new = model.chosen.iter().all(|m| {
                 let other = m.effect.facts().name;
-                let drag = ["pivot_friction", "coulomb_friction"];
-                !(drag.contains(&name) && drag.contains(&other))
-                    && (other != name || again(name, &m.setting, &c.setting))
+                !same_drag(name, other) && (other != name || again(name, &m.setting, &c.setting))
             });
             if new
                 && c.effect.possible(&c.setting)

@@ -15,13 +15,18 @@ pub struct Columns {
 /// Shortest record that is one.
 const LEAST_ROWS: usize = 2;
 
-/// Reads the columns `wanted` of a comma-separated file with a header line; gzip is recognised by its first bytes.
-pub fn read_columns(file: &Path, wanted: &[&str]) -> Result<Columns, RecordingError> {
+/// Opens a comma-separated file with a header line; gzip is recognised by its first bytes.
+pub(super) fn open_table(file: &Path) -> Result<csv::Reader<Box<dyn Read>>, RecordingError> {
     let io = |source| RecordingError::Io { file: file.into(), source };
     let mut bytes = BufReader::new(std::fs::File::open(file).map_err(io)?);
     let packed = bytes.fill_buf().map_err(io)?.starts_with(&[0x1f, 0x8b]);
     let text: Box<dyn Read> = if packed { Box::new(MultiGzDecoder::new(bytes)) } else { Box::new(bytes) };
-    let mut rows = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
+    Ok(csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text))
+}
+
+/// Reads the columns `wanted` of a comma-separated file with a header line; gzip is recognised by its first bytes.
+pub fn read_columns(file: &Path, wanted: &[&str]) -> Result<Columns, RecordingError> {
+    let mut rows = open_table(file)?;
     let table = |source| RecordingError::Table { file: file.into(), source };
     let header = rows.headers().map_err(table)?.clone();
     let place = |name: &&str| {

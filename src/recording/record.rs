@@ -1,8 +1,7 @@
 //! One time record of a machine: reference, excitation, command, position, and what else was logged.
 
 use super::RecordingError;
-use flate2::read::MultiGzDecoder;
-use std::io::{BufRead, BufReader, Read};
+use super::columns::open_table;
 use std::path::{Path, PathBuf};
 
 /// Names of the columns in the file; the contract's names by default.
@@ -65,8 +64,6 @@ pub struct Record {
     pub reference: Option<Vec<f64>>,
     /// Excitation; zeros where the file has none.
     pub excitation: Vec<f64>,
-    /// Whether the file has an excitation.
-    pub excited: bool,
     /// Command.
     pub command: Vec<f64>,
     /// Position.
@@ -95,11 +92,7 @@ impl Record {
 
     /// Reads a record.
     pub fn read(file: &Path, settings: &RecordSettings) -> Result<Record, RecordingError> {
-        let io = |source| RecordingError::Io { file: file.into(), source };
-        let mut bytes = BufReader::new(std::fs::File::open(file).map_err(io)?);
-        let packed = bytes.fill_buf().map_err(io)?.starts_with(&[0x1f, 0x8b]);
-        let text: Box<dyn Read> = if packed { Box::new(MultiGzDecoder::new(bytes)) } else { Box::new(bytes) };
-        let mut rows = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
+        let mut rows = open_table(file)?;
         let table = |source| RecordingError::Table { file: file.into(), source };
         let header = rows.headers().map_err(table)?.clone();
         let names = &settings.names;
@@ -166,7 +159,6 @@ impl Record {
             file: file.into(),
             sample_time_s,
             gaps,
-            excited: wanted[4].1.is_some(),
             excitation: if excitation.is_empty() { vec![0.0; position.len()] } else { excitation },
             reference: (!reference.is_empty()).then_some(reference),
             pes: (!pes.is_empty()).then_some(pes),
