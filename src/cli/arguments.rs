@@ -361,6 +361,8 @@ pub(super) enum StudyName {
     FleetScale,
     /// Coverage over the number of shared tables for 1000 slots
     FleetShared,
+    /// The search for physics on records without any, for the cases in the folder --data
+    FalseAlarms,
     /// Diagnoses of the cases in the folder --data, beside their answers
     Mismatch,
     /// Real recordings: EMPS, Silverbox, motor bench, mirror, diagnosed from a linear model

@@ -66,9 +66,10 @@ pub(super) fn run(a: &DiagnoseArguments, screen: &mut Screen) -> Result<Ending, 
     let case = case(a)?;
     let plant = load::plant(&case.plant)?;
     let controller = case.controller.as_ref().map(|f| load::controller(f)).transpose()?;
-    let mut made = diagnose(&case, &plant, controller.as_ref(), &DiagnoseSettings::default(), |m| {
-        screen.say(&format!("{}: {m}", case.id))
-    })?;
+    let mut settings = DiagnoseSettings::default();
+    settings.select.bootstrap = a.bootstrap as usize;
+    let mut made =
+        diagnose(&case, &plant, controller.as_ref(), &settings, |m| screen.say(&format!("{}: {m}", case.id)))?;
     if !matches!(made.diagnosis.verdict, Verdict::NoMismatch | Verdict::DataFault) {
         let text =
             toml::to_string(&PlantFile::from(&made.corrected.plant)).map_err(|source| Failure::Toml { source })?;

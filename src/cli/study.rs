@@ -36,6 +36,7 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::Prediction => study::prediction()?,
         StudyName::Plants => study::plants()?,
         StudyName::Mirror => study::mirror(&a.data)?,
+        StudyName::FalseAlarms => study::false_alarms(&a.data)?,
         StudyName::Mismatch => study::mismatch(&a.data)?,
         StudyName::Recordings => study::recordings(&a.data)?,
         StudyName::Motor => study::motor(&a.data)?,

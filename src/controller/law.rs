@@ -73,9 +73,14 @@ impl<'a> Law<'a> {
         memory
     }
 
-    /// The command that the law gives, limit included, from a recorded error (reference less position).
+    /// The command that the law gives, limit included, from a recorded error (reference less position); its memory as the first
+    /// recorded commands ask for.
     pub fn replay(&self, reference: &[f64], error: &[f64], command: &[f64]) -> Vec<f64> {
-        let mut memory = self.memory(reference, error, command);
+        self.replay_from(self.memory(reference, error, command), reference, error)
+    }
+
+    /// The same from a given memory.
+    pub fn replay_from(&self, mut memory: Vec<[f64; 2]>, reference: &[f64], error: &[f64]) -> Vec<f64> {
         (0..error.len())
             .map(|k| {
                 let u = step_chain(&self.chain, &mut memory, error[k]) + self.ahead(reference, k);

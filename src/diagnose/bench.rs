@@ -13,6 +13,7 @@ use crate::lti::{Body, LtiError, Plant};
 use crate::numeric::least_squares::Qr;
 use crate::physics::{Entry, Port, Scene};
 use crate::recording::Role;
+use std::f64::consts::TAU;
 
 /// The ground of a diagnosis.
 #[derive(Clone, Debug)]
@@ -161,7 +162,7 @@ impl Bench {
     /// Sets up a diagnosis of `given` on these runs.
     pub fn new(given: &Plant, runs: Vec<Run>, sample_time_s: f64, spindle_hz: Option<f64>) -> Result<Bench, LtiError> {
         let form = LinearForm::new(given, sample_time_s);
-        let fit_runs: Vec<usize> = (0..runs.len()).filter(|&i| runs[i].role == Role::Fit).collect();
+        let fit_runs: Vec<usize> = (0..runs.len()).filter(|&i| runs[i].role == Role::Fit && !runs[i].bumped).collect();
         let mut stack = Stack::grouped(&runs, &fit_runs);
         let scene = scene(given, &runs, sample_time_s, spindle_hz);
         let p = vec![0.0; form.knobs.len()];
@@ -316,6 +317,25 @@ impl Bench {
         let acceleration = qr.solve(&mut e)[2] * free_scales(&body, t, n)[2];
         let gain = body_numbers(&carrier.plant.body).0 * carrier.plant.resonance_gain;
         Ok(acceleration * carrier.arm_over_record() / gain - run.before)
+    }
+
+    /// Power of the noise near a frequency (Hz) over that of noise that the filter has made white, at least 1; as repeats show it,
+    /// over three lines' widths.
+    pub fn noise_near(&self, hz: f64) -> f64 {
+        let t = self.scene.sample_time_s;
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (_, x) in &self.repeats {
+            for side in [-1.0, 0.0, 1.0] {
+                let w = TAU * (hz * t + side / x.len() as f64);
+                let (re, im) = x.iter().enumerate().fold((0.0, 0.0), |(re, im), (k, v)| {
+                    let (sin, cos) = (w * k as f64).sin_cos();
+                    (re + v * cos, im + v * sin)
+                });
+                sum += (re * re + im * im) / x.len() as f64;
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { f64::max(sum / count, 1.0) } else { 1.0 }
     }
 
     /// A fit on the stack with these effects.

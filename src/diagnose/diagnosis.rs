@@ -1,6 +1,7 @@
 //! The diagnosis of a case, step by step: logs, noise, linear refit, search, judgement on hold-out records, verdict.
 
 use super::bench::Bench;
+use super::bump::bump;
 use super::corrected::{Corrected, corrected};
 use super::finding::*;
 use super::fit_report::fit_report;
@@ -120,15 +121,17 @@ pub fn diagnose(
             bench = other;
         }
     }
+    let bumps = set_aside(&mut bench, given, sample_time_s, case.spindle_hz)?;
     // Records whose samples slipped hold nothing that a model could be fitted to.
     let selection = select::select(&mut bench, library(), &settings.select, &mut progress);
     progress("simulating all records");
-    let fixed = corrected(&bench.form, &selection.model.refitted.p, &selection.model.chosen, &bench.scene);
+    let last = selection.last();
+    let fixed = corrected(&bench.form, &last.refitted.p, &last.chosen, &bench.scene);
     let refitted = corrected(&bench.form, &selection.baseline.refitted.p, &[], &bench.scene);
     let closed = law.as_ref().filter(|_| hygiene.closed);
     let (figures, errors) = fit_report(&bench, &selection, given, &refitted, &fixed, closed);
     let sse = bench.stack.total as f64;
-    let whitened = [selection.given / sse, selection.baseline.cost / sse, selection.model.cost / sse];
+    let whitened = [selection.given / sse, selection.baseline.cost / sse, selection.best().cost / sse];
     let mut diagnosis = Diagnosis {
         schema: "servotune.diagnosis/1",
         id: case.id.clone(),
@@ -144,10 +147,38 @@ pub fn diagnose(
         holdout_whitened: held_out(&bench, &selection, &fixed)?,
         remarks,
         search: search(&selection),
+        bootstrap: selection.bootstrap.clone(),
     };
-    judge(&mut diagnosis, &bench, &selection, hygiene.finding);
+    judge(&mut diagnosis, &bench, &selection, hygiene.finding, bumps);
     super::experiment::propose(&mut diagnosis, &bench, &selection);
     Ok(Diagnosed { diagnosis, bench, selection, corrected: fixed, refitted: refitted.plant, errors })
+}
+
+/// Share of the fit records into which pushes may fall; where there are more, they are no bumps but how the machine is.
+const BUMPED: f64 = 0.25;
+
+/// Finds records into which a push from outside falls, and makes the bench again without them.
+fn set_aside(
+    bench: &mut Bench,
+    given: &Plant,
+    sample_time_s: f64,
+    spindle_hz: Option<f64>,
+) -> Result<Vec<Finding>, LtiError> {
+    let most = (BUMPED * bench.fit_runs.len() as f64).floor().max(1.0) as usize;
+    let (mut cleaner, mut found) = (bench.clone(), Vec::new());
+    while let Some(b) = bump(&cleaner) {
+        if found.len() == most {
+            return Ok(Vec::new());
+        }
+        found.push(b.finding(&cleaner.runs, &given.command_unit));
+        let mut runs = cleaner.runs.clone();
+        runs[b.run].bumped = true;
+        cleaner = Bench::new(given, runs, sample_time_s, spindle_hz)?;
+    }
+    if !found.is_empty() {
+        *bench = cleaner;
+    }
+    Ok(found)
 }
 
 /// Whitened error per sample on the records that were not used, along their recorded motion: linear refit and final model. It
@@ -184,8 +215,8 @@ fn search(selection: &Selection) -> Vec<Tried> {
 }
 
 /// From findings to a verdict.
-fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<Finding>) {
-    let (base, model) = (&selection.baseline, &selection.model);
+fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<Finding>, bumps: Vec<Finding>) {
+    let (base, model) = (&selection.baseline, selection.best());
     let explained = if base.excess() > 0.0 { 1.0 - model.excess().max(0.0) / base.excess() } else { 1.0 };
     let clean = model.cost / model.freedom < CLEAN || model.excess_sigma() < 6.0;
     // Along the recorded motion, and simulated: in closed loop limits and noise play into each other, in open loop a free body
@@ -198,7 +229,13 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
         d.verdict = if f.port == crate::physics::Port::Controller { Verdict::Named } else { Verdict::DataFault };
         d.findings.push(f);
     }
-    if !model.chosen.is_empty() {
+    // A search that finds as much where nothing is has found nothing.
+    let believed = selection.bootstrap.as_ref().is_none_or(|b| b.p_value <= BELIEVED.max(1.0 / (b.draws + 1) as f64));
+    if !believed && !model.chosen.is_empty() {
+        d.remarks.push(
+            "the bootstrap finds as much in records without physics: the findings of the search are withdrawn".into(),
+        );
+    } else if !model.chosen.is_empty() {
         let decisive = explained >= MOST && rival_share(selection) < RIVAL;
         if (explained >= NAMED_SHARE || clean || decisive) && holds {
             if !clean && explained < NAMED_SHARE {
@@ -214,7 +251,8 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
                 }
             }
             if d.findings.is_empty() && !found.is_empty() {
-                d.verdict = if found[0].family.len() > 1 { Verdict::Family } else { Verdict::Named };
+                let open = found.iter().any(|f| f.family.len() > 1);
+                d.verdict = if open { Verdict::Family } else { Verdict::Named };
             }
             // A log that slipped explains what comes after it better than any physics does.
             if d.verdict != Verdict::DataFault {
@@ -229,14 +267,18 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
         d.findings.push(super::name::unexplained(bench, selection, 0.0));
     }
     if d.verdict != Verdict::DataFault {
-        let lines = line_findings(bench, selection);
-        if d.findings.is_empty()
-            && let Some(f) = lines.first()
-        {
-            d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
+        let (lines, unsteady) = line_findings(bench, selection);
+        for f in bumps.into_iter().chain(lines) {
+            if d.findings.is_empty() {
+                d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
+            }
+            if d.verdict != Verdict::LocatedUnexplained {
+                d.findings.push(f);
+            }
         }
-        if d.verdict != Verdict::LocatedUnexplained {
-            d.findings.extend(lines);
+        if d.findings.is_empty() && !unsteady.is_empty() {
+            d.verdict = Verdict::LocatedUnexplained;
+            d.findings.push(super::line_finding::unsteady(bench, &unsteady));
         }
     }
     linear_story(d, bench, selection);
@@ -264,15 +306,18 @@ fn rival_share(selection: &Selection) -> f64 {
         return 1.0;
     };
     let name = |i: usize| step.candidates[i].effect.facts().name;
-    let gain = step.before - taken.1.cost;
+    let gain = step.before - taken.1.evidence;
     let others = step.tried.iter().filter(|t| name(t.0) != name(taken.0) && !same_drag(name(t.0), name(taken.0)));
-    others.map(|t| (step.before - t.1.cost) / gain).fold(0.0, f64::max)
+    others.map(|t| (step.before - t.1.evidence) / gain).fold(0.0, f64::max)
 }
 
 /// Share of the error in excess of noise from which a name may be given though more is left than noise, and the share of its
 /// gain that the best rival may reach then: what the library lacks is usually near to several of its laws.
 const MOST: f64 = 0.75;
 const RIVAL: f64 = 0.8;
+
+/// Chance over the whole search, by the bootstrap, up to which findings stand.
+const BELIEVED: f64 = 0.01;
 
 /// Whether a scan saw far more than noise shows, though no law explains enough of it.
 fn unaccounted(selection: &Selection) -> bool {

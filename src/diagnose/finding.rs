@@ -1,5 +1,6 @@
 //! What a diagnosis says, as `diagnosis.json` of the contract carries it.
 
+use super::bootstrap::Bootstrap;
 use super::hygiene::{Replay, SampleFault};
 use super::judge::Simulation;
 use super::whiten::NoiseLevels;
@@ -179,4 +180,7 @@ pub struct Diagnosis {
     pub remarks: Vec<String>,
     /// The search.
     pub search: Vec<Tried>,
+    /// The search on records without physics, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bootstrap: Option<Bootstrap>,
 }

@@ -37,7 +37,7 @@ pub(super) fn fit_report(
     let open = three(None);
     let chosen = if closed.is_some() { three(closed) } else { open.clone() };
     let of_role = |e: &[Vec<Vec<f64>>; 3], role: Role| -> Option<FitFigures> {
-        let which: Vec<usize> = (0..every.len()).filter(|&i| every[i].role == role).collect();
+        let which: Vec<usize> = (0..every.len()).filter(|&i| every[i].role == role && !every[i].bumped).collect();
         if which.is_empty() {
             return None;
         }

@@ -9,10 +9,10 @@ use super::linear::{Sampled, free_motions};
 use super::lines::Line;
 use super::run::Run;
 use super::select::Model;
-use super::stack::Basis;
 use super::trajectory::Trajectory;
 use crate::controller::Law;
 use crate::lti::{Body, DiscretePlant, LtiError, Plant, PlantState, step_chain};
+use crate::numeric::least_squares::{Qr, dot};
 use crate::physics::{Effect, Entry, Machine, Sample, Scene, Setting};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -85,24 +85,110 @@ impl Judged<'_> {
     }
 }
 
+/// Rounds in which the start of a record is found where laws are not straight in it.
+const ROUNDS: usize = 4;
+/// Relative fall of the error from round to round below which the start is found.
+const FOUND: f64 = 1e-3;
+
 /// Recorded less simulated position of one record; in closed loop where a law is given and the record has a reference.
 ///
 /// The machine starts at rest where the record does, the controller with the memory that the first recorded commands ask for;
-/// what is left of the start is taken out as free motions of body or loop, by least squares.
+/// what is left of the start is taken out as free motions of body or loop, by least squares. Laws beyond the linear feel the
+/// start: with them the simulation is made again with the free motions in it, until they stay (Gauss and Newton).
 pub fn error(model: &Judged, run: &Run, closed: Option<&Law>) -> Result<Vec<f64>, LtiError> {
-    let mut machine = Machine::new(model.plant, &model.effects, model.scene)?.started_at(run.origin, run.before);
-    if let Some((bench, fit)) = model.fit.filter(|_| !run.rested && !model.effects.is_empty()) {
-        machine = machine.held_by(bench.constant_torque(run, fit)?, model.gain_at_rest());
+    let rounds = if model.effects.is_empty() { 1 } else { ROUNDS };
+    Ok(started(model, run, closed, vec![0.0; run.len()], rounds)?.error)
+}
+
+/// A simulation whose start was found.
+#[derive(Clone, Debug, Default)]
+pub struct Started {
+    /// Recorded less simulated position.
+    pub error: Vec<f64>,
+    /// The free motion that the record starts with.
+    pub free: Vec<f64>,
+}
+
+/// The same from a free motion that is near the right one, in a number of rounds.
+pub fn started(
+    model: &Judged,
+    run: &Run,
+    closed: Option<&Law>,
+    mut free: Vec<f64>,
+    rounds: usize,
+) -> Result<Started, LtiError> {
+    let start = model.fit.filter(|_| !run.rested && !model.effects.is_empty());
+    let constant = start.map(|(bench, fit)| bench.constant_torque(run, fit)).transpose()?;
+    let closed = closed.filter(|_| run.reference.is_some());
+    let open = model.columns(run)?;
+    let seen: Vec<Vec<f64>> = match closed {
+        Some(law) => {
+            let plant = DiscretePlant::of(model.plant, model.scene.sample_time_s)?;
+            open.iter().map(|d| in_loop(&plant, law, d)).collect()
+        }
+        None => open.clone(),
+    };
+    // Columns start at a size near 1: one that runs away in a loop is no start.
+    let sound: Vec<usize> = (0..seen.len()).filter(|&i| seen[i].iter().all(|v| v.abs() < 1e6)).collect();
+    let mut best: Option<(f64, Started)> = None;
+    for _ in 0..rounds.max(1) {
+        let raw = simulate(model, run, closed, constant, free.clone())?;
+        if raw.iter().any(|v| !v.is_finite()) {
+            return Ok(best.map_or(Started { error: raw, free }, |b| b.1));
+        }
+        let shares = least_squares(&seen, &sound, &raw);
+        let mut left = raw;
+        for (&i, s) in sound.iter().zip(&shares) {
+            left.iter_mut().zip(&seen[i]).for_each(|(e, v)| *e -= s * v);
+            free.iter_mut().zip(&open[i]).for_each(|(f, v)| *f += s * v);
+        }
+        let size = dot(&left, &left);
+        let before = best.as_ref().map_or(f64::INFINITY, |b| b.0);
+        if size < before {
+            best = Some((size, Started { error: left, free: free.clone() }));
+        }
+        // Not below one part in a thousand of the last: found, or running away.
+        if size >= (1.0 - FOUND) * before || size.is_nan() {
+            break;
+        }
     }
+    Ok(best.map_or_else(Started::default, |b| b.1))
+}
+
+/// Shares of some of the columns in a series.
+fn least_squares(columns: &[Vec<f64>], which: &[usize], series: &[f64]) -> Vec<f64> {
+    let n = series.len();
+    if which.is_empty() || n < which.len() {
+        return Vec::new();
+    }
+    let mut qr = Qr::default();
+    qr.factor(n, which.len(), |a| {
+        a.chunks_exact_mut(n).zip(which).for_each(|(a, &i)| a.copy_from_slice(&columns[i]));
+    });
+    qr.solve(&mut series.to_vec()).into_iter().map(|s| if s.is_finite() { s } else { 0.0 }).collect()
+}
+
+/// Recorded less simulated position with a free motion of the machine.
+fn simulate(
+    model: &Judged,
+    run: &Run,
+    closed: Option<&Law>,
+    constant_torque: Option<f64>,
+    free: Vec<f64>,
+) -> Result<Vec<f64>, LtiError> {
+    let mut machine = Machine::new(model.plant, &model.effects, model.scene)?.started_at(run.origin, run.before);
+    if let Some(torque) = constant_torque {
+        machine = machine.held_by(torque, model.gain_at_rest());
+    }
+    let mut machine = machine.carried_by(free);
     let t = model.scene.sample_time_s;
     let spindle = model.scene.spindle_hz.unwrap_or(0.0) * TAU;
-    let n = run.len();
-    let mut out = Vec::with_capacity(n);
+    let mut out = Vec::with_capacity(run.len());
     let mut loops = closed.zip(run.reference.as_deref()).map(|(law, reference)| {
         let recorded: Vec<f64> = reference.iter().zip(&run.position).map(|(r, y)| r - y).collect();
         (law, reference, law.memory(reference, &recorded, &run.command))
     });
-    for k in 0..n {
+    for k in 0..run.len() {
         let angle = run.spindle_rad.as_ref().map_or(spindle * k as f64 * t, |s| s[k]);
         let y = machine.measure(angle, run.temperature.as_ref().map_or(0.0, |c| c[k]));
         out.push(run.position[k] - y);
@@ -115,12 +201,6 @@ pub fn error(model: &Judged, run: &Run, closed: Option<&Law>) -> Result<Vec<f64>
         };
         machine.command(u);
     }
-    let mut own = model.columns(run)?;
-    if let Some((law, ..)) = &loops {
-        let plant = DiscretePlant::of(model.plant, t)?;
-        own = own.iter().map(|d| in_loop(&plant, law, d)).collect();
-    }
-    take_out(own, &mut out);
     Ok(out)
 }
 
@@ -137,19 +217,6 @@ fn in_loop(plant: &DiscretePlant, law: &Law, disturbance: &[f64]) -> Vec<f64> {
             y
         })
         .collect()
-}
-
-/// Takes the least-squares share of a few columns out of a series. Columns start at a size near 1: one that runs away in a
-/// loop is no start.
-fn take_out(columns: Vec<Vec<f64>>, x: &mut [f64]) {
-    if x.iter().any(|v| !v.is_finite()) {
-        return;
-    }
-    let mut basis = Basis::default();
-    for c in columns.into_iter().filter(|c| c.iter().all(|v| v.abs() < 1e6)) {
-        basis.add_local(0, c);
-    }
-    basis.project(x);
 }
 
 /// Errors of several records; infinite where the simulation cannot run or runs away.

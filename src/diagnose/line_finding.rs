@@ -11,11 +11,9 @@ use crate::lti::FrequencyResponse;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Amplitudes of a line in every fit run under the final model (position_unit).
-fn amplitudes(bench: &Bench, selection: &Selection, line: &Line) -> Vec<f64> {
+/// Every fit run with its error under the final model.
+fn left(bench: &Bench, selection: &Selection) -> Vec<(Run, Vec<f64>)> {
     let model = &selection.model;
-    let t = bench.scene.sample_time_s;
-    let body = bench.form.given.body;
     let mut out = Vec::new();
     // One repeat of every segment at a time stands in for its mean.
     let most = bench.stack.segments.iter().map(|s| s.runs.len()).max().unwrap_or(0);
@@ -23,15 +21,60 @@ fn amplitudes(bench: &Bench, selection: &Selection, line: &Line) -> Vec<f64> {
         let runs: Vec<Run> =
             bench.stack.segments.iter().map(|s| bench.runs[s.runs[j.min(s.runs.len() - 1)]].clone()).collect();
         let errors = bench.fit(model.chosen.clone()).errors_of(&model.refitted.p, &runs);
-        for ((s, run), e) in bench.stack.segments.iter().zip(&runs).zip(&errors) {
-            if j < s.runs.len() {
-                let [a, b] = line.fit(run, &free_motions(&body, t, run.len()), t, e);
-                out.push(a.hypot(b));
-            }
-        }
+        let own = bench.stack.segments.iter().map(|s| j < s.runs.len());
+        out.extend(runs.into_iter().zip(errors).zip(own).filter(|(_, own)| *own).map(|(r, _)| r));
     }
     out
 }
+
+/// A line in every run: its cosine and sine over the whole, the first and the second half.
+struct Phasors([Vec<[f64; 2]>; 3]);
+
+impl Phasors {
+    fn of(bench: &Bench, runs: &[(Run, Vec<f64>)], line: &Line) -> Phasors {
+        let (t, body) = (bench.scene.sample_time_s, bench.form.given.body);
+        let over = |part: [usize; 2]| -> Vec<[f64; 2]> {
+            let each = runs.iter().map(|(run, e)| {
+                let [from, to] = part.map(|p| p * run.len() / 2);
+                line.fit(run, from..to, &free_motions(&body, t, to - from), t, e)
+            });
+            each.collect()
+        };
+        Phasors([over([0, 2]), over([0, 1]), over([1, 2])])
+    }
+
+    fn amplitudes(&self) -> Vec<f64> {
+        self.0[0].iter().map(|[a, b]| a.hypot(*b)).collect()
+    }
+
+    /// Whether it is a hum: as strong in every run, as strong in both halves of each, and in step over them. A narrow band of
+    /// noise changes its strength from run to run as Rayleigh's law has it (relative spread 0.52) and loses its step; what rings
+    /// after a push dies away.
+    fn steady(&self) -> bool {
+        let amplitudes = self.amplitudes();
+        let n = amplitudes.len() as f64;
+        let mean = amplitudes.iter().sum::<f64>() / n;
+        let spread = (amplitudes.iter().map(|a| (a - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt();
+        let [_, first, second] = &self.0;
+        let power = |x: &[[f64; 2]]| x.iter().map(|[a, b]| a * a + b * b).sum::<f64>();
+        let (before, after) = (power(first), power(second));
+        let (re, im) = first
+            .iter()
+            .zip(second)
+            .fold((0.0, 0.0), |(re, im), ([a, b], [c, d])| (re + a * c + b * d, im + a * d - b * c));
+        let ratio = after / before;
+        spread < UNEVEN * mean
+            && re.hypot(im) > IN_STEP * (before * after).sqrt()
+            && (1.0 / FADES..FADES).contains(&ratio)
+    }
+}
+
+/// Relative spread of a hum's strength over the runs, noise on it included.
+const UNEVEN: f64 = 0.42;
+/// Least coherence of the halves of all runs.
+const IN_STEP: f64 = 0.5;
+/// Ratio of the power in both halves within which a hum neither fades nor swells.
+const FADES: f64 = 3.0;
 
 /// Mean and its 95 % interval from the spread over runs.
 fn estimate(values: &[f64], scale: f64, unit: &str) -> Estimate {
@@ -42,8 +85,12 @@ fn estimate(values: &[f64], scale: f64, unit: &str) -> Estimate {
     Estimate { value: scale * mean, low: scale * (mean - off), high: scale * (mean + off), unit: unit.into() }
 }
 
-/// One finding for all orders of the spindle, one for each other line.
-pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> Vec<Finding> {
+/// One finding for all orders of the spindle, one for each other line; and the frequencies (Hz) of those that are none, but narrow
+/// bands of noise or something that rings.
+pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Finding>, Vec<f64>) {
+    let errors = if bench.lines.is_empty() { Vec::new() } else { left(bench, selection) };
+    let all: Vec<(&Line, Phasors)> = bench.lines.iter().map(|l| (l, Phasors::of(bench, &errors, l))).collect();
+    let (hums, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|(_, p)| p.steady());
     let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
     let given = &bench.form.given;
     let make = |effect: &str, family: &[&str], lines: &[&Line], parameters: BTreeMap<String, Estimate>| {
@@ -62,11 +109,11 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> Vec<Finding
         }
     };
     let mut out = Vec::new();
-    let mut orders: Vec<&Line> = bench.lines.iter().filter(|l| l.order.is_some()).collect();
-    orders.sort_by_key(|l| l.order);
-    if let Some(first) = orders.first() {
+    let mut orders: Vec<&(&Line, Phasors)> = hums.iter().filter(|l| l.0.order.is_some()).collect();
+    orders.sort_by_key(|l| l.0.order);
+    if let Some((first, _)) = orders.first() {
         let mut parameters = BTreeMap::from([("base_hz".to_owned(), plain(first.hz, "Hz"))]);
-        for l in &orders {
+        for (l, phasors) in &orders {
             let harmonic = l.order.unwrap_or(1) as f64 / first.order.unwrap_or(1) as f64;
             let name = if l.order == first.order {
                 "amplitude".to_owned()
@@ -75,13 +122,14 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> Vec<Finding
             } else {
                 format!("amplitude_of_order_{}", l.order.unwrap_or(0))
             };
-            parameters.insert(name, estimate(&amplitudes(bench, selection, l), 1.0, &given.position_unit));
+            parameters.insert(name, estimate(&phasors.amplitudes(), 1.0, &given.position_unit));
         }
-        out.push(make("repeatable_runout", &["repeatable_runout"], &orders, parameters));
+        let lines: Vec<&Line> = orders.iter().map(|o| o.0).collect();
+        out.push(make("repeatable_runout", &["repeatable_runout"], &lines, parameters));
     }
     let sampled = Sampled::of(&selection.model.refitted.plant, bench.scene.sample_time_s);
-    for l in bench.lines.iter().filter(|l| l.order.is_none()) {
-        let values = amplitudes(bench, selection, l);
+    for (l, phasors) in hums.iter().filter(|l| l.0.order.is_none()) {
+        let values = phasors.amplitudes();
         let mut parameters = BTreeMap::from([
             ("frequency_hz".to_owned(), plain(l.hz, "Hz")),
             ("amplitude".to_owned(), estimate(&values, 1.0, &given.position_unit)),
@@ -96,5 +144,29 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> Vec<Finding
         };
         out.push(make("line_disturbance", family, &[l], parameters));
     }
-    out
+    (out, others.iter().map(|(l, _)| l.hz).collect())
+}
+
+/// What shows at some frequencies (Hz) in every repeat differently, and is no hum.
+pub(super) fn unsteady(bench: &Bench, frequencies_hz: &[f64]) -> Finding {
+    let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
+    let (_, port) = text_of("unexplained");
+    let strongest = bench.lines.iter().filter(|l| frequencies_hz.contains(&l.hz)).map(|l| l.log_p).fold(0.0, f64::min);
+    let width = 1.0 / bench.scene.duration_s.max(bench.scene.sample_time_s);
+    let at: Vec<String> = frequencies_hz.iter().map(|f| format!("{f:.3}")).collect();
+    Finding {
+        effect: "unexplained".into(),
+        family: vec!["unexplained".into()],
+        port,
+        p_value: strongest.exp().max(1e-300),
+        says: format!(
+            "Near {} Hz something moves the arm that differs from repeat to repeat and is no steady hum: it swells, dies away or comes and goes.",
+            at.join(", ")
+        ),
+        parameters: BTreeMap::new(),
+        place: Where {
+            frequency_hz: frequencies_hz.iter().map(|f| [(f - width).max(0.0), f + width]).collect(),
+            ..everywhere(&runs)
+        },
+    }
 }

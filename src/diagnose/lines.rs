@@ -11,6 +11,7 @@ use crate::numeric::golden::golden_section;
 use crate::numeric::least_squares::dot;
 use crate::numeric::spectrum::forward;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// One line.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,13 +43,13 @@ impl Line {
         [f64::cos, f64::sin].map(|f| (0..run.len()).map(|k| f(angle(k))).collect())
     }
 
-    /// The line in `error`, fitted beside free motions of the body: its cosine and sine.
-    pub fn fit(&self, run: &Run, free: &[Vec<f64>], sample_time_s: f64, error: &[f64]) -> [f64; 2] {
+    /// The line in part of `error`, fitted beside free motions of the body over that part: its cosine and sine.
+    pub fn fit(&self, run: &Run, over: Range<usize>, free: &[Vec<f64>], sample_time_s: f64, error: &[f64]) -> [f64; 2] {
         let mut basis = Basis::default();
         free.iter().for_each(|c| basis.add_local(0, c.clone()));
-        let mut e = error.to_vec();
+        let mut e = error[over.clone()].to_vec();
         basis.project(&mut e);
-        let [mut c, mut s] = self.columns(run, sample_time_s);
+        let [mut c, mut s] = self.columns(run, sample_time_s).map(|c| c[over.clone()].to_vec());
         basis.project(&mut c);
         basis.project(&mut s);
         let (cc, cs, ss, ce, se) = (dot(&c, &c), dot(&c, &s), dot(&s, &s), dot(&c, &e), dot(&s, &e));
@@ -152,7 +153,7 @@ pub fn take_lines(
         }
         for (r, e) in errors.iter_mut() {
             let run = &runs[*r];
-            let fitted = line.fit(run, &free(run.len()), sample_time_s, e);
+            let fitted = line.fit(run, 0..run.len(), &free(run.len()), sample_time_s, e);
             for (column, a) in line.columns(run, sample_time_s).iter().zip(fitted) {
                 e.iter_mut().zip(column).for_each(|(e, c)| *e -= a * c);
             }

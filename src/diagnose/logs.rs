@@ -2,7 +2,7 @@
 
 use super::bench::scene;
 use super::finding::Finding;
-use super::hygiene::{Replay, SampleFault, replay_records, sample_faults, slip};
+use super::hygiene::{Replay, SampleFault, replay_records, sample_faults, slips};
 use super::judge::{Judged, error};
 use super::run::Run;
 use crate::controller::Law;
@@ -48,7 +48,7 @@ pub(super) fn check(
         && !r.failing.is_empty()
     {
         let failing: Vec<usize> = (0..runs.len()).filter(|&i| r.failing.contains(&runs[i].name)).collect();
-        let slips: Vec<SampleFault> = failing.iter().filter_map(|&i| slip(law, &runs[i], sample_time_s)).collect();
+        let slips: Vec<SampleFault> = failing.iter().flat_map(|&i| slips(law, &runs[i], sample_time_s)).collect();
         let named: Vec<&Run> = failing.iter().map(|&i| &runs[i]).collect();
         let helps = |e: f64| e < 0.3 * r.error;
         if !slips.is_empty() {

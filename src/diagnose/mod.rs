@@ -5,6 +5,8 @@
 //! errors have variance 1 under noise alone. Spec: `specs/mismatch.md`.
 
 mod bench;
+mod bootstrap;
+mod bump;
 mod columns;
 mod corrected;
 mod diagnosis;
@@ -24,11 +26,14 @@ mod refit;
 mod run;
 mod scan;
 mod select;
+mod settle;
+mod simulated;
 mod stack;
 mod trajectory;
 mod whiten;
 
 pub use bench::Bench;
+pub use bootstrap::Bootstrap;
 pub use corrected::Corrected;
 pub use diagnosis::{DiagnoseError, DiagnoseSettings, Diagnosed, diagnose};
 pub use finding::{

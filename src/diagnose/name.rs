@@ -20,6 +20,11 @@ const FAMILY_SHARE: f64 = 1e-3;
 /// Sliding length over the sensor's noise below which friction counts as dry.
 const DRY: f64 = 12.0;
 
+/// Share of the noise's power from which a sensor's grid is worth a word.
+const GRID: f64 = 0.1;
+/// Growth of the noise's power from rest to the highest speed that is worth a word.
+const FASTER: f64 = 0.2;
+
 /// Whether two names are the two ends of one law, told apart by the sliding length alone.
 pub(super) fn same_drag(a: &str, b: &str) -> bool {
     let drag = ["pivot_friction", "coulomb_friction"];
@@ -44,7 +49,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
     let step = &selection.steps[chosen.step];
     let (candidate, model) = &step.tried[step.taken?];
     let c = &step.candidates[*candidate];
-    let gain = step.before - model.cost;
+    let gain = step.before - model.evidence;
     let spindle =
         |hz: f64| bench.scene.spindle_hz.is_some_and(|s| ((hz / s).round() - hz / s).abs() < 0.004 && hz > 0.9 * s);
     let own = chosen.effect.facts().name;
@@ -111,7 +116,7 @@ fn effect_signal(bench: &Bench, selection: &Selection, at: usize) -> Vec<f64> {
 /// Parameters of the chosen effect `at` with 95 % intervals: each free number moved by its standard error, the changes of
 /// each parameter added as squares; widened where the model leaves more than noise.
 fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String, Estimate> {
-    let model = &selection.model;
+    let model = selection.last();
     let scene = &bench.scene;
     let chosen = &model.chosen[at];
     let effect = chosen.effect;
@@ -187,8 +192,8 @@ pub(super) fn noise_story(bench: &Bench) -> Option<Finding> {
     let steps: Vec<f64> = whole.iter().filter_map(|r| super::hygiene::quantum(&r.position)).collect();
     if steps.len() == whole.len() && !steps.is_empty() {
         let q = steps.iter().copied().fold(f64::INFINITY, f64::min);
-        // Rounding to a grid makes noise of step/√12; below a quarter of the noise's power it is nobody's concern.
-        if q * q / 12.0 > 0.25 * bench.levels.sensor_rms.powi(2) {
+        // Rounding to a grid makes noise of step/√12.
+        if q * q / 12.0 > GRID * bench.levels.sensor_rms.powi(2) {
             return Some(statistic("quantisation", ("step", plain(q, command)), 1e-300, &whole));
         }
     }
@@ -214,8 +219,8 @@ pub(super) fn noise_story(bench: &Bench) -> Option<Finding> {
     let left = (syy - sy * sy / n - slope * (sxy - sx * sy / n)) / n;
     let sigma = (left / spread).sqrt();
     let floor = (sy - slope * sx) / n;
-    // Seven standard errors, and at the highest speed half as much again as at rest.
-    if !(slope > 7.0 * sigma && slope > 0.5 * floor) {
+    // Seven standard errors, and at the highest speed clearly more than at rest.
+    if !(slope > 7.0 * sigma && slope > FASTER * floor) {
         return None;
     }
     let seconds = (slope * bench.levels.sensor_rms.powi(2)).sqrt() / bench.scene.speed;

@@ -1,9 +1,12 @@
 //! Which effects the model lacks: scan, refit with each of the best, keep the best, scan again.
 
 use super::bench::Bench;
+use super::bootstrap::{Bootstrap, bootstrap};
 use super::name::same_drag;
 use super::refit::{Chosen, Refitted};
 use super::scan::{Candidate, Ground, log_tail};
+use super::settle::{exchange, prune, spare};
+use super::simulated::simulated;
 use crate::physics::{Effect, Setting};
 use rayon::prelude::*;
 
@@ -20,11 +23,13 @@ pub struct SelectSettings {
     pub share: f64,
     /// Iterations of each refit.
     pub iterations: usize,
+    /// Draws of the parametric bootstrap; 0 for none.
+    pub bootstrap: usize,
 }
 
 impl Default for SelectSettings {
     fn default() -> SelectSettings {
-        SelectSettings { most: 4, refits: 5, false_alarm: 1e-4, share: 0.35, iterations: 8 }
+        SelectSettings { most: 4, refits: 5, false_alarm: 1e-4, share: 0.35, iterations: 8, bootstrap: 0 }
     }
 }
 
@@ -37,13 +42,40 @@ pub struct Model {
     pub refitted: Refitted,
     /// Sum of squares of the whitened error.
     pub cost: f64,
+    /// Minus twice the logarithm of the likelihood, up to a constant: `cost` where the noise is known from repeats; where it is
+    /// not, a model that leaves less is one under less noise, and the noise's own level counts.
+    pub evidence: f64,
     /// Samples less directions used up.
     pub freedom: f64,
     /// Standard deviation of the cost under noise alone, the noise's own level being an estimate from so many repeats.
     pub sigma: f64,
 }
 
+impl Selection {
+    /// The model that leaves less, along the recorded motion or simulated.
+    pub fn best(&self) -> &Model {
+        if self.last().cost < self.model.cost { self.last() } else { &self.model }
+    }
+
+    /// The model that numbers are taken from.
+    pub fn last(&self) -> &Model {
+        self.simulated.as_ref().unwrap_or(&self.model)
+    }
+}
+
 impl Model {
+    /// Whether a machine can be so in every one of its effects.
+    pub(super) fn possible(&self) -> bool {
+        let knobs = self.refitted.p.len();
+        let mut from = knobs;
+        self.chosen.iter().all(|c| {
+            let count = if c.effect.facts().fixed { 0 } else { c.setting.strengths.len() };
+            let errors = self.refitted.spread.get(from..from + count).unwrap_or(&[]);
+            from += count;
+            c.effect.possible(&c.setting, errors)
+        })
+    }
+
     /// The error in excess of the noise, in units of the noise's variance.
     pub fn excess(&self) -> f64 {
         self.cost - self.freedom
@@ -79,22 +111,37 @@ pub struct Selection {
     pub steps: Vec<Step>,
     /// Where the search ended.
     pub model: Model,
+    /// The same fitted once more by simulation, where that holds: what numbers and corrected plant are taken from.
+    pub simulated: Option<Model>,
     /// For each effect of the model, others in its place and the sum of squares that they leave.
     pub rivals: Vec<Vec<(&'static str, f64)>>,
+    /// The search on records without physics, where it was asked for.
+    pub bootstrap: Option<Bootstrap>,
 }
 
 /// Share of what is explained already that a second, third and fourth effect must add: no law is nearer to a machine than
 /// the first, and machines with many defects are rare.
-const MINOR: [f64; 4] = [0.0, 5e-3, 2e-2, 4e-2];
+pub(super) const MINOR: [f64; 4] = [0.0, 5e-3, 2e-2, 4e-2];
 
+/// The drags. What one of them does while the arm stands still, no motion tells: beside it an effect that adds less than this share
+/// must explain this much of what is left.
+pub(super) const DRAGS: [&str; 2] = ["pivot_friction", "coulomb_friction"];
+const BESIDE_DRAG: f64 = 0.08;
+const REST: f64 = 0.75;
+/// Gain of a scan from which a law is tried where no repeat tells what noise is: noise made from the error itself hides most of what
+/// is left.
+const LOOK: f64 = 8.0;
+
+/// Share of a law that the linear parameters can imitate above which these records say nothing of it.
+const CONCEALED: f64 = 0.9995;
 /// Most rounds of refit and noise where no repeat tells what noise is.
 const SETTLING: usize = 8;
 /// Change of the linear parameters, relative or in samples, below which they have settled.
 const SETTLED: f64 = 1e-3;
 /// Share of its gain by which an effect of each record's own must beat one of the machine.
-const OWN: f64 = 0.05;
+pub(super) const OWN: f64 = 0.05;
 
-fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64], iterations: usize) -> Model {
+pub(super) fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64], iterations: usize) -> Model {
     let mut fit = bench.fit(chosen);
     let refitted = fit.refit(p, iterations);
     let chosen = fit.chosen;
@@ -102,11 +149,20 @@ fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64], iterations: usize) -> M
     let freedom = bench.stack.total as f64 - used as f64;
     let known = bench.repeats.iter().map(|r| r.1.len()).sum::<usize>() as f64 - bench.stack.total as f64;
     let level = if bench.repeats.is_empty() { 0.0 } else { freedom * freedom / known.max(1.0) };
-    Model { cost: refitted.cost, freedom, sigma: (2.0 * (freedom + level)).sqrt(), chosen, refitted }
+    let noise = if bench.levels.from_repeats { 0.0 } else { bench.whitener.evidence(bench.stack.total) };
+    let evidence = refitted.cost + noise;
+    Model { cost: refitted.cost, evidence, freedom, sigma: (2.0 * (freedom + level)).sqrt(), chosen, refitted }
+}
+
+/// A model with the noise that it leaves, where no repeat tells what noise is.
+fn settled(bench: &Bench, model: Model, iterations: usize) -> Model {
+    let mut own = bench.clone();
+    own.renew(&model.refitted.p, &model.chosen);
+    fitted(&own, model.chosen, &model.refitted.p, iterations)
 }
 
 /// The better of a fit from where the search stands and one from the given plant.
-fn fitted_from_both(bench: &Bench, chosen: &[Chosen], p: &[f64], iterations: usize) -> Model {
+pub(super) fn fitted_from_both(bench: &Bench, chosen: &[Chosen], p: &[f64], iterations: usize) -> Model {
     let here = fitted(bench, chosen.to_vec(), p, iterations);
     if here.excess_sigma() < 5.0 || p.iter().all(|v| *v == 0.0) {
         return here;
@@ -145,6 +201,11 @@ pub fn select(
     let mut given = bench.fit(vec![]).cost(&zero);
     progress("refit of the linear parameters");
     let mut baseline = refit(bench, settings.iterations);
+    let calibration = (settings.bootstrap > 0).then(|| {
+        progress("bootstrap: the search on records without physics");
+        let (n, done) = (settings.bootstrap, |_| {});
+        bootstrap(bench, library, &baseline, settings.iterations, settings.false_alarm, n, &done)
+    });
     let mut model = baseline.clone();
     let mut steps = Vec::new();
     let limit = settings.false_alarm.ln();
@@ -162,9 +223,10 @@ pub fn select(
                 !same_drag(name, other) && (other != name || again(name, &m.setting, &c.setting))
             });
             if new
-                && c.effect.possible(&c.setting)
-                && c.log_p_value(library.len()) < limit
-                && c.concealed < 0.9995
+                && c.effect.possible(&c.setting, &[])
+                && (c.log_p_value(library.len()) < limit && hums(bench, c, c.gain, library.len()) < limit
+                    || (!bench.levels.from_repeats && c.gain > LOOK))
+                && c.concealed < CONCEALED
                 && seen < 1 + usize::from(leads)
                 && worth.len() < settings.refits
             {
@@ -182,8 +244,11 @@ pub fn select(
                 range: c.range.clone(),
                 step: steps.len(),
             });
-            let tried = fitted_from_both(bench, &chosen, &model.refitted.p, settings.iterations);
-            if tried.chosen.iter().all(|c| c.effect.possible(&c.setting)) {
+            let mut tried = fitted_from_both(bench, &chosen, &model.refitted.p, settings.iterations);
+            if !bench.levels.from_repeats {
+                tried = settled(bench, tried, settings.iterations);
+            }
+            if tried.possible() {
                 step.tried.push((i, tried));
             }
         }
@@ -192,18 +257,21 @@ pub fn select(
         // Repeats take part with their mean: what differs from record to record by its nature is no first thought.
         let paid = |t: &(usize, Model)| {
             let c = &step.candidates[t.0];
-            let own = if c.effect.facts().per_record { OWN * (model.cost - t.1.cost).max(0.0) } else { 0.0 };
-            t.1.cost + price * numbers(c) + own
+            let own = if c.effect.facts().per_record { OWN * (model.evidence - t.1.evidence).max(0.0) } else { 0.0 };
+            t.1.evidence + price * numbers(c) + own
         };
         step.taken = (0..step.tried.len()).min_by(|&a, &b| paid(&step.tried[a]).total_cmp(&paid(&step.tried[b])));
         let accepted = step.taken.and_then(|t| {
             let (i, next) = &step.tried[t];
             let c = &step.candidates[*i];
-            let gain = model.cost - next.cost;
+            let gain = model.evidence - next.evidence;
             let log_p =
                 log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library.len() as f64).ln();
-            let explained = (baseline.cost - model.cost).max(0.0);
-            let asked = settings.share * (model.excess() - 2.0 * model.sigma).max(0.0);
+            let log_p = log_p.max(hums(bench, c, gain, library.len()));
+            let explained = (baseline.evidence - model.evidence).max(0.0);
+            let dragged = model.chosen.iter().any(|c| DRAGS.contains(&c.effect.facts().name));
+            let share = if dragged && gain < BESIDE_DRAG * explained { REST } else { settings.share };
+            let asked = share * (model.excess() - 2.0 * model.sigma).max(0.0);
             let minor = MINOR.get(model.chosen.len()).copied().unwrap_or(0.0) * explained;
             (log_p < limit && gain > asked && gain > minor).then(|| next.clone())
         });
@@ -224,7 +292,7 @@ pub fn select(
     }
     prune(bench, &mut model, baseline.cost, settings.iterations);
     progress("rivals of the findings");
-    let rivals = exchange(bench, &mut model, &steps, settings.iterations);
+    let mut rivals = exchange(bench, &mut model, &steps, settings.iterations);
     if !bench.levels.from_repeats && !model.chosen.is_empty() {
         // By the noise that the best model leaves, what the others left too.
         given = bench.fit(vec![]).cost(&zero);
@@ -233,67 +301,12 @@ pub fn select(
     if baseline.cost > given {
         baseline.cost = given;
     }
-    Selection { given, baseline, steps, model, rivals }
-}
-
-/// Takes effects out again that later ones made needless.
-fn prune(bench: &Bench, model: &mut Model, before: f64, iterations: usize) {
-    let price = (bench.stack.total as f64).ln();
-    while model.chosen.len() > 1 {
-        let without = |i: usize| {
-            let mut chosen = model.chosen.clone();
-            chosen.remove(i);
-            fitted(bench, chosen, &model.refitted.p, iterations)
-        };
-        let all: Vec<Model> = (0..model.chosen.len()).map(without).collect();
-        let Some((i, best)) = all.into_iter().enumerate().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost)) else { return };
-        let c = &model.chosen[i];
-        let numbers = (c.setting.strengths.len() + c.setting.inner.len()) as f64;
-        if best.cost - model.cost > (price * numbers).max(MINOR[1] * (before - best.cost)) {
-            return;
-        }
-        *model = best;
+    progress("fit by simulation");
+    let mut simulated = simulated(bench, &model);
+    if let Some(s) = &mut simulated {
+        spare(bench, &mut model, s, &mut rivals, &steps, baseline.cost, settings.iterations);
     }
-}
-
-/// Share of the gain of an effect from which a rival of its step is tried in its place.
-const NEAR: f64 = 0.8;
-/// Fall of the sum of squares for which an effect is exchanged.
-const BETTER: f64 = 10.0;
-
-/// Tries the rivals of each effect in its place, everything else refitted, and takes them where they fit better now.
-fn exchange(bench: &Bench, model: &mut Model, steps: &[Step], iterations: usize) -> Vec<Vec<(&'static str, f64)>> {
-    let mut all = Vec::new();
-    for at in 0..model.chosen.len() {
-        let step = &steps[model.chosen[at].step];
-        let Some(taken) = step.taken.map(|t| &step.tried[t]) else {
-            all.push(Vec::new());
-            continue;
-        };
-        let gain = step.before - taken.1.cost;
-        let mut found: Vec<(&'static str, f64)> = Vec::new();
-        for (i, tried) in &step.tried {
-            let c = &step.candidates[*i];
-            let (name, own) = (c.effect.facts().name, model.chosen[at].effect.facts().name);
-            let elsewhere = model.chosen.iter().any(|m| m.effect.facts().name == name);
-            if name == own || elsewhere || step.before - tried.cost < NEAR * gain {
-                continue;
-            }
-            let Some(last) = tried.chosen.last() else { continue };
-            let mut chosen = model.chosen.clone();
-            chosen[at] = Chosen { step: model.chosen[at].step, ..last.clone() };
-            let other = fitted_from_both(bench, &chosen, &model.refitted.p, iterations);
-            let dearer = if c.effect.facts().per_record { OWN * gain } else { 0.0 };
-            if other.cost + BETTER + dearer < model.cost {
-                found.push((own, model.cost));
-                *model = other;
-            } else {
-                found.push((name, other.cost));
-            }
-        }
-        all.push(found);
-    }
-    all
+    Selection { given, baseline, steps, model, simulated, rivals, bootstrap: calibration }
 }
 
 /// Free numbers of a candidate.
@@ -302,10 +315,27 @@ fn numbers(c: &Candidate) -> f64 {
     (strengths + c.setting.inner.iter().filter(|v| **v != 0.0).count()) as f64
 }
 
+/// Logarithm of the chance of a hum's gain where the noise itself is stronger near its frequency, a narrow band of it being no hum;
+/// -infinity for all other effects.
+fn hums(bench: &Bench, c: &Candidate, gain: f64, effects: usize) -> f64 {
+    if c.effect.facts().name != "line_disturbance" {
+        return f64::NEG_INFINITY;
+    }
+    let fair = Candidate { gain: gain / bench.noise_near(c.setting.inner[0]), ..c.clone() };
+    fair.log_p_value(effects)
+}
+
 /// Whether a second one of the same effect can be another thing: another line, another mode, another grating.
 fn again(name: &str, a: &Setting, b: &Setting) -> bool {
     let many = ["repeatable_runout", "line_disturbance", "unmodelled_resonance", "shock"];
     many.contains(&name) && (a.inner[0] - b.inner[0]).abs() > 0.02 * a.inner[0].abs()
+}
+
+/// Logarithm of the closed-form bound of the strongest candidate beside a model.
+pub(super) fn strongest(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> f64 {
+    let step = scan(bench, library, model);
+    let possible = step.candidates.iter().filter(|c| c.effect.possible(&c.setting, &[]) && c.concealed < CONCEALED);
+    possible.map(|c| c.log_p_value(library.len())).fold(0.0, f64::min)
 }
 
 fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
@@ -317,7 +347,7 @@ fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
         candidates.extend(scan_at(bench, &fixed, model, &vec![0.0; model.refitted.p.len()]));
     }
     candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    Step { before: model.cost, candidates, tried: Vec::new(), taken: None }
+    Step { before: model.evidence, candidates, tried: Vec::new(), taken: None }
 }
 
 /// Standard deviations of excess above which a linear refit is taken to hide something.

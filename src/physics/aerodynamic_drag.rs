@@ -48,7 +48,7 @@ impl Effect for AerodynamicDrag {
         vec![Parameter::new("coefficient", setting.strengths[0], Unit::CommandSecondSquaredPerPositionSquared)]
     }
 
-    fn possible(&self, setting: &Setting) -> bool {
+    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         setting.strengths.first().is_some_and(|s| *s > 0.0)
     }
 

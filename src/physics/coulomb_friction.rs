@@ -86,7 +86,7 @@ impl Effect for CoulombFriction {
         all
     }
 
-    fn possible(&self, setting: &Setting) -> bool {
+    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         setting.strengths.first().is_some_and(|s| *s > 0.0)
     }
 

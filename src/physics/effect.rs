@@ -267,8 +267,9 @@ pub trait Effect: Sync {
     /// The parameters as reports name them.
     fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter>;
 
-    /// Whether a machine can be so: a drag takes energy, it gives none.
-    fn possible(&self, _setting: &Setting) -> bool {
+    /// Whether a machine can be so: a drag takes energy, it gives none. `errors` are the standard errors of the strengths, empty
+    /// where they are not known yet.
+    fn possible(&self, _setting: &Setting, _errors: &[f64]) -> bool {
         true
     }
 

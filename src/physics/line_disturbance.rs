@@ -24,6 +24,8 @@ static FACTS: Facts = Facts {
     band_hz: [10.0, 1000.0],
 };
 
+/// Relative spread of a hum's strength from record to record that is nothing unusual.
+const UNEVEN: f64 = 0.15;
 /// Most points of the scan; a record longer than some 1.5 s is scanned up to a lower frequency.
 const POINTS: usize = 3000;
 
@@ -73,6 +75,22 @@ impl Effect for LineDisturbance {
             Parameter::new("amplitude_command", a.hypot(b), Unit::Command),
             Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
         ]
+    }
+
+    /// A hum does not heed what the machine does: it is as strong in every record. What excites itself from record to record is
+    /// another thing.
+    fn possible(&self, setting: &Setting, errors: &[f64]) -> bool {
+        let amplitudes: Vec<f64> = setting.strengths.chunks_exact(2).map(|s| s[0].hypot(s[1])).collect();
+        if amplitudes.len() < 2 || errors.len() != setting.strengths.len() {
+            return true;
+        }
+        let mean = amplitudes.iter().sum::<f64>() / amplitudes.len() as f64;
+        let excess =
+            |(a, e): (&f64, &[f64])| (a - mean).powi(2) / (0.5 * (e[0] * e[0] + e[1] * e[1]) + (UNEVEN * mean).powi(2));
+        let chi: f64 = amplitudes.iter().zip(errors.chunks_exact(2)).map(excess).sum();
+        // Three standard deviations of chi-square.
+        let free = amplitudes.len() as f64 - 1.0;
+        chi < free + 3.0 * (2.0 * free).sqrt()
     }
 
     fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {

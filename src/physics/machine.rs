@@ -50,6 +50,8 @@ pub struct Machine {
     origin: f64,
     /// Command behind the amplifier and torque under which it stood at `origin`: only what differs from them moves it.
     standing: [f64; 2],
+    /// A motion that neither command nor law makes (a start in full swing, a hum), a value per sample; 0 behind its end.
+    free: Vec<f64>,
     /// The arm's own position over the recorded one.
     arm: f64,
 }
@@ -81,6 +83,22 @@ impl Machine {
         self.standing = [spring - torque, 0.0];
         self.w = 0.0;
         self
+    }
+
+    /// The same machine with a motion that neither command nor law makes: the answer to a start in full swing or to a hum
+    /// (position_unit, a value per sample). The laws feel it.
+    pub fn carried_by(mut self, free: Vec<f64>) -> Machine {
+        if let [first, second, ..] = free[..] {
+            // The positions before the first sample, for the speed there.
+            self.x = [0.0, 1.0, 2.0].map(|k| self.x[0] + first + k * (first - second));
+        }
+        self.free = free;
+        self
+    }
+
+    /// The free motion at a sample.
+    fn free(&self, k: usize) -> f64 {
+        self.free.get(k).copied().unwrap_or(0.0)
     }
 
     /// A machine with these effects; `scene` says what the laws need to know of it.
@@ -126,6 +144,7 @@ impl Machine {
             k: 0,
             origin: 0.0,
             standing: [0.0; 2],
+            free: Vec::new(),
             arm: scene.arm_over_record(),
         })
     }
@@ -133,7 +152,7 @@ impl Machine {
     /// The position as the sensor gives it at this sample, without noise (position_unit).
     pub fn measure(&mut self, spindle_rad: f64, temperature: f64) -> f64 {
         let t = self.delayed.sample_time_s();
-        let x = self.origin + self.pushed.position() + self.torqued.position();
+        let x = self.origin + self.pushed.position() + self.torqued.position() + self.free(self.k);
         self.x = [x, self.x[0], self.x[1]];
         // Second-order backward difference.
         let v = (3.0 * self.x[0] - 4.0 * self.x[1] + self.x[2]) / (2.0 * t);
@@ -189,7 +208,7 @@ impl Machine {
         self.held[1].clone_from(&self.torqued);
         self.torqued.advance(&self.direct);
         if !self.torque.is_empty() {
-            let to = self.ahead(self.origin + self.pushed.position() + self.torqued.position());
+            let to = self.ahead(self.origin + self.pushed.position() + self.torqued.position() + self.free(self.k + 1));
             let (from, to) = (self.now.scaled(self.arm), to.scaled(self.arm));
             for part in &mut self.torque {
                 part.law.commit(&from, &to);
@@ -209,7 +228,7 @@ impl Machine {
         self.trial.clone_from(&self.torqued);
         self.trial.command(-self.standing[1]);
         self.trial.advance(&self.direct);
-        let free = self.origin + self.pushed.position() + self.trial.position();
+        let free = self.origin + self.pushed.position() + self.trial.position() + self.free(self.k + 1);
         let from = self.now.scaled(self.arm);
         let law = |w: f64| {
             let to = self.ahead(free + self.reach * w).scaled(self.arm);

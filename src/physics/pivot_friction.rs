@@ -138,7 +138,7 @@ impl Effect for PivotFriction {
         ]
     }
 
-    fn possible(&self, setting: &Setting) -> bool {
+    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         setting.strengths.first().is_some_and(|s| *s > 0.0)
     }
 

@@ -42,6 +42,9 @@ impl Law for Rolloff {
     }
 }
 
+/// Share of the whole fall by which the torque factor may seem to rise over an eighth of the way: noise, not shape.
+const RISE: f64 = 0.05;
+
 /// Fall of the torque factor at a position, over its value at 0.
 fn drop(strengths: &[f64], z: f64) -> f64 {
     strengths[0] * z + strengths[1] * z * z + strengths[2] * z.powi(4) + strengths[3] * z.powi(6)
@@ -60,6 +63,14 @@ impl Effect for TorqueFactorRolloff {
     fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
         // The magnet's zones are told by the position as recorded.
         Box::new(Rolloff { whole: inner[0] > 1.5, travel: scene.travel * scene.arm_over_record() })
+    }
+
+    /// A magnet's field falls towards its ends and does not rise again on the way.
+    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
+        let s = &setting.strengths;
+        let even = |z: f64| if setting.inner[0] > 1.5 { 0.5 * (drop(s, z) + drop(s, -z)) } else { s[1] * z * z };
+        let whole = even(1.0);
+        whole > 0.0 && (1..=8).all(|i| even(f64::from(i) / 8.0) - even(f64::from(i - 1) / 8.0) > -RISE * whole)
     }
 
     fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {

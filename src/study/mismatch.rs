@@ -57,8 +57,8 @@ fn agrees(d: &Diagnosis, answer: &[String]) -> bool {
     }
 }
 
-/// Diagnoses every case of a folder.
-pub fn mismatch(folder: &Path) -> Result<Study, StudyError> {
+/// The folders of a folder that hold a case, in the order of their names.
+pub(super) fn case_folders(folder: &Path) -> Result<Vec<PathBuf>, StudyError> {
     let mut cases: Vec<PathBuf> = std::fs::read_dir(folder)
         .map_err(|_| StudyError::Absent { file: folder.into() })?
         .filter_map(|e| e.ok().map(|e| e.path()))
@@ -68,14 +68,23 @@ pub fn mismatch(folder: &Path) -> Result<Study, StudyError> {
     if cases.is_empty() {
         return Err(StudyError::Absent { file: folder.join("CASE/case.toml") });
     }
-    let mut made = Vec::new();
-    for path in &cases {
-        let case = Case::read(path, &RecordSettings::default())?;
-        let file: PlantFile = read_toml(&case.plant)?;
-        let plant = Plant::try_from(file)?;
-        let controller: Option<Controller> = case.controller.as_ref().map(|f| read_toml(f)).transpose()?;
-        made.push(diagnose(&case, &plant, controller.as_ref(), &DiagnoseSettings::default(), |_| {})?.diagnosis);
-    }
+    Ok(cases)
+}
+
+/// Diagnoses the case in a folder.
+pub(super) fn diagnosed(path: &Path, settings: &DiagnoseSettings) -> Result<Diagnosis, StudyError> {
+    let case = Case::read(path, &RecordSettings::default())?;
+    let file: PlantFile = read_toml(&case.plant)?;
+    let plant = Plant::try_from(file)?;
+    let controller: Option<Controller> = case.controller.as_ref().map(|f| read_toml(f)).transpose()?;
+    Ok(diagnose(&case, &plant, controller.as_ref(), settings, |_| {})?.diagnosis)
+}
+
+/// Diagnoses every case of a folder.
+pub fn mismatch(folder: &Path) -> Result<Study, StudyError> {
+    let settings = DiagnoseSettings::default();
+    let cases = case_folders(folder)?;
+    let made = cases.iter().map(|path| diagnosed(path, &settings)).collect::<Result<Vec<Diagnosis>, StudyError>>()?;
     let rows = made.iter().map(|d| row(d, folder)).collect::<Result<Vec<Row>, StudyError>>()?;
     let mut study = Study::default();
     study.page("mismatch/cases.md", page(&rows));

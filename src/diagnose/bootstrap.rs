@@ -1,0 +1,69 @@
+//! How often the search finds something where nothing is: the whole first search on records made from the linear refit and its noise.
+//!
+//! In: the bench as it stood before the search, and the linear refit. Each draw simulates every mean record from the refit, adds
+//! coloured noise of the measured levels, refits the linear parameters, smooths the motion anew and scans the whole library. The
+//! statistic is the smallest chance of any candidate, as the search weighs it (parametric bootstrap of a maximum; Davison &
+//! Hinkley 1997, ch. 4). Spec: `specs/mismatch.md`.
+
+use super::bench::Bench;
+use super::select::{Model, refit, strongest};
+use crate::numeric::random::Random;
+use crate::physics::Effect;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// What draws without any physics beyond the linear gave.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Bootstrap {
+    /// Draws.
+    pub draws: usize,
+    /// Logarithm of the closed-form bound of the strongest candidate on the records themselves.
+    pub observed_log_p: f64,
+    /// The same of each draw, smallest first.
+    pub null_log_p: Vec<f64>,
+    /// Chance of a candidate as strong as the observed one under noise alone: (1 + draws as strong) / (1 + draws).
+    pub p_value: f64,
+    /// Draws in which the search would have gone on to a finding, by the closed-form bound.
+    pub alarms: usize,
+}
+
+/// Seed of the draws; draw `i` is stream `i`.
+const SEED: u64 = 0x5ca1_ab1e;
+
+/// Runs the search on `draws` records without physics; `limit` is the chance below which a candidate counts as seen.
+pub(super) fn bootstrap(
+    bench: &Bench,
+    library: &[&'static dyn Effect],
+    baseline: &Model,
+    iterations: usize,
+    limit: f64,
+    draws: usize,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Bootstrap {
+    let observed_log_p = strongest(bench, library, baseline);
+    let errors = bench.fit(vec![]).errors(&baseline.refitted.p);
+    let one = |draw: usize| {
+        let mut random = Random::stream(SEED, draw as u64);
+        let mut null = bench.clone();
+        for ((mean, error), segment) in null.means.iter_mut().zip(&errors).zip(&bench.stack.segments) {
+            let mut noise: Vec<f64> = (0..error.len()).map(|_| random.normal() / segment.weight).collect();
+            bench.whitener.colour(&mut noise);
+            mean.position.iter_mut().zip(error).zip(&noise).for_each(|((y, e), n)| *y += n - e);
+        }
+        null.correct(&vec![0.0; bench.form.knobs.len()], &[]);
+        let model = refit(&mut null, iterations);
+        let log_p = strongest(&null, library, &model);
+        progress(draw);
+        log_p
+    };
+    let mut null_log_p: Vec<f64> = (0..draws).into_par_iter().map(one).collect();
+    null_log_p.sort_by(f64::total_cmp);
+    let count = |below: f64| null_log_p.iter().filter(|p| **p <= below).count();
+    Bootstrap {
+        draws,
+        observed_log_p,
+        p_value: (1 + count(observed_log_p)) as f64 / (1 + draws) as f64,
+        alarms: count(limit.ln()),
+        null_log_p,
+    }
+}

@@ -1,0 +1,195 @@
+//! A push from outside that falls into one repeat of several: somebody bumps the machine while it records.
+//!
+//! In: what repeats differ by, whitened. Out: the record, the time and the strength of the push. The mean over repeats would carry
+//! it into every fit and their spread would count it as noise, so such a record is kept out of both.
+
+use super::bench::Bench;
+use super::columns::raw_columns;
+use super::finding::{Estimate, Finding, Where};
+use super::linear::Sampled;
+use super::name::text_of;
+use super::run::Run;
+use super::scan::log_tail;
+use super::trajectory::Trajectory;
+use crate::numeric::least_squares::dot;
+use crate::physics::{Sample, effect};
+use std::collections::BTreeMap;
+
+/// A push that falls into one record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bump {
+    /// Which run.
+    pub run: usize,
+    /// When it begins, and how long it lasts (s).
+    pub time_s: f64,
+    /// Duration (s).
+    pub width_s: f64,
+    /// Its peak (command_unit) and the standard error of that.
+    pub peak: [f64; 2],
+    /// Logarithm of the chance that noise alone shows it somewhere.
+    pub log_p: f64,
+}
+
+/// Chance of a false push.
+const FALSE: f64 = 1e-9;
+/// Share of what a record has beyond its noise that one push must explain: what comes and goes all the time is no bump.
+const WHOLE: f64 = 0.6;
+/// Widths of a push that are tried, and the shares of the record from which to which they go.
+const WIDTHS: usize = 8;
+const SHORTEST: f64 = 1.0 / 400.0;
+const LONGEST: f64 = 1.0 / 8.0;
+/// Shortest push (samples).
+const FEWEST: f64 = 6.0;
+/// Share of a chi-square of one that its median is.
+const MEDIAN: f64 = 0.4549;
+
+/// The answer to a push of unit peak that begins with the record, whitened, and its length in samples.
+struct Answer {
+    whitened: Vec<f64>,
+    /// Sums of its squares up to each sample.
+    energy: Vec<f64>,
+    samples: usize,
+}
+
+fn answers(bench: &Bench, sampled: &Sampled, n: usize) -> Vec<Answer> {
+    let Some(shock) = effect("shock") else { return Vec::new() };
+    let t = bench.scene.sample_time_s;
+    let samples = (0..n).map(|k| Sample { t: k as f64 * t, ..Sample::default() }).collect();
+    let motion = Trajectory { samples, unexplained: Vec::new() };
+    let (low, high) = ((SHORTEST * n as f64).max(FEWEST), LONGEST * n as f64);
+    let width = |i: usize| low * (high / low).powf(i as f64 / (WIDTHS - 1) as f64);
+    let answer = |i: usize| {
+        let raw = raw_columns(shock, &[0.0, width(i) * t], &bench.scene, &motion);
+        let mut y = vec![0.0; n];
+        sampled.direct.add_response(&raw[0], &mut y);
+        bench.whitener.apply(&mut y);
+        let mut sum = 0.0;
+        let energy = y.iter().map(|v| {
+            sum += v * v;
+            sum
+        });
+        Answer { energy: energy.collect(), samples: width(i).round() as usize, whitened: y }
+    };
+    if high > low { (0..WIDTHS).map(answer).collect() } else { Vec::new() }
+}
+
+/// The best push in a whitened series of noise level `sigma`: gain, start (samples), which answer, strength.
+fn best(answers: &[Answer], x: &[f64], sigma: f64) -> Option<(f64, usize, usize, f64)> {
+    let mut best: Option<(f64, usize, usize, f64)> = None;
+    for (i, a) in answers.iter().enumerate() {
+        for from in (0..x.len().saturating_sub(a.samples)).step_by((a.samples / 4).max(1)) {
+            let n = x.len() - from;
+            let along = dot(&a.whitened[..n], &x[from..]);
+            let gain = along * along / (a.energy[n - 1] * sigma * sigma);
+            if best.is_none_or(|b| gain > b.0) {
+                best = Some((gain, from, i, along / a.energy[n - 1]));
+            }
+        }
+    }
+    best
+}
+
+/// The clearest push among the repeats, if there is one.
+pub fn bump(bench: &Bench) -> Option<Bump> {
+    let sampled = Sampled::of(&bench.form.given, bench.scene.sample_time_s).ok()?;
+    let longest = bench.repeats.iter().map(|r| r.1.len()).max()?;
+    let answers = answers(bench, &sampled, longest);
+    let points: usize = answers.iter().map(|a| 4 * longest / a.samples.max(4)).sum::<usize>() * bench.repeats.len();
+    let mut found: Option<(f64, Bump)> = None;
+    for (run, x) in &bench.repeats {
+        let mates = bench.stack.segments.iter().find(|s| s.runs.contains(run)).map_or(0, |s| s.runs.len());
+        if mates < 2 {
+            // Laps of one record: which lap is no business of a record.
+            continue;
+        }
+        let n = x.len() as f64;
+        let mut squares: Vec<f64> = x.iter().map(|v| v * v).collect();
+        let excess_of = squares.iter().sum::<f64>();
+        squares.sort_by(f64::total_cmp);
+        let sigma = (squares[squares.len() / 2] / MEDIAN).sqrt();
+        let Some((gain, from, which, strength)) = best(&answers, x, sigma) else { continue };
+        let log_p = log_tail(gain, 1) + (points.max(1) as f64).ln();
+        // Less three standard deviations of the noise's own share, its level being that of a median.
+        let excess = excess_of / (sigma * sigma) - n - 3.0 * (6.0 * n).sqrt();
+        if log_p < FALSE.ln() && gain > WHOLE * excess && found.as_ref().is_none_or(|f| gain > f.0) {
+            // A repeat less the mean holds this part of what is its own.
+            let part = ((mates - 1) as f64 / mates as f64).sqrt();
+            let t = bench.scene.sample_time_s;
+            let answer = &answers[which];
+            let error = sigma / (answer.energy[x.len() - from - 1].sqrt() * part);
+            let bump = Bump {
+                run: *run,
+                time_s: from as f64 * t,
+                width_s: answer.samples as f64 * t,
+                peak: [strength / part, error],
+                log_p,
+            };
+            found = Some((gain, bump));
+        }
+    }
+    let bump = found?.1;
+    Some(of_two(bench, &answers, bump))
+}
+
+/// Of two repeats each differs from the mean as much as the other: the bumped one is where the push shows beside the model.
+fn of_two(bench: &Bench, answers: &[Answer], bump: Bump) -> Bump {
+    let Some(segment) = bench.stack.segments.iter().find(|s| s.runs.contains(&bump.run)) else { return bump };
+    let [a, b] = segment.runs[..] else { return bump };
+    let t = bench.scene.sample_time_s;
+    let from = (bump.time_s / t).round() as usize;
+    let Some(answer) = answers.iter().min_by_key(|x| x.samples.abs_diff((bump.width_s / t).round() as usize)) else {
+        return bump;
+    };
+    let along = |run: usize| -> f64 {
+        let mut stand: Vec<Run> = bench.means.clone();
+        let Some(at) = bench.stack.segments.iter().position(|s| s.runs.contains(&run)) else { return 0.0 };
+        stand[at] = bench.runs[run].clone();
+        let fit = bench.fit(vec![]);
+        let mut errors = fit.errors_of(&vec![0.0; bench.form.knobs.len()], &stand);
+        let mut e = errors.swap_remove(at);
+        bench.whitener.apply(&mut e);
+        // The push alone: the slow answer of a wrong model changes little over its length.
+        let n = e.len() - from;
+        dot(&answer.whitened[..n], &e[from..]).abs()
+    };
+    if along(a) > along(b) {
+        Bump { run: a, peak: if bump.run == a { bump.peak } else { [-bump.peak[0], bump.peak[1]] }, ..bump }
+    } else {
+        Bump { run: b, peak: if bump.run == b { bump.peak } else { [-bump.peak[0], bump.peak[1]] }, ..bump }
+    }
+}
+
+impl Bump {
+    /// The finding, in a machine with these units.
+    pub(super) fn finding(&self, runs: &[Run], command_unit: &str) -> Finding {
+        let (says, port) = text_of("shock");
+        let number = |value: f64, off: f64, unit: &str| Estimate {
+            value,
+            low: value - off,
+            high: value + off,
+            unit: unit.into(),
+        };
+        let name = &runs[self.run].name;
+        Finding {
+            effect: "shock".into(),
+            family: vec!["shock".into()],
+            port,
+            p_value: self.log_p.min(0.0).exp().max(1e-300),
+            says: format!(
+                "In record {name}, {:.4} s after its start, {says}; its repeats do not show it.",
+                self.time_s
+            ),
+            parameters: BTreeMap::from([
+                ("peak_command".to_owned(), number(self.peak[0], 1.96 * self.peak[1], command_unit)),
+                ("time_s".to_owned(), number(self.time_s, 0.5 * self.width_s, "s")),
+                ("width_s".to_owned(), number(self.width_s, 0.5 * self.width_s, "s")),
+            ]),
+            place: Where {
+                records: vec![name.clone()],
+                time_s: vec![[self.time_s, self.time_s + self.width_s]],
+                velocity_sign: "both",
+                ..Where::default()
+            },
+        }
+    }
+}

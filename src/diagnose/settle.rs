@@ -1,0 +1,114 @@
+//! The final model of a search, looked at again: effects that others made needless go, and rivals are tried in the place of each.
+
+use super::bench::Bench;
+use super::refit::Chosen;
+use super::select::{DRAGS, MINOR, Model, OWN, Step, fitted, fitted_from_both};
+use super::simulated::simulated;
+
+/// Takes effects out again that later ones made needless.
+pub(super) fn prune(bench: &Bench, model: &mut Model, before: f64, iterations: usize) {
+    let price = (bench.stack.total as f64).ln();
+    while model.chosen.len() > 1 {
+        let without = |i: usize| {
+            let mut chosen = model.chosen.clone();
+            chosen.remove(i);
+            fitted(bench, chosen, &model.refitted.p, iterations)
+        };
+        let all: Vec<Model> = (0..model.chosen.len()).map(without).collect();
+        let Some((i, best)) = all.into_iter().enumerate().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost)) else { return };
+        let c = &model.chosen[i];
+        let numbers = (c.setting.strengths.len() + c.setting.inner.len()) as f64;
+        if best.cost - model.cost > (price * numbers).max(MINOR[1] * (before - best.cost)) {
+            return;
+        }
+        *model = best;
+    }
+}
+
+/// Share of the largest gain below which an effect beside a drag is in doubt.
+const SMALL: f64 = 0.3;
+
+/// Takes out what stands beside a drag only because the drag's column, made along a noisy motion, falls short of the drag: simulated,
+/// the model does without.
+pub(super) fn spare(
+    bench: &Bench,
+    model: &mut Model,
+    by_simulation: &mut Model,
+    rivals: &mut Vec<Vec<(&'static str, f64)>>,
+    steps: &[Step],
+    before: f64,
+    iterations: usize,
+) {
+    let drag = |c: &Chosen| DRAGS.contains(&c.effect.facts().name);
+    let gain = |c: &Chosen| {
+        let step = &steps[c.step];
+        step.taken.map_or(0.0, |t| step.before - step.tried[t].1.evidence)
+    };
+    let most = model.chosen.iter().map(gain).fold(0.0, f64::max);
+    let small = |c: &Chosen| gain(c) < SMALL * most;
+    let price = (bench.stack.total as f64).ln();
+    while model.chosen.len() > 1 && model.chosen.iter().any(drag) {
+        let mut without = Vec::new();
+        for at in (0..model.chosen.len()).filter(|&i| !drag(&model.chosen[i]) && small(&model.chosen[i])) {
+            let mut chosen = model.chosen.clone();
+            chosen.remove(at);
+            let less = fitted(bench, chosen, &model.refitted.p, iterations);
+            if let Some(s) = simulated(bench, &less) {
+                without.push((at, less, s));
+            }
+        }
+        let Some((at, less, s)) = without.into_iter().min_by(|a, b| a.2.cost.total_cmp(&b.2.cost)) else { return };
+        let c = &model.chosen[at];
+        let numbers = (c.setting.strengths.len() + c.setting.inner.len()) as f64;
+        if s.cost - by_simulation.cost > (price * numbers).max(MINOR[1] * (before - s.cost)) {
+            return;
+        }
+        rivals.remove(at);
+        (*model, *by_simulation) = (less, s);
+    }
+}
+
+/// Share of the gain of an effect from which a rival of its step is tried in its place.
+const NEAR: f64 = 0.8;
+/// Fall of the sum of squares for which an effect is exchanged.
+const BETTER: f64 = 10.0;
+
+/// Tries the rivals of each effect in its place, everything else refitted, and takes them where they fit better now.
+pub(super) fn exchange(
+    bench: &Bench,
+    model: &mut Model,
+    steps: &[Step],
+    iterations: usize,
+) -> Vec<Vec<(&'static str, f64)>> {
+    let mut all = Vec::new();
+    for at in 0..model.chosen.len() {
+        let step = &steps[model.chosen[at].step];
+        let Some(taken) = step.taken.map(|t| &step.tried[t]) else {
+            all.push(Vec::new());
+            continue;
+        };
+        let gain = step.before - taken.1.evidence;
+        let mut found: Vec<(&'static str, f64)> = Vec::new();
+        for (i, tried) in &step.tried {
+            let c = &step.candidates[*i];
+            let (name, own) = (c.effect.facts().name, model.chosen[at].effect.facts().name);
+            let elsewhere = model.chosen.iter().any(|m| m.effect.facts().name == name);
+            if name == own || elsewhere || step.before - tried.evidence < NEAR * gain {
+                continue;
+            }
+            let Some(last) = tried.chosen.last() else { continue };
+            let mut chosen = model.chosen.clone();
+            chosen[at] = Chosen { step: model.chosen[at].step, ..last.clone() };
+            let other = fitted_from_both(bench, &chosen, &model.refitted.p, iterations);
+            let dearer = if c.effect.facts().per_record { OWN * gain } else { 0.0 };
+            if other.cost + BETTER + dearer < model.cost && other.possible() {
+                found.push((own, model.cost));
+                *model = other;
+            } else {
+                found.push((name, other.cost));
+            }
+        }
+        all.push(found);
+    }
+    all
+}

@@ -1,0 +1,246 @@
+//! The final model fitted once more, by simulation: the laws feel the motion that the model makes, not the recorded one.
+//!
+//! Along the recorded motion a law sees the sensor's noise: a drag turns round a little early and late, its level comes out too
+//! small (the dilution of a regression whose input is noisy). Simulated from the recorded command it does not. In: the model of the
+//! search. Out: body, delay and the effects' numbers at the least whitened simulation error of the mean records, with their errors.
+
+use super::bench::Bench;
+use super::corrected::corrected;
+use super::judge::{Judged, Started, started};
+use super::linear::Knob;
+use super::refit::{Chosen, Refitted};
+use super::run::Run;
+use super::select::Model;
+use super::stack::Basis;
+use crate::numeric::least_squares::dot;
+use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
+use crate::physics::Effect;
+use rayon::prelude::*;
+
+/// Most Jacobians.
+const ITERATIONS: usize = 6;
+/// Relative fall of the sum of squares at which the fit ends.
+const TOLERANCE: f64 = 1e-4;
+/// Rounds in which a start is found.
+const ROUNDS: usize = 3;
+/// Step in a linear parameter.
+const STEP: f64 = 1e-4;
+/// Relative steps in strengths and inner parameters: laws have kinks, and smaller steps see only them.
+const STRENGTH_STEP: f64 = 2e-3;
+const INNER_STEP: f64 = 5e-3;
+/// Shortest length of a dry drag over the shortest that the search takes.
+const DRIER: f64 = 0.02;
+/// Whitened simulation error over that along the recorded motion above which the simulation runs away and fits nothing.
+const AWAY: f64 = 100.0;
+
+/// What is moved: places in the linear parameters, then strengths and inner parameters by effect and place.
+struct Free {
+    knobs: Vec<usize>,
+    strengths: Vec<[usize; 2]>,
+    inner: Vec<[usize; 2]>,
+}
+
+struct Problem<'a> {
+    bench: &'a Bench,
+    model: &'a Model,
+    free: Free,
+    local: Basis,
+    /// The free motion that each mean record starts with, as found last: near enough for what is not far.
+    starts: Vec<Vec<f64>>,
+}
+
+impl Problem<'_> {
+    fn start(&self) -> Vec<f64> {
+        let m = self.model;
+        let knobs = self.free.knobs.iter().map(|&i| m.refitted.p[i]);
+        let strengths = self.free.strengths.iter().map(|&[e, i]| m.chosen[e].setting.strengths[i]);
+        let inner = self.free.inner.iter().map(|&[e, i]| m.chosen[e].setting.inner[i].abs().ln());
+        knobs.chain(strengths).chain(inner).collect()
+    }
+
+    fn unpack(&self, x: &[f64]) -> (Vec<f64>, Vec<Chosen>) {
+        let (mut p, mut chosen) = (self.model.refitted.p.clone(), self.model.chosen.clone());
+        let (knobs, rest) = x.split_at(self.free.knobs.len());
+        let (strengths, inner) = rest.split_at(self.free.strengths.len());
+        self.free.knobs.iter().zip(knobs).for_each(|(&i, v)| p[i] = *v);
+        self.free.strengths.iter().zip(strengths).for_each(|(&[e, i], v)| chosen[e].setting.strengths[i] = *v);
+        for (&[e, i], v) in self.free.inner.iter().zip(inner) {
+            let slot = &mut chosen[e].setting.inner[i];
+            *slot = v.exp().copysign(*slot);
+        }
+        (p, chosen)
+    }
+
+    /// Every mean record simulated, from the starts found last; infinite where it runs away.
+    fn simulate(&self, x: &[f64], rounds: usize) -> Vec<Started> {
+        let bench = self.bench;
+        let (p, chosen) = self.unpack(x);
+        let made = corrected(&bench.form, &p, &chosen, &bench.scene);
+        let own = chosen.iter().filter(|c| c.effect.facts().per_record);
+        let judged = Judged {
+            plant: &made.plant,
+            effects: made.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect(),
+            own: own.map(|c| (c.effect as &dyn Effect, &c.setting.inner[..])).collect(),
+            lines: &[],
+            fit: Some((bench, self.model)),
+            scene: &bench.scene,
+        };
+        let away = |run: &Run| Started { error: vec![f64::INFINITY; run.len()], free: vec![0.0; run.len()] };
+        let one = |(run, free): (&Run, &Vec<f64>)| {
+            started(&judged, run, None, free.clone(), rounds).unwrap_or_else(|_| away(run))
+        };
+        bench.means.par_iter().zip(&self.starts).map(one).collect()
+    }
+
+    /// Whitened simulation error of the mean records, one stacked vector, each record's own directions taken out.
+    fn error(&self, x: &[f64], rounds: usize) -> Vec<f64> {
+        self.whitened(self.simulate(x, rounds))
+    }
+
+    fn whitened(&self, all: Vec<Started>) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.bench.stack.total);
+        for (segment, mut s) in self.bench.stack.segments.iter().zip(all) {
+            self.bench.whitener.apply(&mut s.error);
+            out.extend(s.error.into_iter().map(|v| segment.weight * v));
+        }
+        self.local.project(&mut out);
+        out
+    }
+
+    /// Finds the starts at `x` anew and keeps them; gives the whitened error.
+    fn settle(&mut self, x: &[f64]) -> Vec<f64> {
+        let all = self.simulate(x, ROUNDS);
+        for (kept, s) in self.starts.iter_mut().zip(&all) {
+            if s.free.iter().all(|v| v.is_finite()) {
+                kept.clone_from(&s.free);
+            }
+        }
+        self.whitened(all)
+    }
+
+    fn step(&self, i: usize, x: f64) -> f64 {
+        let (knobs, strengths) = (self.free.knobs.len(), self.free.strengths.len());
+        match i {
+            i if i < knobs => STEP,
+            i if i < knobs + strengths => STRENGTH_STEP * x.abs().max(1e-12),
+            _ => INNER_STEP,
+        }
+    }
+}
+
+impl Residuals for Problem<'_> {
+    fn rows(&self) -> usize {
+        self.bench.stack.total
+    }
+
+    fn cols(&self) -> usize {
+        self.free.knobs.len() + self.free.strengths.len() + self.free.inner.len()
+    }
+
+    fn evaluate(&mut self, x: &[f64], r: &mut [f64]) {
+        r.copy_from_slice(&self.error(x, 2));
+    }
+
+    fn jacobian(&mut self, x: &[f64], j: &mut [f64]) {
+        self.settle(x);
+        let this = &*self;
+        let n = self.bench.stack.total;
+        // Both sides: the mean slope over a kink, not the slope on one side of it.
+        j.par_chunks_exact_mut(n).enumerate().for_each(|(i, column)| {
+            let step = this.step(i, x[i]);
+            let moved = |by: f64| {
+                let mut to = x.to_vec();
+                to[i] += by;
+                this.error(&to, 1)
+            };
+            let (up, down) = (moved(step), moved(-step));
+            column.iter_mut().zip(up.iter().zip(&down)).for_each(|(c, (a, b))| *c = (a - b) / (2.0 * step));
+        });
+    }
+
+    fn limit(&self, i: usize) -> Limit {
+        let (knobs, strengths) = (self.free.knobs.len(), self.free.strengths.len());
+        if i < knobs + strengths {
+            let step = if i < knobs { 0.3 } else { f64::INFINITY };
+            return Limit { low: f64::NEG_INFINITY, high: f64::INFINITY, step };
+        }
+        let [e, k] = self.free.inner[i - knobs - strengths];
+        let c = &self.model.chosen[e];
+        let [low, high] = c.range[k];
+        // Along a noisy motion a dry drag needs a length that the noise does not cover; simulated it may be as dry as it is.
+        let dry = c.effect.facts().name == "coulomb_friction" && k == 0;
+        let (low, step) = if dry { (DRIER * low, 0.8) } else { (low, 0.3) };
+        Limit { low: low.ln(), high: high.ln(), step }
+    }
+}
+
+/// The model with body, delay and effects fitted by simulation; none where it has no effect, where its simulation runs away or where
+/// nothing is won.
+pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
+    if model.chosen.is_empty() {
+        return None;
+    }
+    let body = |k: &Knob| matches!(k, Knob::Gain | Knob::Stiffness | Knob::Viscous | Knob::Delay);
+    let knobs: Vec<usize> = (0..bench.form.knobs.len()).filter(|&i| body(&bench.form.knobs[i])).collect();
+    let (mut strengths, mut inner) = (Vec::new(), Vec::new());
+    for (e, c) in model.chosen.iter().enumerate() {
+        let facts = c.effect.facts();
+        if !facts.fixed && !facts.per_record {
+            // A strength of exactly 0 belongs to a term that this form of the law has not.
+            let there = (0..c.setting.strengths.len()).filter(|&i| c.setting.strengths[i] != 0.0);
+            strengths.extend(there.map(|i| [e, i]));
+        }
+        if !facts.per_record {
+            inner.extend((0..c.setting.inner.len()).filter(|&i| c.continuous[i]).map(|i| [e, i]));
+        }
+    }
+    let free = Free { knobs, strengths, inner };
+    let starts = bench.means.iter().map(|r| vec![0.0; r.len()]).collect();
+    let mut problem = Problem { bench, model, free, local: bench.fit(vec![]).local_basis(), starts };
+    let mut x = problem.start();
+    let before = problem.settle(&x);
+    let before = dot(&before, &before);
+    if !(before.is_finite() && before < AWAY * model.cost) {
+        return None;
+    }
+    let mut work = Workspace::default();
+    let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
+    let outcome = minimise(&mut problem, &mut x, &settings, &mut work);
+    if !outcome.cost.is_finite() || outcome.cost > before {
+        return None;
+    }
+    let (p, chosen) = problem.unpack(&x);
+    if !chosen.iter().all(|c| c.effect.possible(&c.setting, &[])) {
+        return None;
+    }
+    // The errors of what was not moved stay those of the search.
+    let mut spread = model.refitted.spread.clone();
+    let root = work.qr.inverse_root();
+    let n = work.qr.cols();
+    let own = |i: usize| (0..n).map(|j| root[j * n + i].powi(2)).sum::<f64>().sqrt();
+    for (i, at) in places(&problem.free, model).into_iter().enumerate() {
+        if let Some(s) = spread.get_mut(at) {
+            *s = own(i);
+        }
+    }
+    let plant = bench.form.plant(&p);
+    let refitted = Refitted { p, plant, cost: outcome.cost, spread, converged: outcome.converged };
+    Some(Model { chosen, refitted, cost: outcome.cost, ..model.clone() })
+}
+
+/// Where each number that was moved stands among all numbers of a fit: linear parameters, strengths, inner parameters.
+fn places(free: &Free, model: &Model) -> Vec<usize> {
+    let strengths = |e: usize| {
+        let c = &model.chosen[e];
+        if c.effect.facts().fixed { 0 } else { c.setting.strengths.len() }
+    };
+    let knobs = model.refitted.p.len();
+    let all: usize = (0..model.chosen.len()).map(strengths).sum();
+    let strength = |&[e, i]: &[usize; 2]| knobs + (0..e).map(strengths).sum::<usize>() + i;
+    let moving = |e: usize, to: usize| model.chosen[e].continuous[..to].iter().filter(|c| **c).count();
+    let inner = |&[e, i]: &[usize; 2]| {
+        let before: usize = (0..e).map(|e| moving(e, model.chosen[e].continuous.len())).sum();
+        knobs + all + before + moving(e, i)
+    };
+    free.knobs.iter().copied().chain(free.strengths.iter().map(strength)).chain(free.inner.iter().map(inner)).collect()
+}
