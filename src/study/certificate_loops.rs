@@ -58,9 +58,9 @@ pub(super) struct LoopCase {
     pub cells: usize,
 }
 
-/// All loops, in the order of their seeds.
-pub(super) fn loops(count: u64) -> Result<Vec<LoopCase>, StudyError> {
-    (0..count).into_par_iter().map(|seed| Ok(judge(seed)?.0)).collect()
+/// The loops of these seeds, in their order.
+pub(super) fn loops(seeds: std::ops::Range<u64>) -> Result<Vec<LoopCase>, StudyError> {
+    seeds.into_par_iter().map(|seed| Ok(judge(seed)?.0)).collect()
 }
 
 /// The first `count` loops with their truth.

@@ -12,6 +12,9 @@ use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+/// Least damping of a mode where nobody says another.
+pub const LEAST_DAMPING: f64 = 0.005;
+
 /// How a sweep is to be taken.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -139,6 +142,7 @@ impl Swept {
             floor,
             gain: self.gain,
             turn: Range::ZERO,
+            stuck: self.gain.width(),
         }
     }
 }
