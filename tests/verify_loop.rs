@@ -160,3 +160,15 @@ fn no_machine_of_a_box_breaks_its_bounds() {
         }
     }
 }
+
+/// Poles of the sections beside the first cells: a cell as wide as their distance has no bound until it is halved.
+#[test]
+fn a_low_pass_just_below_half_the_rate_is_no_reason_to_refuse() {
+    for frequency_hz in [11_000.0, 11_800.0, 12_000.0, 12_300.0] {
+        for class in MachineClass::ALL {
+            let mut c = nominal_controller().unwrap();
+            c.lowpass = vec![Lowpass { frequency_hz, damping_ratio: 0.7 }];
+            agree(&paper_machine(class).unwrap(), &c, class.name());
+        }
+    }
+}

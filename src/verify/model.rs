@@ -91,6 +91,7 @@ impl Sampled {
         slope += far.first;
         radius += far.remainder + error;
         let (gain, turn) = (Range::ZERO, Range::ZERO);
+        let radius = if radius.is_nan() { f64::INFINITY } else { radius };
         let patch = Patch { centre, half: slope * half, radius, floor: error, gain, turn, stuck: 0.0 };
         others.far = far.most + error;
         others.most += others.far;

@@ -50,6 +50,9 @@ impl Patch {
     /// Whether a smaller cell would have a markedly smaller patch: what it would take away is not dwarfed by what uncertainty adds
     /// at a single frequency, nor by the floor.
     pub fn coarse(&self) -> bool {
+        if !self.radius.is_finite() {
+            return true;
+        }
         let size = self.centre.norm();
         // Over a cell every uncertain factor also carries its own run along the cell.
         let run = (self.gain.width().max(self.turn.width()) - self.stuck).max(0.0) * size;
@@ -59,14 +62,16 @@ impl Patch {
 
     /// Whether a smaller cell would have a smaller certain part.
     pub fn shrinks(&self) -> bool {
-        self.half.norm() + self.radius - self.floor > FLOOR_SHARE * self.floor
+        // A cell as wide as the distance of a pole has no bound yet.
+        !self.radius.is_finite() || self.half.norm() + self.radius - self.floor > FLOOR_SHARE * self.floor
     }
 
     /// |L|.
     pub fn size(&self) -> Range {
         let low = (self.to_segment(Complex::new(0.0, 0.0)) - self.radius).max(0.0);
         let high = (self.centre - self.half).norm().max((self.centre + self.half).norm()) + self.radius;
-        Range { low: low * self.gain.low.exp(), high: high * self.gain.high.exp() }
+        let r = Range { low: low * self.gain.low.exp(), high: high * self.gain.high.exp() }.sound();
+        Range { low: r.low.max(0.0), ..r }
     }
 
     /// Angle from -180 deg to L (rad), on the branch of the centre in (-pi, pi]; none where L may be 0.

@@ -134,11 +134,13 @@ impl Swept {
             common = common.times(Product::hold(angle));
         }
         let floor = common.term(half).most * gap.error;
+        let floor = if floor.is_nan() { f64::INFINITY } else { floor };
         let l = common.times(Expansion::plain(jet)).term(half);
+        let radius = if l.remainder.is_nan() { f64::INFINITY } else { l.remainder };
         Patch {
             centre: l.value,
             half: l.first * half,
-            radius: l.remainder + floor,
+            radius: radius + floor,
             floor,
             gain: self.gain,
             turn: Range::ZERO,

@@ -110,13 +110,15 @@ impl Spread {
         }
         let lag = others.times * TAU * self.delay_s / self.t + 2.0 * others.far;
         for p in active {
-            let (gain, turn) = (gain.plus(p.moves.0), turn.plus(p.moves.1));
+            let (gain, turn) = (gain.plus(p.moves.0).sound(), turn.plus(p.moves.1).sound());
             // The patch is moved as a whole, as its first alias is; the others, which move by no more than their ratio says, are off by the
             // difference: |e^x - 1| <= e^|x| - 1. Their delay turns them by whole turns a sample more.
             let own = gain.low.abs().max(gain.high.abs()).hypot(turn.low.abs().max(turn.high.abs()));
             let apart = (self.alias_ratio + own).exp();
             let late = if self.delay_s > 0.0 { lag.min(2.0 * others.most) } else { 0.0 };
             let rim = others.most * (apart - 1.0) + apart * late;
+            // Where a factor may vanish its logarithm has no bound, and nothing is known.
+            let rim = if rim.is_nan() { f64::INFINITY } else { rim };
             into.push(Patch {
                 radius: nominal.radius + rim,
                 floor: nominal.floor + rim,
@@ -151,7 +153,7 @@ impl Spread {
             self.over(f, Range { low: at(i), high: at(i + 1) }, self.damping)
         };
         // The nominal value over the cell is taken out again.
-        let out = |m: Range, n: Range| Range { low: m.low - n.high, high: m.high - n.low };
+        let out = |m: Range, n: Range| Range { low: m.low - n.high, high: m.high - n.low }.sound();
         (0..count)
             .map(|i| {
                 let (moved, still) = (part(full, i), part(point, i));

@@ -10,7 +10,7 @@ use super::{LimitError, LimitPlant};
 use crate::controller::{Controller, Feedforward};
 use crate::pes::{HIGH_BAND_HZ, LOW_BAND_HZ};
 use crate::tune::{Spec, bench};
-use nalgebra::{Complex, DMatrix, SymmetricEigen};
+use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 
 /// How hard the bound is driven up, and over which loops.
@@ -174,22 +174,6 @@ const UNIT_SAMPLES: usize = 16;
 /// Radius of the ball of coordinates that is searched: energies up to its square times the limits', far beyond any use.
 const BALL: f64 = 1e4;
 
-/// Share of the largest singular value below which a direction of a norm's rows is left out: the norm only falls by it.
-const SLIGHT: f64 = 1e-5;
-
-/// Fewer rows with nearly the same sum of squares, and none greater: the solver's work grows with their number.
-fn thinned(rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    let Some(width) = rows.first().map(Vec::len) else { return rows };
-    let all = DMatrix::from_fn(rows.len(), width, |i, j| rows[i][j]);
-    let e = SymmetricEigen::new(all.tr_mul(&all));
-    let largest = e.eigenvalues.iter().fold(0.0f64, |a, x| a.max(*x));
-    let kept: Vec<usize> = (0..width).filter(|i| e.eigenvalues[*i] > SLIGHT * SLIGHT * largest).collect();
-    if kept.len() >= rows.len() {
-        return rows;
-    }
-    kept.into_iter().map(|i| e.eigenvectors.column(i).iter().map(|x| x * e.eigenvalues[i].sqrt()).collect()).collect()
-}
-
 /// A programme that keeps its cuts between objectives.
 struct Model<'a> {
     h: &'a Horizon,
@@ -216,7 +200,7 @@ impl<'a> Model<'a> {
         let scale = bench::weights(&spec.limits);
         let all: Vec<(&Affine, f64)> = (0..2).flat_map(|b| bands[b].iter().map(move |a| (a, scale[b]))).collect();
         let basis = Basis::of(&all, h.taps, unit);
-        let turned = [0, 1].map(|b: usize| thinned(bands[b].iter().map(|a| basis.row(a, scale[b], 2)).collect()));
+        let turned = [0, 1].map(|b: usize| bands[b].iter().map(|a| basis.row(a, scale[b], 2)).collect());
         let pointwise = Pointwise {
             sample_time_s,
             tail: settings.tail,
