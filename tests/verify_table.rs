@@ -4,8 +4,11 @@
 use assert_cmd::Command;
 use servotune::document::sha256_hex;
 use servotune::lti::{Plant, PlantFile};
+use servotune::numeric::random::Random;
 use servotune::tune::{GainTable, InputDigest, Machine, Spec, TuneSettings, tune};
 use servotune::twin::nominal_controller;
+use servotune::twin::plants::{log_grid, measure};
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 const PLANT: &str = include_str!("../specs/machines/tunable.toml");
@@ -73,5 +76,62 @@ fn a_table_is_proved_and_every_change_is_seen() {
     std::fs::write(dir.join("plant.toml"), format!("{PLANT}\n[[plant.physics]]\neffect = \"slew_limit\"\n")).unwrap();
     let (code, text) = verify(&dir, &[]);
     assert!(code == 2 && text.contains("slew_limit"), "{text}");
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+fn run(dir: &Path, words: &[&str]) -> (i32, String, String) {
+    let out = Command::cargo_bin("servotune").unwrap().current_dir(dir).args(words).output().unwrap();
+    let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
+    (out.status.code().unwrap(), text(&out.stdout), text(&out.stderr))
+}
+
+#[test]
+fn tune_proves_its_table_and_says_so() {
+    let dir = folder("beside");
+    std::fs::write(dir.join("start.toml"), include_str!("../specs/controllers/nominal.toml")).unwrap();
+    let words = ["tune", "--plant", "plant.toml", "--spec", "spec.toml", "--controller", "start.toml", "--starts", "4"];
+    let with = |more: &[&'static str]| run(&dir, &[&words[..], more].concat());
+    let (code, text, _) = with(&["--out", "mine.toml"]);
+    assert!(code == 0 && text.contains("Proved: every limit holds at every frequency"), "{text}");
+    // Another run of the proof repeats the certificate, value by value.
+    let verify = ["verify", "mine.toml", "--plant", "plant.toml", "--spec", "spec.toml"];
+    let (code, _, said) = run(&dir, &verify);
+    assert!(code == 0 && said.contains("checked against mine.certificate.json"), "{said}");
+    let (code, text, _) = with(&["--out", "bare.toml", "--no-certificate", "--json"]);
+    let document: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(code == 0 && document["certificate"].is_null() && !dir.join("bare.certificate.json").exists());
+    // Limits that nobody meets: the compromise has a certificate that names them.
+    let hard = std::fs::read_to_string(dir.join("spec.toml"))
+        .unwrap()
+        .replace("max_sensitivity = 2.4", "max_sensitivity = 1.05");
+    std::fs::write(dir.join("hard.toml"), hard).unwrap();
+    let words =
+        ["tune", "--plant", "plant.toml", "--spec", "hard.toml", "--starts", "2", "--keep-infeasible", "--json"];
+    let (code, text, _) = run(&dir, &[&words[..], &["--out", "hard_gains.toml"]].concat());
+    let document: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((code, document["certificate"]["proved"].as_bool()), (1, Some(false)), "{text}");
+    assert!(document["certificate"]["says"].as_str().unwrap().contains("max_sensitivity at most 1.05"), "{text}");
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+#[test]
+fn a_table_tuned_on_a_sweep_says_what_the_sweep_does_not_prove() {
+    let dir = folder("swept");
+    let read: PlantFile = servotune::document::parse_toml(Path::new("plant"), PLANT).unwrap();
+    let plant = Plant::try_from(read).unwrap();
+    let grid = log_grid(20.0, 12_000.0, 400);
+    let frf = measure(&plant, &grid, 0.0, &mut Random::new(1)).unwrap();
+    let rows: Vec<String> = grid
+        .iter()
+        .zip(frf.value())
+        .map(|(w, p)| format!("{},{},{}", w / TAU, 20.0 * p.norm().log10(), p.arg().to_degrees()))
+        .collect();
+    std::fs::write(dir.join("sweep.csv"), rows.join("\n") + "\n").unwrap();
+    let words = ["tune", "--frf", "sweep.csv", "--phase", "response", "--spec", "spec.toml", "--starts", "4", "--json"];
+    let (_, text, said) = run(&dir, &[&words[..], &["--out", "mine.toml", "--keep-infeasible"]].concat());
+    let document: serde_json::Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{said}"));
+    let proof = &document["certificate"];
+    let says = proof["says"].as_str().unwrap();
+    assert!(proof["proved"] == false && says.contains("a sweep alone does not prove it"), "{says}");
     std::fs::remove_dir_all(dir).unwrap();
 }

@@ -234,6 +234,9 @@ pub(super) struct TuneArguments {
     /// Write the best compromise even where the limits are not met
     #[arg(long)]
     pub keep_infeasible: bool,
+    /// Leave out the certificate that is otherwise proved and written beside each gain table (gains.certificate.json)
+    #[arg(long)]
+    pub no_certificate: bool,
     /// Sample time where no start controller gives one (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 39.6e-6)]
     pub sample_time_s: f64,

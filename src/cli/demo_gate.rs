@@ -84,6 +84,7 @@ pub(super) fn run(
         tuning: TuneSettings::default(),
         overrides: BTreeMap::new(),
         keep_infeasible: false,
+        certify: None,
         replace: true,
         out: &gains,
     };

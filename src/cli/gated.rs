@@ -3,6 +3,7 @@
 //! In: a folder of machine folders, a gate, a spec. Out: a row for each machine with its class, action, reason and what became of it, and a gain
 //! table for each tuned one. A broken folder is a row with its error. What `tune --machines` and `demo` share.
 
+use super::proof::{self, On, Proof};
 use super::{Failure, Screen};
 use crate::controller::Controller;
 use crate::document::sha256_hex;
@@ -33,6 +34,8 @@ pub(super) struct Job<'a> {
     /// Machines to tune whatever the gate says, with the reason.
     pub overrides: BTreeMap<String, String>,
     pub keep_infeasible: bool,
+    /// The spec's file, where certificates are to be written beside the tables.
+    pub certify: Option<&'a Path>,
     /// Whether gains of an earlier run may be written over.
     pub replace: bool,
     pub out: &'a Path,
@@ -77,6 +80,8 @@ pub(super) struct Row {
     pub fate: Fate,
     /// The gain table, where one was written.
     pub gains: Option<PathBuf>,
+    /// The proof of that table.
+    pub certificate: Option<Proof>,
     /// What is broken.
     pub error: Option<String>,
     /// Why it was tuned against the gate.
@@ -159,6 +164,7 @@ fn judged(id: String, v: Verdict, problems: &[String]) -> Row {
         why,
         fate: if broken { Fate::Failed } else { Fate::NotTuned },
         gains: None,
+        certificate: None,
         error: broken.then(|| problems.join("; ")),
         by_order: None,
     }
@@ -190,6 +196,12 @@ fn tuned(job: &Job<'_>, row: &mut Row, screen: &mut Screen) -> Result<(), Failur
         let gains = job.out.join(&row.id).join(GAINS);
         table.write(&gains)?;
         screen.say(&format!("wrote {}", gains.display()));
+        if let Some(spec) = job.certify {
+            let on = On::Sweep { sweep: &sweep, hold_included: job.hold == Hold::Included };
+            let proof = proof::beside(&gains, &on, spec, screen)?;
+            screen.say(&format!("machine {}: {}", row.id, proof.says));
+            row.certificate = Some(proof);
+        }
         row.gains = Some(gains);
     } else {
         let (_, words) = super::slot::verdict(&outcome);

@@ -35,12 +35,12 @@ pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Fai
     let found = limit(&seen, t, forward, &spec, &settings)?;
     let figures = gains.as_ref().map(|g| standing(&seen, g, &spec)).transpose()?;
     let searched = match a.search {
-        Some(starts) => {
+        0 => None,
+        starts => {
             let wide = TuneSettings { sample_time_s: t, starts, ..TuneSettings::default() };
             let best = tune(&Machine::Model(&plant), &spec, gains.as_ref(), &wide)?;
             Some(standing(&seen, best.controller(), &spec)?)
         }
-        None => None,
     };
     let document = Document {
         schema: "servotune.limit/1",
@@ -54,7 +54,7 @@ pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Fai
         screen.say(&format!("wrote {}", file.display()));
     }
     let mut text = limit_table(&found, figures.as_ref(), &plant.position_unit)?.text();
-    text += &limit_sentences(&found, figures.as_ref(), searched.as_ref());
+    text += &limit_sentences(&found, figures.as_ref(), searched.as_ref().map(|s| (s, a.search)));
     screen.result(&document, &text)?;
     Ok(if found.verdict == Verdict::Impossible { Ending::Rejected } else { Ending::Accepted })
 }

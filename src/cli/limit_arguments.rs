@@ -26,9 +26,9 @@ pub(super) struct LimitArguments {
     /// Document to write (limit.json)
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Also search the spec's structure from this many starts: the best gains found, no bound
-    #[arg(long, value_name = "STARTS")]
-    pub search: Option<usize>,
+    /// Search the spec's structure from this many starts for the best gains it has: evidence, no bound; 0 leaves it out
+    #[arg(long, value_name = "STARTS", default_value_t = 24)]
+    pub search: usize,
     /// Sum of the sensitivity's impulse response that loops of the class may have left beyond the write
     #[arg(long, value_name = "SUM", default_value_t = 0.05, value_parser = not_negative)]
     pub tail: f64,

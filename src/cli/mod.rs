@@ -30,6 +30,7 @@ mod margins;
 mod next_sweep;
 mod pareto;
 mod physics;
+mod proof;
 mod response;
 mod screen;
 mod simulate;

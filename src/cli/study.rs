@@ -29,7 +29,7 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::Classes => study::classes()?,
         StudyName::Gate => study::gate()?,
         StudyName::GateSeeds => study::gate_seeds()?,
-        StudyName::Certificate => study::certificate(&a.data)?,
+        StudyName::Certificate => study::certificate(&a.data, &mut |words| screen.say(words))?,
         StudyName::Ladder => study::ladder()?,
         StudyName::Line => study::line_study()?,
         StudyName::Limits => study::limits(&a.data)?,

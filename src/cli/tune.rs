@@ -1,6 +1,7 @@
 //! `servotune tune`: gains that meet the limits, a gain table, a report.
 
 use super::arguments::{ModelArguments, TuneArguments};
+use super::proof::{self, On, Proof};
 use super::slot::{self, Slot};
 use super::{Ending, Failure, Screen, load, physics, tune_machines};
 use crate::document::{read_text, sha256_hex, write_text};
@@ -23,6 +24,8 @@ struct Document<'a> {
     #[serde(flatten)]
     outcome: &'a Outcome,
     gain_table: Option<&'a Path>,
+    /// The proof of the table; absent without a table or by --no-certificate.
+    certificate: Option<&'a Proof>,
     report: Option<&'a Path>,
     /// Names and judgement of the physics; absent without any.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -127,11 +130,18 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
             (outcome, table, tuned)
         }
     };
-    let mut written = None;
+    let (mut written, mut proof) = (None, None);
     if tuned || a.keep_infeasible {
         table.write(&a.out)?;
         screen.say(&format!("wrote {}", a.out.display()));
         written = Some(a.out.as_path());
+        if !a.no_certificate {
+            let on = match (&given, &a.plant) {
+                (Given::Response { sweep, .. }, _) => On::Sweep { sweep, hold_included: a.hold_included },
+                (Given::Model(..), file) => On::Plant(file.as_deref().ok_or(Failure::NoMachine)?),
+            };
+            proof = Some(proof::beside(&a.out, &on, &a.spec, screen)?);
+        }
     } else {
         screen.say("no gain table was written: the limits are not met (--keep-infeasible writes the compromise)");
     }
@@ -154,8 +164,11 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         Some((physics, t)) => physical_text(physics, t, start.as_ref(), units)?,
         None => text(&outcome, start.as_ref(), units)?,
     };
-    let document = Document { outcome: &outcome, gain_table: written, report: a.report.as_deref(), physics };
-    screen.result(&document, &text)?;
+    let certificate = proof.as_ref();
+    let said = certificate.map_or_else(String::new, |p| format!("{}\n", p.says));
+    let document =
+        Document { outcome: &outcome, gain_table: written, certificate, report: a.report.as_deref(), physics };
+    screen.result(&document, &(text + &said))?;
     Ok(if tuned { Ending::Accepted } else { Ending::Rejected })
 }
 

@@ -44,6 +44,7 @@ pub(super) fn run(a: &TuneArguments, machines: &Path, gate: &Path, screen: &mut 
         tuning: TuneSettings { sample_time_s: a.sample_time_s, starts: a.starts, ..TuneSettings::default() },
         overrides,
         keep_infeasible: a.keep_infeasible,
+        certify: (!a.no_certificate).then_some(a.spec.as_path()),
         replace: false,
         out: &a.out,
     };

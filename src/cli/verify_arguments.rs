@@ -1,7 +1,7 @@
 //! The words of `servotune verify`.
 
 use super::sweep_arguments::ReadingArguments;
-use crate::verify::{Uncertainty, Word};
+use crate::verify::{LEAST_DAMPING, Uncertainty, Word};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -27,7 +27,7 @@ pub(super) struct VerifyArguments {
     #[arg(long, value_name = "FRF")]
     pub frf: Vec<PathBuf>,
     /// No mode has less damping: what may hide between the points of a sweep follows from it
-    #[arg(long, value_name = "RATIO", default_value_t = 0.005, requires = "frf")]
+    #[arg(long, value_name = "RATIO", default_value_t = LEAST_DAMPING, requires = "frf")]
     pub min_damping: f64,
     /// The sweep was taken through the controller's own hold, which is then not applied again
     #[arg(long, requires = "frf")]

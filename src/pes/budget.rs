@@ -201,24 +201,37 @@ pub fn predict(
     profile: &Profile,
     settings: &PredictSettings,
 ) -> Result<Prediction, PesError> {
+    Ok(predict_each(plant, controller, profile, settings, [settings.model_error])?[0])
+}
+
+/// The same for several model errors, over the same draws; that of the settings does not count.
+pub fn predict_each<const N: usize>(
+    plant: &Plant,
+    controller: &Controller,
+    profile: &Profile,
+    settings: &PredictSettings,
+    model_errors: [f64; N],
+) -> Result<[Prediction; N], PesError> {
     let run = Runner::new(plant, controller, profile)?;
     let mut random = crate::numeric::random::Random::stream(settings.seed, 21);
-    let (mut low, mut high) = (Vec::new(), Vec::new());
+    let mut drawn = Vec::with_capacity(settings.draws.max(1));
     let mut p = profile.clone();
     for i in 0..settings.draws.max(1) {
         p.noise.seed = settings.seed + i as u64;
-        let [a, b, _] = run.figures(&run.window(&p)?);
+        let [low, high, _] = run.figures(&run.window(&p)?);
         // Model and noise levels are off by a common factor: one draw of it for each record.
-        let factor = (settings.model_error * random.normal()).exp();
-        low.push(a * factor);
-        high.push(b * factor);
+        drawn.push((low, high, random.normal()));
     }
     let range = |mut x: Vec<f64>| {
         x.sort_by(f64::total_cmp);
         let out = 0.5 * (1.0 - settings.level);
         Range { median: quantile(&x, 0.5), low: quantile(&x, out), high: quantile(&x, 1.0 - out) }
     };
-    Ok(Prediction { dft_low: range(low), dft_high: range(high), level: settings.level })
+    Ok(model_errors.map(|error| Prediction {
+        dft_low: range(drawn.iter().map(|(low, _, n)| low * (error * n).exp()).collect()),
+        dft_high: range(drawn.iter().map(|(_, high, n)| high * (error * n).exp()).collect()),
+        level: settings.level,
+    }))
 }
 
 /// Quantile of ascending values; place p (n + 1), as unbiased ranges of future draws need it.

@@ -16,7 +16,7 @@ mod simulation;
 mod spectral;
 mod window_frame;
 
-pub use budget::{Budget, PredictSettings, Prediction, Range, Source, SourceShare, budget, predict};
+pub use budget::{Budget, PredictSettings, Prediction, Range, Source, SourceShare, budget, predict, predict_each};
 pub use dft::{Harmonic, WindowDft};
 pub use expected::{ExpectedNoise, NoiseWork};
 pub use figures::{HIGH_BAND_HZ, LOW_BAND_HZ, PesFigures, figures};

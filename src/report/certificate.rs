@@ -84,6 +84,44 @@ pub fn certificate_text(c: &Certificate) -> Result<String, ReportError> {
     Ok(text)
 }
 
+/// The verdict in a sentence: what is not proved, by how much, and what to sweep again.
+pub fn certificate_sentence(c: &Certificate) -> String {
+    if c.proved {
+        return "Proved: every limit holds at every frequency.".into();
+    }
+    let mut parts = Vec::new();
+    let many = c.cases.len() > 1;
+    for (i, case) in c.cases.iter().enumerate() {
+        let of = if many { format!("machine {}: ", i + 1) } else { String::new() };
+        match case.bounds.stability {
+            Stability::Stable => {}
+            Stability::Unstable => parts.push(format!("{of}the loop is unstable")),
+            Stability::Undecided => parts.push(format!("{of}stability is not proved")),
+        }
+        for l in case.limits.iter().filter(|l| l.verdict != Verdict::Proved) {
+            let (side, end, way) = if l.side == "at_least" {
+                ("at least", l.proven.low, "at least")
+            } else {
+                ("at most", l.proven.high, "at most")
+            };
+            let proven = match end {
+                Some(x) => format!("{way} {x:.4} is proved"),
+                None if case.write.is_none() && l.proven.high.is_none() => "a sweep alone does not prove it".into(),
+                None => "no bound is proved".into(),
+            };
+            parts.push(format!("{of}{} {side} {} {} ({proven})", l.name, l.required, l.unit));
+        }
+        parts.extend(case.sweep_again.iter().map(|s| {
+            format!(
+                "{of}sweep {:.1} to {:.1} Hz again, points at most {:.3} Hz apart",
+                s.low_hz, s.high_hz, s.spacing_hz
+            )
+        }));
+    }
+    parts.extend(c.findings.iter().map(|f| sentence(f).trim_end_matches('.').to_owned()));
+    format!("Not proved: {}.", parts.join("; "))
+}
+
 /// A finding in words.
 pub fn sentence(f: &Finding) -> String {
     let number = |x: &Option<f64>| x.map_or("none".to_owned(), |x| x.to_string());

@@ -34,8 +34,8 @@ pub fn limit_table(limit: &Limit, gains: Option<&Standing>, unit: &str) -> Resul
     Ok(table)
 }
 
-/// What limit, gains and search say together.
-pub fn limit_sentences(limit: &Limit, gains: Option<&Standing>, searched: Option<&Standing>) -> String {
+/// What limit, gains and search (with its number of starts) say together.
+pub fn limit_sentences(limit: &Limit, gains: Option<&Standing>, searched: Option<(&Standing, usize)>) -> String {
     let mut text = String::new();
     let percent = |a: f64, b: f64| 100.0 * (a / b - 1.0);
     if limit.verdict == Verdict::Impossible {
@@ -49,9 +49,9 @@ pub fn limit_sentences(limit: &Limit, gains: Option<&Standing>, searched: Option
                 g.tail, limit.tail
             );
         }
-        if let Some(s) = searched.filter(|s| s.figures.objective > 0.0) {
+        if let Some((s, starts)) = searched.filter(|(s, _)| s.figures.objective > 0.0) {
             text += &format!(
-                "These gains are within {:.2} % of the best found in their structure by a wide search (evidence, no bound).\n",
+                "These gains are within {:.2} % of the best found in their structure by a search from {starts} starts (evidence, no bound).\n",
                 percent(g.figures.objective, s.figures.objective).max(0.0)
             );
         }

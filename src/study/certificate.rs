@@ -15,11 +15,24 @@ const ROWS: u64 = 1000;
 /// Changes of each kind and machine.
 const CHANGES: u64 = 250;
 
-/// Makes the study; `data` is the folder with the benchmark plant.
-pub fn certificate(data: &Path) -> Result<Study, StudyError> {
-    let cases = loops(LOOPS)?;
+/// Loops judged between two words of progress.
+const CHUNK: u64 = 5_000;
+
+/// Makes the study; `data` is the folder with the benchmark plant, `say` hears how far it is.
+pub fn certificate(data: &Path, say: &mut dyn FnMut(&str)) -> Result<Study, StudyError> {
     let certified = machines()?;
+    say("machines: tuned and certified");
     let changed = mutations(&certified, CHANGES)?;
+    say("changed tables: done");
+    let nine = benchmark(data)?;
+    say("benchmark plant: done");
+    let swept = sweeps()?;
+    say("sweeps: done");
+    let mut cases = Vec::new();
+    for from in (0..LOOPS).step_by(CHUNK as usize) {
+        cases.extend(loops(from..(from + CHUNK).min(LOOPS))?);
+        say(&format!("loops: {} of {LOOPS}", cases.len()));
+    }
     let mut study = Study::default();
     let mut text = format!(
         "# Certificate\n\n\
@@ -33,13 +46,18 @@ pub fn certificate(data: &Path) -> Result<Study, StudyError> {
     text += &loop_table(&cases);
     text += "\n## The four machines: table and certificate\n\nTuned to `specs/limits/paper.toml` from `specs/controllers/nominal.toml`.\n\n";
     text += &machine_table(&certified);
+    let apart = certified.iter().map(|m| m.dft_apart).fold(0.0, f64::max);
+    text += &format!(
+        "\nThe DFT figures are those of one record on the plant as it stands; no box is around them. Their half width, 1e-9 of the travel, is an assumption and no theorem. The certificate's \
+         simulation and the search's, which share no code, lie within {apart:.1e} of the travel of each other on these machines.\n"
+    );
     for m in &certified {
         text += &format!("\n### {}\n\n```text\n{}```\n", m.class.name(), certificate_text(&m.certificate)?);
     }
     text += "\n## The nine cases of the HDD benchmark plant\n\n";
-    text += &benchmark(data)?;
+    text += &nine;
     text += "\n## Sweeps with modes between their points\n\n";
-    text += &sweeps()?;
+    text += &swept;
     text += "\n## Changed tables and certificates\n\n\
              | change | tried | caught by the proof alone | caught with the certificate beside the table |\n|---|---|---|---|\n";
     for (kind, c) in changed {
@@ -84,7 +102,7 @@ fn loop_table(cases: &[LoopCase]) -> String {
 
 fn machine_table(all: &[Certified]) -> String {
     let mut text = format!(
-        "| machine | search | certificate | over the box (gain {} %, frequency {} %, damping {} %, delay {} %) | coefficients in 24 bits, 20 behind the point |\n\
+        "| machine | search | certificate | over the box (gain {} %, frequency {} %, damping {} %, delay {} %) | coefficients in 24 bits, 18 behind the point |\n\
          |---|---|---|---|---|\n",
         100.0 * BOX.gain,
         100.0 * BOX.frequency,

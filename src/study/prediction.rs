@@ -6,7 +6,7 @@ use crate::feedback::{ModelLoop, margins};
 use crate::identify::{IdentifySettings, OrderChoice, identify};
 use crate::lti::{Body, DiscretePlant, Plant};
 use crate::numeric::random::Random;
-use crate::pes::{PredictSettings, figures, predict, simulate};
+use crate::pes::{PredictSettings, figures, predict_each, simulate};
 use crate::report::number::NumberFormat;
 use crate::report::table::{Column, Table};
 use crate::twin::plants::{log_grid, measure};
@@ -129,16 +129,13 @@ fn machine(i: u64) -> Result<Vec<Judged>, StudyError> {
             continue;
         }
         let mut profile = paper_profile(class)?;
-        let runs = ERRORS.map(|model_error| {
-            predict(&model, &c, &profile, &PredictSettings { model_error, ..PredictSettings::default() })
-        });
+        let runs = predict_each(&model, &c, &profile, &PredictSettings::default(), ERRORS)?;
         profile.noise.seed = 1_000_000 + 1000 * i + run;
         let record = figures(&simulate(&truth, &c, &profile)?.pes, &profile);
         for (band, seen) in [(0, record.dft_low), (1, record.dft_high)] {
             let mut inside = [false; ERRORS.len()];
             let mut error_db = 0.0;
             for (k, p) in runs.iter().enumerate() {
-                let p = p.as_ref().map_err(Clone::clone)?;
                 let r = if band == 0 { p.dft_low } else { p.dft_high };
                 inside[k] = (r.low..=r.high).contains(&seen);
                 if k == 0 {

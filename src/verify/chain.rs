@@ -104,7 +104,7 @@ impl Chain {
         for r in &self.sections {
             let s = &r.section;
             let over = factor([1.0, s.a1, s.a2], &r.poles, z, half);
-            let beside = r.zeros.iter().any(|root| (z - root).norm() < 3.0 * half + 1e-9);
+            let beside = r.zeros.iter().any(|root| (z - root).norm_sqr().sqrt() < 3.0 * half + 1e-9);
             let zeros = if beside {
                 zero([s.b0, s.b1, s.b2], back, half)
             } else {
@@ -127,8 +127,8 @@ fn quadratic([a, b, c]: [f64; 3], q: Complex<f64>) -> (Complex<f64>, Complex<f64
 fn factor(of: [f64; 3], roots: &[Complex<f64>], z: Complex<f64>, half: f64) -> Expansion {
     let (value, first, rounding) = quadratic(of, z.conj());
     let bend = roots.iter().map(|root| {
-        let near = ((z - root).norm() - half).max(0.0);
-        root.norm() / (near * near)
+        let near = ((z - root).norm_sqr().sqrt() - half).max(0.0);
+        root.norm_sqr().sqrt() / (near * near)
     });
     Expansion { value, slope: first / value, bend: bend.sum(), rounding: rounding / value.norm(), zeros: None }
 }

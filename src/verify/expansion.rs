@@ -108,7 +108,7 @@ impl Expansion {
     /// logarithmic part.
     #[inline]
     pub fn term(&self, half: f64) -> Term {
-        let steep = self.slope.norm() + half * self.bend;
+        let steep = self.slope.norm_sqr().sqrt() + half * self.bend;
         let size = self.value.norm();
         let most = size * (half * steep).exp() * (1.0 + self.rounding);
         let bounds = [most, most * steep, most * (steep * steep + self.bend)];

@@ -28,7 +28,7 @@ pub use certificate::{CaseProof, Certificate, Inputs, ProvenLimit, SCHEMA, Sourc
 pub use error::VerifyError;
 pub use range::Range;
 pub use settings::VerifySettings;
-pub use swept::{SweepAgain, SweepAssumption};
+pub use swept::{LEAST_DAMPING, SweepAgain, SweepAssumption};
 pub use table::Finding;
 pub use uncertain::Uncertainty;
 pub use word::Word;

@@ -2,7 +2,7 @@
 
 use super::chain::Chain;
 use super::plant::{END, Product, RigidBody};
-use super::uncertain::Spread;
+use super::uncertain::{Others, Spread};
 use super::{Patch, Range, Uncertainty, VerifyError};
 use crate::lti::{Plant, Section};
 use nalgebra::Complex;
@@ -66,13 +66,13 @@ impl Sampled {
         self.expand(a, b).0
     }
 
-    /// The nominal patch, and the size of all aliases but the first (upper bound over the cell).
-    fn expand(&self, a: f64, b: f64) -> (Patch, f64) {
+    /// The nominal patch, and the sizes of all aliases but the first.
+    fn expand(&self, a: f64, b: f64) -> (Patch, Others) {
         let (angle, half) = (0.5 * (a + b), 0.5 * (b - a));
         let common = self.chain.expand(angle, half).times(Product::hold(angle));
         let main = common.times(self.product.alias(angle, half, 0)).term(half);
         let (mut centre, mut slope, mut radius) = (main.value, main.first, main.remainder);
-        let mut others = 0.0;
+        let mut others = Others::default();
         for k in 1..=self.product.whole as i64 {
             for k in [k, -k] {
                 let e = common.times(self.product.alias(angle, half, k)).times(Product::share(angle, half, k));
@@ -80,7 +80,8 @@ impl Sampled {
                 centre += e.value;
                 slope += e.first;
                 radius += e.remainder;
-                others += e.most;
+                others.most += e.most;
+                others.times += e.most * k.unsigned_abs() as f64;
             }
         }
         let (far, error) = self.product.far(angle, half);
@@ -89,8 +90,12 @@ impl Sampled {
         centre += far.value;
         slope += far.first;
         radius += far.remainder + error;
-        let patch = Patch { centre, half: slope * half, radius, floor: error, gain: Range::ZERO, turn: Range::ZERO };
-        (patch, others + far.most + error)
+        let (gain, turn) = (Range::ZERO, Range::ZERO);
+        let radius = if radius.is_nan() { f64::INFINITY } else { radius };
+        let patch = Patch { centre, half: slope * half, radius, floor: error, gain, turn, stuck: 0.0 };
+        others.far = far.most + error;
+        others.most += others.far;
+        (patch, others)
     }
 }
 
@@ -100,7 +105,7 @@ impl Enclosed for Sampled {
         let (patch, others) = self.expand(a, b);
         match &self.spread {
             None => into.push(patch),
-            Some(s) => s.patches(&patch, others, [a, b], into),
+            Some(s) => s.patches(&patch, &others, [a, b], into),
         }
     }
 

@@ -22,6 +22,8 @@ pub(super) struct Patch {
     pub gain: Range,
     /// Angle (rad) by which uncertainty may turn.
     pub turn: Range,
+    /// The wider of both at one frequency: what of them no smaller cell takes away.
+    pub stuck: f64,
 }
 
 /// A set this much wider than its certain part gains nothing from smaller cells.
@@ -37,7 +39,7 @@ impl Patch {
         let to = point - self.centre;
         let size = self.half.norm_sqr();
         let t = if size > 0.0 { ((to.re * self.half.re + to.im * self.half.im) / size).clamp(-1.0, 1.0) } else { 0.0 };
-        (to - self.half * t).norm()
+        (to - self.half * t).norm_sqr().sqrt()
     }
 
     /// Whether nothing is uncertain.
@@ -45,24 +47,31 @@ impl Patch {
         self.gain.width() == 0.0 && self.turn.width() == 0.0
     }
 
-    /// Whether a smaller cell would have a markedly smaller patch: the certain part is neither dwarfed by what uncertainty adds nor by
-    /// what no cell takes away.
+    /// Whether a smaller cell would have a markedly smaller patch: what it would take away is not dwarfed by what uncertainty adds
+    /// at a single frequency, nor by the floor.
     pub fn coarse(&self) -> bool {
-        let own = self.half.norm() + self.radius - self.floor;
-        let spread = self.gain.width().max(self.turn.width()) * self.centre.norm();
-        own > SPREAD_SHARE * spread && self.shrinks()
+        if !self.radius.is_finite() {
+            return true;
+        }
+        let size = self.centre.norm();
+        // Over a cell every uncertain factor also carries its own run along the cell.
+        let run = (self.gain.width().max(self.turn.width()) - self.stuck).max(0.0) * size;
+        let own = self.half.norm() + self.radius - self.floor + run;
+        own > SPREAD_SHARE * self.stuck * size && own > FLOOR_SHARE * self.floor
     }
 
     /// Whether a smaller cell would have a smaller certain part.
     pub fn shrinks(&self) -> bool {
-        self.half.norm() + self.radius - self.floor > FLOOR_SHARE * self.floor
+        // A cell as wide as the distance of a pole has no bound yet.
+        !self.radius.is_finite() || self.half.norm() + self.radius - self.floor > FLOOR_SHARE * self.floor
     }
 
     /// |L|.
     pub fn size(&self) -> Range {
         let low = (self.to_segment(Complex::new(0.0, 0.0)) - self.radius).max(0.0);
         let high = (self.centre - self.half).norm().max((self.centre + self.half).norm()) + self.radius;
-        Range { low: low * self.gain.low.exp(), high: high * self.gain.high.exp() }
+        let r = Range { low: low * self.gain.low.exp(), high: high * self.gain.high.exp() }.sound();
+        Range { low: r.low.max(0.0), ..r }
     }
 
     /// Angle from -180 deg to L (rad), on the branch of the centre in (-pi, pi]; none where L may be 0.
@@ -179,7 +188,7 @@ mod tests {
         let mut c = |s: f64| Complex::new(r.between(-s, s), r.between(-s, s));
         let (centre, half) = (c(3.0), c(0.4));
         let (gain, turn) = (Range::between(-spread, 0.5 * spread), Range::between(-0.3 * spread, spread));
-        Patch { centre, half, radius: r.between(0.0, 0.2), floor: 0.0, gain, turn }
+        Patch { centre, half, radius: r.between(0.0, 0.2), floor: 0.0, gain, turn, stuck: 0.0 }
     }
 
     /// Every member of the set obeys every bound; members are drawn, the bounds are not.
@@ -218,6 +227,7 @@ mod tests {
             floor: 0.0,
             gain: Range::ZERO,
             turn: Range::ZERO,
+            stuck: 0.0,
         };
         assert!((p.balance() - ((1.0 + l) / (1.0 - l)).norm()).abs() < 1e-12);
         assert!((p.distance() - (1.0 + l).norm()).abs() < 1e-15);

@@ -36,6 +36,12 @@ impl Range {
         Range { low: self.low - by, high: self.high + by }
     }
 
+    /// The range with an end that is no number moved to infinity: nothing is known there.
+    pub fn sound(self) -> Range {
+        let or = |x: f64, none: f64| if x.is_nan() { none } else { x };
+        Range { low: or(self.low, f64::NEG_INFINITY), high: or(self.high, f64::INFINITY) }
+    }
+
     /// High less low.
     pub fn width(self) -> f64 {
         self.high - self.low

@@ -12,6 +12,9 @@ use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+/// Least damping of a mode where nobody says another.
+pub const LEAST_DAMPING: f64 = 0.005;
+
 /// How a sweep is to be taken.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -131,14 +134,17 @@ impl Swept {
             common = common.times(Product::hold(angle));
         }
         let floor = common.term(half).most * gap.error;
+        let floor = if floor.is_nan() { f64::INFINITY } else { floor };
         let l = common.times(Expansion::plain(jet)).term(half);
+        let radius = if l.remainder.is_nan() { f64::INFINITY } else { l.remainder };
         Patch {
             centre: l.value,
             half: l.first * half,
-            radius: l.remainder + floor,
+            radius: radius + floor,
             floor,
             gain: self.gain,
             turn: Range::ZERO,
+            stuck: self.gain.width(),
         }
     }
 }

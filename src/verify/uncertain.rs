@@ -7,7 +7,7 @@ use super::plant::{Product, Quadratic, RigidBody};
 use super::{Patch, Range};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 /// Relative half widths of a parameter box; 0 is certain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -42,8 +42,19 @@ pub(super) struct Spread {
     t: f64,
     frequency: f64,
     damping: f64,
-    /// The most that the modes' box multiplies any alias beyond the first by.
-    alias_most: f64,
+    /// Bound of |ln| of what the box multiplies any alias beyond the first by, gain and delay aside.
+    alias_ratio: f64,
+}
+
+/// Sizes of the aliases beside the first over a cell.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Others {
+    /// Upper bound of all together.
+    pub most: f64,
+    /// Of those summed whole, each times the whole turns that it lies away.
+    pub times: f64,
+    /// Of those beyond.
+    pub far: f64,
 }
 
 /// Largest share of a radian or of ln that a piece may move by.
@@ -55,6 +66,13 @@ const PIECES: usize = 400;
 type Move = (Range, Range);
 const STAYS: Move = (Range::ZERO, Range::ZERO);
 
+/// One piece of a factor's range over a cell, and how wide its moves are at a single frequency: what no smaller cell takes away.
+#[derive(Clone, Copy)]
+struct Piece {
+    moves: Move,
+    still: f64,
+}
+
 impl Spread {
     pub fn of(p: &Product, u: &super::Uncertainty) -> Spread {
         let mut factors: Vec<Factor> = p.modes.iter().map(|[z, p]| (Some(*z), *p)).collect();
@@ -63,84 +81,123 @@ impl Spread {
         }
         let mut spread = Spread {
             factors,
-            alias_most: 1.0,
+            alias_ratio: 0.0,
             gain: Range { low: (1.0 - u.gain).max(1e-9).ln(), high: (1.0 + u.gain).ln() },
             delay_s: u.delay * p.delay_s,
             t: p.t,
             frequency: u.frequency,
             damping: u.damping,
         };
-        spread.alias_most = spread.over_aliases();
+        spread.alias_ratio = spread.factors.iter().map(|f| spread.over_aliases(f)).sum();
         spread
     }
 
-    /// The most that the modes' box multiplies the plant by anywhere above half the rate, from bands 2 % wide up to three times
-    /// the highest mode; above that every factor has settled to within its frequency range squared.
-    fn over_aliases(&self) -> f64 {
-        let top = self.factors.iter().map(|f| f.1.w0.max(f.0.map_or(0.0, |z| z.w0))).fold(0.0, f64::max);
-        let mut w = PI / self.t;
-        let mut most = f64::NEG_INFINITY;
-        while w < (3.0 * top).max(1.1 * PI / self.t) {
-            let band = Range { low: w, high: 1.02 * w };
-            most = most.max(self.factors.iter().map(|f| hull(&self.pieces(f, band)).0.high).sum());
-            w = band.high;
-        }
-        let settled = (1.0 + self.frequency).powi(2).ln() * self.factors.len() as f64;
-        most.max(settled).exp()
-    }
-
-    /// Patches of the whole box over the cell; `others` bounds the aliases beside the first.
-    pub fn patches(&self, nominal: &Patch, others: f64, [a, b]: [f64; 2], into: &mut Vec<Patch>) {
+    /// Patches of the whole box over the cell, from the aliases beside the first.
+    pub fn patches(&self, nominal: &Patch, others: &Others, [a, b]: [f64; 2], into: &mut Vec<Patch>) {
         let w = Range { low: a / self.t, high: b / self.t };
         let delay = self.delay_s * w.high;
         let (mut gain, mut turn) = (Range::ZERO, Range { low: -delay, high: delay });
-        let mut active: Vec<Move> = vec![STAYS];
+        let mut active = vec![Piece { moves: STAYS, still: 0.0 }];
+        let mut stuck = self.gain.width() + 2.0 * delay;
         for f in &self.factors {
-            let pieces = self.pieces(f, w);
+            let mut pieces = self.pieces(f, w);
             if pieces.len() > active.len() {
-                let (g, t) = hull(&active);
-                (gain, turn) = (gain.plus(g), turn.plus(t));
-                active = pieces;
-            } else {
-                let (g, t) = hull(&pieces);
-                (gain, turn) = (gain.plus(g), turn.plus(t));
+                std::mem::swap(&mut active, &mut pieces);
             }
+            let (g, t) = hull(&pieces);
+            (gain, turn) = (gain.plus(g), turn.plus(t));
+            stuck += pieces.iter().map(|p| p.still).fold(0.0, f64::max);
         }
-        for (g, t) in active {
-            let gain = gain.plus(g);
-            // The other aliases may stretch by their own most and turn by anything; the stretch of the first, which is applied to the
-            // whole patch, is taken out of their rim again.
-            let rim = others * (1.0 + self.alias_most * (-gain.low).exp());
+        let lag = others.times * TAU * self.delay_s / self.t + 2.0 * others.far;
+        for p in active {
+            let (gain, turn) = (gain.plus(p.moves.0).sound(), turn.plus(p.moves.1).sound());
+            // The patch is moved as a whole, as its first alias is; the others, which move by no more than their ratio says, are off by the
+            // difference: |e^x - 1| <= e^|x| - 1. Their delay turns them by whole turns a sample more.
+            let own = gain.low.abs().max(gain.high.abs()).hypot(turn.low.abs().max(turn.high.abs()));
+            let apart = (self.alias_ratio + own).exp();
+            let late = if self.delay_s > 0.0 { lag.min(2.0 * others.most) } else { 0.0 };
+            let rim = others.most * (apart - 1.0) + apart * late;
+            // Where a factor may vanish its logarithm has no bound, and nothing is known.
+            let rim = if rim.is_nan() { f64::INFINITY } else { rim };
             into.push(Patch {
                 radius: nominal.radius + rim,
                 floor: nominal.floor + rim,
                 gain: gain.plus(self.gain),
-                turn: turn.plus(t),
+                turn,
+                stuck: stuck + p.still,
                 ..*nominal
             });
         }
     }
 
     /// What one factor may do over the cell, piece by piece of its frequency range.
-    fn pieces(&self, f: &Factor, w: Range) -> Vec<Move> {
+    fn pieces(&self, f: &Factor, w: Range) -> Vec<Piece> {
         if self.frequency == 0.0 && self.damping == 0.0 {
-            return vec![STAYS];
+            return vec![Piece { moves: STAYS, still: 0.0 }];
         }
         // The set over the piece is m(w/f), which is the factor itself over a moved range of w.
         let (low, high) = ((1.0 - self.frequency).max(1e-3), 1.0 + self.frequency);
         let full = Range { low: w.low / high, high: w.high / low };
+        let ratio = self.ratio(f, full);
+        if ratio < PIECE {
+            let moves = Range { low: -ratio, high: ratio };
+            return vec![Piece { moves: (moves, moves), still: 2.0 * ratio }];
+        }
         let nearest = f.1.reach(full).min(f.0.map_or(f64::INFINITY, |z| z.reach(full)));
         let count = ((full.width() / (PIECE * nearest)).ceil() as usize).clamp(1, PIECES);
         let nominal = self.over(f, w, 0.0);
+        let middle = 0.5 * (w.low + w.high);
+        let point = Range { low: middle / high, high: middle / low };
+        let part = |r: Range, i: usize| {
+            let at = |i: usize| r.low + r.width() * i as f64 / count as f64;
+            self.over(f, Range { low: at(i), high: at(i + 1) }, self.damping)
+        };
+        // The nominal value over the cell is taken out again.
+        let out = |m: Range, n: Range| Range { low: m.low - n.high, high: m.high - n.low }.sound();
         (0..count)
             .map(|i| {
-                let at = |i: usize| full.low + full.width() * i as f64 / count as f64;
-                let moved = self.over(f, Range { low: at(i), high: at(i + 1) }, self.damping);
-                // The nominal value over the cell is taken out again.
-                let out = |m: Range, n: Range| Range { low: m.low - n.high, high: m.high - n.low };
-                (out(moved.0, nominal.0), out(moved.1, nominal.1))
+                let (moved, still) = (part(full, i), part(point, i));
+                let moves = (out(moved.0, nominal.0), out(moved.1, nominal.1));
+                Piece { moves, still: still.0.width().max(still.1.width()) }
             })
             .collect()
+    }
+
+    /// Bound of |ln(m moved / m)| at any frequency of a range that holds the moves: the logarithm's slopes times the moves.
+    ///
+    /// d ln q/d ln u = 2 - 2 (1 + j d u)/q = -2 u (u - j d)/q for q = 1 - u² + 2 j d u; in a mode the 2 of zero and pole cancel.
+    fn ratio(&self, (zero, pole): &Factor, full: Range) -> f64 {
+        let one = |q: &Quadratic| {
+            let (u, d) = (full.high / q.w0, q.damping.abs() * (1.0 + self.damping));
+            let least = q.over(full, self.damping).0.low.exp();
+            [2.0 * (1.0 + d * u) / least, 2.0 * u * (u + d) / least, 2.0 * d * u / least]
+        };
+        let p = one(pole);
+        let z = zero.as_ref().map_or([2.0, 0.0, 0.0], one);
+        self.moved((p[0] + z[0]).min(p[1] + z[1]), p[2] + z[2])
+    }
+
+    /// What slopes over ln of frequency and of damping come to over the box; a slope without a move may be anything.
+    fn moved(&self, frequency: f64, damping: f64) -> f64 {
+        let by = |share: f64, slope: f64| if share > 0.0 { share * slope } else { 0.0 };
+        by(-(1.0 - self.frequency).max(1e-3).ln(), frequency) + by(self.damping, damping)
+    }
+
+    /// The same over all aliases but the first: from half the rate on. Beyond its resonance each slope falls with u.
+    fn over_aliases(&self, (zero, pole): &Factor) -> f64 {
+        let one = |q: &Quadratic| {
+            let u = PI / self.t / q.w0 / (1.0 + self.frequency);
+            let [low, high] = [1.0 - self.damping, 1.0 + self.damping].map(|x| x * q.damping.abs());
+            if u > 1.0 {
+                let size = (u * u - 1.0).hypot(2.0 * low * u);
+                return [2.0 * (1.0 + high * u) / size, 2.0 * high * u / size];
+            }
+            let dip = if low * low < 0.5 { 2.0 * low * (1.0 - low * low).sqrt() } else { 1.0 };
+            [2.0 * (1.0 + 2.0 * high) / dip.min(3.0), if high > 0.0 { high / low } else { 0.0 }]
+        };
+        let p = one(pole);
+        let z = zero.as_ref().map_or([2.0, 0.0], one);
+        self.moved(p[0] + z[0], p[1] + z[1])
     }
 
     /// ln of size and angle of the factor, 1 at rest, over a range of frequencies and a range of damping.
@@ -152,8 +209,9 @@ impl Spread {
     }
 }
 
-fn hull(all: &[Move]) -> Move {
-    all.iter().skip(1).fold(all[0], |h, m| (h.0.hull(m.0), h.1.hull(m.1)))
+fn hull(all: &[Piece]) -> Move {
+    let first = all.first().map_or(STAYS, |p| p.moves);
+    all.iter().skip(1).fold(first, |h, p| (h.0.hull(p.moves.0), h.1.hull(p.moves.1)))
 }
 
 impl Quadratic {
