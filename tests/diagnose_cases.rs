@@ -203,8 +203,8 @@ fn a_line_whose_phase_differs_between_repeats_is_a_finding_and_no_noise() {
 
 #[test]
 fn a_narrow_band_of_noise_is_no_hum() {
-    // A lightly damped filter (5 Hz wide, so that it forgets within a third of a record) driven by white noise.
-    let (pole, hz, amplitude) = ((-std::f64::consts::PI * 5.0 * T).exp(), 137.0, 4.0 * NOISE);
+    // A lightly damped filter (20 Hz wide, so that it forgets within a tenth of a record) driven by white noise.
+    let (pole, hz, amplitude) = ((-std::f64::consts::PI * 20.0 * T).exp(), 137.0, 4.0 * NOISE);
     let turn = 2.0 * pole * (std::f64::consts::TAU * hz * T).cos();
     let mut r = Random::new(5);
     let mut records = records(&GIVEN);
