@@ -2,7 +2,7 @@
 
 use super::diagnose_arguments::DiagnoseArguments;
 use super::{Ending, Failure, Screen, load};
-use crate::diagnose::{DiagnoseSettings, Verdict, diagnose};
+use crate::diagnose::{DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use crate::document::write_text;
 use crate::lti::PlantFile;
 use crate::recording::{Case, Record, RecordEntry, Role};
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// The file of the corrected model, in the output folder.
 const CORRECTED: &str = "plant_corrected.toml";
 /// The page for people, beside it.
-const REPORT: &str = "report.html";
+pub(super) const REPORT: &str = "report.html";
 
 /// What the report was made from.
 fn provenance(case: &Case) -> Vec<(String, String)> {
@@ -63,6 +63,14 @@ fn case(a: &DiagnoseArguments) -> Result<Case, Failure> {
 }
 
 pub(super) fn run(a: &DiagnoseArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let (diagnosis, text) = make(a, screen)?;
+    screen.result(&diagnosis, &text)?;
+    let sure = matches!(diagnosis.verdict, Verdict::NoMismatch | Verdict::Refit | Verdict::Named | Verdict::Family);
+    Ok(if sure { Ending::Accepted } else { Ending::Rejected })
+}
+
+/// Diagnoses and writes every file; gives the diagnosis and what a person reads of it.
+pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagnosis, String), Failure> {
     let case = case(a)?;
     let plant = load::plant(&case.plant)?;
     let controller = case.controller.as_ref().map(|f| load::controller(f)).transpose()?;
@@ -117,7 +125,5 @@ pub(super) fn run(a: &DiagnoseArguments, screen: &mut Screen) -> Result<Ending, 
     }
     let next = &diagnosis.next_experiment;
     let _ = writeln!(text, "  next: {} (expected separation {:.1})", next.what, next.expected_separation);
-    screen.result(&diagnosis, &text)?;
-    let sure = matches!(diagnosis.verdict, Verdict::NoMismatch | Verdict::Refit | Verdict::Named | Verdict::Family);
-    Ok(if sure { Ending::Accepted } else { Ending::Rejected })
+    Ok((diagnosis, text))
 }

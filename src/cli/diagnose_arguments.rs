@@ -59,6 +59,25 @@ pub(super) struct DiagnoseArguments {
 }
 
 impl DiagnoseArguments {
+    /// A case folder, nothing else asked for.
+    pub(super) fn of_case(case: PathBuf, out: PathBuf) -> DiagnoseArguments {
+        DiagnoseArguments {
+            case: Some(case),
+            record: Vec::new(),
+            holdout: Vec::new(),
+            repeats: false,
+            plant: None,
+            controller: None,
+            columns: None,
+            sample_rate_hz: None,
+            rows: None,
+            holdout_rows: None,
+            spindle_hz: None,
+            bootstrap: 0,
+            out,
+        }
+    }
+
     /// How records are read.
     pub(super) fn settings(&self, rows: Option<[usize; 2]>) -> RecordSettings {
         RecordSettings {

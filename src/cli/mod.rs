@@ -7,6 +7,7 @@ mod arguments;
 mod budget;
 mod classify;
 mod demo;
+mod demo_diagnosis;
 mod demo_gate;
 mod diagnose;
 mod diagnose_arguments;

@@ -90,17 +90,15 @@ const PRINTED: f64 = 1e-7;
 /// Samples at the start over which a command at rest is averaged.
 const AT_REST: usize = 16;
 
-/// Samples for which nothing drives the machine at the start, up to [`AT_REST`]: the reference stands still and the excitation is
-/// off.
-fn still(reference: Option<&[f64]>, excitation: &[f64]) -> usize {
-    let quiet = |(r, e): &(&f64, &f64), r0: f64| **r == r0 && **e == 0.0;
-    reference.map_or(0, |r| r.iter().zip(excitation).take(AT_REST).take_while(|x| quiet(x, r[0])).count())
+/// Samples for which a reference stands still at the start, up to [`AT_REST`].
+fn still(reference: Option<&[f64]>) -> usize {
+    reference.map_or(0, |r| r.iter().take(AT_REST).take_while(|v| **v == r[0]).count())
 }
 
-/// A signal before its record began: its mean over the `still` samples, what the controller held against springs and cables for
-/// instance; the first sample where there are none.
-fn first(signal: &[f64], still: usize) -> f64 {
-    let n = still.max(1).min(signal.len());
+/// A signal before its record began: its mean as long as the reference stands still, what the controller held against springs
+/// and cables for instance; otherwise the first sample.
+fn first(signal: &[f64], reference: Option<&[f64]>) -> f64 {
+    let n = still(reference).max(1).min(signal.len());
     signal[..n].iter().sum::<f64>() / n as f64
 }
 
@@ -116,16 +114,15 @@ pub fn runs(case: &Case) -> Vec<Run> {
                 groups.push(key);
                 groups.len() - 1
             });
-            let still = still(record.reference.as_deref(), &record.excitation);
             let input: Vec<f64> = record.command.iter().zip(&record.excitation).map(|(c, e)| c + e).collect();
             Run {
                 name: entry.name(),
                 role: entry.role,
                 group,
-                rested: still >= AT_REST.min(record.position.len()),
+                rested: still(record.reference.as_deref()) >= AT_REST.min(record.position.len()),
                 bumped: false,
-                before: first(&record.command, still),
-                origin: first(&record.position, still),
+                before: first(&record.command, record.reference.as_deref()),
+                origin: first(&record.position, record.reference.as_deref()),
                 reference: record.reference.clone(),
                 command: record.command.clone(),
                 excitation: record.excitation.clone(),

@@ -95,7 +95,13 @@ fn logarithmic(view: &View, policy: Ticks, length: f64, spacing: f64) -> Vec<Tic
 pub(super) fn label(value: f64, step: f64) -> String {
     let size = value.abs();
     if value != 0.0 && !(1e-5..1e7).contains(&size.max(step)) {
-        return typographic(&format!("{:e}", (value / step).round() * step));
+        // As many digits as the step asks for: 5e-6 is not 4.9999999999999996e-6.
+        let digits = (size.log10().floor() - step.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+        let text = format!("{value:.digits$e}");
+        let (mantissa, power) = text.split_once('e').unwrap_or((&text, "0"));
+        let short =
+            if mantissa.contains('.') { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa };
+        return typographic(&format!("{short}e{power}"));
     }
     let decimals = (-(step.abs().log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
     let text = format!("{value:.decimals$}");
@@ -119,6 +125,13 @@ mod tests {
         let view = View::new(Scale::Log10, 40.0, 5000.0);
         let text = labels(view, Ticks::Decimal, 600.0, 60.0);
         assert_eq!(text, ["50", "100", "200", "500", "1000", "2000", "5000"]);
+    }
+
+    #[test]
+    fn small_numbers_have_the_digits_of_their_step() {
+        let label = |value: f64, step: f64| label(value, step).replace('\u{2212}', "-");
+        assert_eq!(label(5.0 * 10f64.powi(-6), 5.0 * 10f64.powi(-6)), "5e-6");
+        assert_eq!(label(2.5e-8, 5e-9), "2.5e-8");
     }
 
     #[test]
