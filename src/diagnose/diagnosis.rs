@@ -238,6 +238,12 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
         d.verdict = if f.port == crate::physics::Port::Controller { Verdict::Named } else { Verdict::DataFault };
         d.findings.push(f);
     }
+    if let Some(b) = &selection.bootstrap {
+        d.remarks.push(format!(
+            "bootstrap of {} draws without physics: chance of a candidate as strong as on these records {:.3}; draws that would have been alarms {}",
+            b.draws, b.p_value, b.alarms
+        ));
+    }
     // A search that finds as much where nothing is has found nothing.
     let believed = selection.bootstrap.as_ref().is_none_or(|b| b.p_value <= BELIEVED.max(1.0 / (b.draws + 1) as f64));
     if !believed && !model.chosen.is_empty() {
