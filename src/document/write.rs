@@ -2,7 +2,18 @@
 
 use super::DocumentError;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Files begun by this process: two threads that write one file must not share its temporary name.
+static BEGUN: AtomicUsize = AtomicUsize::new(0);
+
+/// A name beside `file` that nobody else writes to, for what is not whole yet.
+pub fn temporary_beside(file: &Path) -> PathBuf {
+    let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let (process, count) = (std::process::id(), BEGUN.fetch_add(1, Ordering::Relaxed));
+    file.with_file_name(format!(".{name}.{process}.{count}.part"))
+}
 
 /// Writes `bytes` so that the file is either the old one or the new one, never a part of either.
 pub fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), DocumentError> {
@@ -12,8 +23,7 @@ pub fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), DocumentError> {
         _ => Path::new("."),
     };
     std::fs::create_dir_all(folder).map_err(fail("make the folder of"))?;
-    let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let temporary = folder.join(format!(".{name}.{}.part", std::process::id()));
+    let temporary = temporary_beside(file);
     let written = std::fs::File::create(&temporary)
         .and_then(|mut f| f.write_all(bytes).and_then(|()| f.sync_all()))
         .and_then(|()| std::fs::rename(&temporary, file));

@@ -9,7 +9,7 @@ use super::share::assigned;
 use super::store_run::json;
 use super::{Context, FleetError, Store};
 use crate::controller::Controller;
-use crate::document::DocumentError;
+use crate::document::{DocumentError, temporary_beside};
 use crate::gate::features::csv_field;
 use crate::tune::{GainTable, InputDigest, Provenance, Route, Summary};
 use std::fs::File;
@@ -26,8 +26,7 @@ pub(super) struct WholeFile {
 impl WholeFile {
     pub fn begin(file: &Path) -> Result<WholeFile, FleetError> {
         let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let temporary = folder.join(format!(".{name}.{}.part", std::process::id()));
+        let temporary = temporary_beside(file);
         let made = std::fs::create_dir_all(folder).and_then(|()| File::create(&temporary));
         let out = made.map_err(|source| io(file, "write", source))?;
         Ok(WholeFile { out: BufWriter::new(out), temporary, file: file.into() })
