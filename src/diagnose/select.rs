@@ -222,6 +222,8 @@ pub fn select(
                 let other = m.effect.facts().name;
                 !same_drag(name, other) && (other != name || again(name, &m.setting, &c.setting))
             });
+            // A push falls into one record; what every repeat shows at the same time is none.
+            let new = new && (name != "shock" || bench.stack.segments.iter().any(|s| s.runs.len() == 1));
             if new
                 && c.effect.possible(&c.setting, &[])
                 && (c.log_p_value(library.len()) < limit && hums(bench, c, c.gain, library.len()) < limit
