@@ -102,7 +102,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let spec_digest = sha256_hex(spec_text.as_bytes());
     let judged = demo_gate::run(&a.out, &spec, spec_digest, (start.clone(), start_digest), screen)?;
     screen.say("6/6 records of a machine whose bearing sticks, diagnosed with the linear model");
-    let found = demo_diagnosis::run(&a.out, &machine, &machine, &start, screen)?;
+    let found = demo_diagnosis::run(&a.out, &machine, &start, screen)?;
     let words = text(&outcome, Some(&start), slot::units(&id.plant))?;
     let ending = if matches!(outcome, Outcome::Tuned(_)) { Ending::Accepted } else { Ending::Rejected };
     let shown = format!(

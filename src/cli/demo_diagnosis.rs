@@ -40,10 +40,10 @@ fn csv(rows: &[Row], sample_time_s: f64) -> String {
     text
 }
 
-/// Writes the case of a machine with `plant` and a sticking bearing, `given` being the model of it.
-fn write_case(folder: &Path, plant: &Plant, given: &Plant, controller: &Controller) -> Result<(), Failure> {
+/// Writes the case of a machine with `plant` and a sticking bearing, `plant` alone being the model of it.
+fn write_case(folder: &Path, plant: &Plant, controller: &Controller) -> Result<(), Failure> {
     let toml = |source| Failure::Toml { source };
-    write_text(&folder.join("plant.toml"), &toml::to_string(&PlantFile::from(given)).map_err(toml)?)?;
+    write_text(&folder.join("plant.toml"), &toml::to_string(&PlantFile::from(plant)).map_err(toml)?)?;
     write_text(&folder.join("controller.toml"), &toml::to_string(controller).map_err(toml)?)?;
     let mut case = "id = \"demo\"\nplant = \"plant.toml\"\ncontroller = \"controller.toml\"\n".to_owned();
     let t = controller.sample_time_s;
@@ -74,16 +74,15 @@ pub(super) struct Made {
     pub report: PathBuf,
 }
 
-/// Makes the records of a machine with `plant` whose bearing sticks, and diagnoses them with `given` as the model.
+/// Makes the records of a machine with `plant` whose bearing sticks, and diagnoses them with `plant` as the model.
 pub(super) fn run(
     out: &Path,
     plant: &Plant,
-    given: &Plant,
     controller: &Controller,
     screen: &mut Screen,
 ) -> Result<Made, Failure> {
     let folder = out.join("case");
-    write_case(&folder, plant, given, controller)?;
+    write_case(&folder, plant, controller)?;
     let to = out.join("diagnosis");
     let (diagnosis, text) = diagnose::make(&DiagnoseArguments::of_case(folder, to.clone()), screen)?;
     Ok(Made { diagnosis, text, report: to.join(diagnose::REPORT) })

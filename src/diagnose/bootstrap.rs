@@ -38,7 +38,6 @@ pub(super) fn bootstrap(
     iterations: usize,
     limit: f64,
     draws: usize,
-    progress: &(dyn Fn(usize) + Sync),
 ) -> Bootstrap {
     let observed_log_p = strongest(bench, library, baseline);
     let errors = bench.fit(vec![]).errors(&baseline.refitted.p);
@@ -52,9 +51,7 @@ pub(super) fn bootstrap(
         }
         null.correct(&vec![0.0; bench.form.knobs.len()], &[]);
         let model = refit(&mut null, iterations);
-        let log_p = strongest(&null, library, &model);
-        progress(draw);
-        log_p
+        strongest(&null, library, &model)
     };
     let mut null_log_p: Vec<f64> = (0..draws).into_par_iter().map(one).collect();
     null_log_p.sort_by(f64::total_cmp);

@@ -20,9 +20,9 @@ use std::collections::BTreeMap;
 pub struct Bump {
     /// Which run.
     pub run: usize,
-    /// When it begins, and how long it lasts (s).
+    /// When it begins, from the start of the record (s).
     pub time_s: f64,
-    /// Duration (s).
+    /// How long it lasts (s).
     pub width_s: f64,
     /// Its peak (command_unit) and the standard error of that.
     pub peak: [f64; 2],
@@ -133,30 +133,26 @@ pub fn bump(bench: &Bench) -> Option<Bump> {
 
 /// Of two repeats each differs from the mean as much as the other: the bumped one is where the push shows beside the model.
 fn of_two(bench: &Bench, answers: &[Answer], bump: Bump) -> Bump {
-    let Some(segment) = bench.stack.segments.iter().find(|s| s.runs.contains(&bump.run)) else { return bump };
-    let [a, b] = segment.runs[..] else { return bump };
+    let Some(at) = bench.stack.segments.iter().position(|s| s.runs.contains(&bump.run)) else { return bump };
+    let [a, b] = bench.stack.segments[at].runs[..] else { return bump };
     let t = bench.scene.sample_time_s;
     let from = (bump.time_s / t).round() as usize;
     let Some(answer) = answers.iter().min_by_key(|x| x.samples.abs_diff((bump.width_s / t).round() as usize)) else {
         return bump;
     };
+    let fit = bench.fit(vec![]);
     let along = |run: usize| -> f64 {
         let mut stand: Vec<Run> = bench.means.clone();
-        let Some(at) = bench.stack.segments.iter().position(|s| s.runs.contains(&run)) else { return 0.0 };
         stand[at] = bench.runs[run].clone();
-        let fit = bench.fit(vec![]);
-        let mut errors = fit.errors_of(&vec![0.0; bench.form.knobs.len()], &stand);
-        let mut e = errors.swap_remove(at);
+        let mut e = fit.errors_of(&vec![0.0; bench.form.knobs.len()], &stand).swap_remove(at);
         bench.whitener.apply(&mut e);
         // The push alone: the slow answer of a wrong model changes little over its length.
         let n = e.len() - from;
         dot(&answer.whitened[..n], &e[from..]).abs()
     };
-    if along(a) > along(b) {
-        Bump { run: a, peak: if bump.run == a { bump.peak } else { [-bump.peak[0], bump.peak[1]] }, ..bump }
-    } else {
-        Bump { run: b, peak: if bump.run == b { bump.peak } else { [-bump.peak[0], bump.peak[1]] }, ..bump }
-    }
+    let run = if along(a) > along(b) { a } else { b };
+    let sign = if run == bump.run { 1.0 } else { -1.0 };
+    Bump { run, peak: [sign * bump.peak[0], bump.peak[1]], ..bump }
 }
 
 impl Bump {

@@ -46,6 +46,12 @@ pub struct Judged<'a> {
 }
 
 impl Judged<'_> {
+    /// The constant torque on a record that does not begin at rest, where laws feel it (command_unit).
+    pub fn constant_torque(&self, run: &Run) -> Result<Option<f64>, LtiError> {
+        let asked = self.fit.filter(|_| !run.rested && !self.effects.is_empty());
+        asked.map(|(bench, fit)| bench.constant_torque(run, fit)).transpose()
+    }
+
     /// Position per constant command (position_unit per command_unit), infinite for a free inertia.
     fn gain_at_rest(&self) -> f64 {
         let modes: f64 = self.plant.modes.iter().map(|m| (m.zero_rad_s / m.pole_rad_s).powi(2)).product();
@@ -97,7 +103,8 @@ const FOUND: f64 = 1e-3;
 /// start: with them the simulation is made again with the free motions in it, until they stay (Gauss and Newton).
 pub fn error(model: &Judged, run: &Run, closed: Option<&Law>) -> Result<Vec<f64>, LtiError> {
     let rounds = if model.effects.is_empty() { 1 } else { ROUNDS };
-    Ok(started(model, run, closed, vec![0.0; run.len()], rounds)?.error)
+    let constant = model.constant_torque(run)?;
+    Ok(started(model, run, closed, constant, vec![0.0; run.len()], rounds)?.error)
 }
 
 /// A simulation whose start was found.
@@ -109,16 +116,16 @@ pub struct Started {
     pub free: Vec<f64>,
 }
 
-/// The same from a free motion that is near the right one, in a number of rounds.
+/// The same with a known constant torque (command_unit; none for a record that begins at rest) and from a free motion that is near the
+/// right one, in a number of rounds.
 pub fn started(
     model: &Judged,
     run: &Run,
     closed: Option<&Law>,
+    constant: Option<f64>,
     mut free: Vec<f64>,
     rounds: usize,
 ) -> Result<Started, LtiError> {
-    let start = model.fit.filter(|_| !run.rested && !model.effects.is_empty());
-    let constant = start.map(|(bench, fit)| bench.constant_torque(run, fit)).transpose()?;
     let closed = closed.filter(|_| run.reference.is_some());
     let open = model.columns(run)?;
     let seen: Vec<Vec<f64>> = match closed {

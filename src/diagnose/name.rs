@@ -25,10 +25,14 @@ const GRID: f64 = 0.1;
 /// Growth of the noise's power from rest to the highest speed that is worth a word.
 const FASTER: f64 = 0.2;
 
-/// Whether two names are the two ends of one law, told apart by the sliding length alone.
+/// Whether a name is one of the drags: the two ends of one law, told apart by the sliding length alone.
+pub(super) fn is_drag(name: &str) -> bool {
+    ["pivot_friction", "coulomb_friction"].contains(&name)
+}
+
+/// Whether two names are both drags.
 pub(super) fn same_drag(a: &str, b: &str) -> bool {
-    let drag = ["pivot_friction", "coulomb_friction"];
-    drag.contains(&a) && drag.contains(&b)
+    is_drag(a) && is_drag(b)
 }
 
 pub(super) fn text_of(name: &str) -> (&'static str, crate::physics::Port) {

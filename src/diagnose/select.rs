@@ -2,7 +2,7 @@
 
 use super::bench::Bench;
 use super::bootstrap::{Bootstrap, bootstrap};
-use super::name::same_drag;
+use super::name::{is_drag, same_drag};
 use super::refit::{Chosen, Refitted};
 use super::scan::{Candidate, Ground, log_tail};
 use super::settle::{exchange, prune, spare};
@@ -49,18 +49,6 @@ pub struct Model {
     pub freedom: f64,
     /// Standard deviation of the cost under noise alone, the noise's own level being an estimate from so many repeats.
     pub sigma: f64,
-}
-
-impl Selection {
-    /// The model that leaves less, along the recorded motion or simulated.
-    pub fn best(&self) -> &Model {
-        if self.last().cost < self.model.cost { self.last() } else { &self.model }
-    }
-
-    /// The model that numbers are taken from.
-    pub fn last(&self) -> &Model {
-        self.simulated.as_ref().unwrap_or(&self.model)
-    }
 }
 
 impl Model {
@@ -119,13 +107,24 @@ pub struct Selection {
     pub bootstrap: Option<Bootstrap>,
 }
 
+impl Selection {
+    /// The model that leaves less, along the recorded motion or simulated.
+    pub fn best(&self) -> &Model {
+        if self.last().cost < self.model.cost { self.last() } else { &self.model }
+    }
+
+    /// The model that numbers are taken from.
+    pub fn last(&self) -> &Model {
+        self.simulated.as_ref().unwrap_or(&self.model)
+    }
+}
+
 /// Share of what is explained already that a second, third and fourth effect must add: no law is nearer to a machine than
 /// the first, and machines with many defects are rare.
 pub(super) const MINOR: [f64; 4] = [0.0, 5e-3, 2e-2, 4e-2];
 
-/// The drags. What one of them does while the arm stands still, no motion tells: beside it an effect that adds less than this share
-/// must explain this much of what is left.
-pub(super) const DRAGS: [&str; 2] = ["pivot_friction", "coulomb_friction"];
+/// What a drag does while the arm stands still, no motion tells: beside it an effect that adds less than this share must explain this
+/// much of what is left.
 const BESIDE_DRAG: f64 = 0.08;
 const REST: f64 = 0.75;
 /// Gain of a scan from which a law is tried where no repeat tells what noise is: noise made from the error itself hides most of what
@@ -203,8 +202,7 @@ pub fn select(
     let mut baseline = refit(bench, settings.iterations);
     let calibration = (settings.bootstrap > 0).then(|| {
         progress("bootstrap: the search on records without physics");
-        let (n, done) = (settings.bootstrap, |_| {});
-        bootstrap(bench, library, &baseline, settings.iterations, settings.false_alarm, n, &done)
+        bootstrap(bench, library, &baseline, settings.iterations, settings.false_alarm, settings.bootstrap)
     });
     let mut model = baseline.clone();
     let mut steps = Vec::new();
@@ -271,7 +269,7 @@ pub fn select(
                 log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library.len() as f64).ln();
             let log_p = log_p.max(hums(bench, c, gain, library.len()));
             let explained = (baseline.evidence - model.evidence).max(0.0);
-            let dragged = model.chosen.iter().any(|c| DRAGS.contains(&c.effect.facts().name));
+            let dragged = model.chosen.iter().any(|c| is_drag(c.effect.facts().name));
             let share = if dragged && gain < BESIDE_DRAG * explained { REST } else { settings.share };
             let asked = share * (model.excess() - 2.0 * model.sigma).max(0.0);
             let minor = MINOR.get(model.chosen.len()).copied().unwrap_or(0.0) * explained;

@@ -2,7 +2,8 @@
 
 use super::bench::Bench;
 use super::refit::Chosen;
-use super::select::{DRAGS, MINOR, Model, OWN, Step, fitted, fitted_from_both};
+use super::name::is_drag;
+use super::select::{MINOR, Model, OWN, Step, fitted, fitted_from_both};
 use super::simulated::simulated;
 
 /// Takes effects out again that later ones made needless.
@@ -39,7 +40,7 @@ pub(super) fn spare(
     before: f64,
     iterations: usize,
 ) {
-    let drag = |c: &Chosen| DRAGS.contains(&c.effect.facts().name);
+    let drag = |c: &Chosen| is_drag(c.effect.facts().name);
     let gain = |c: &Chosen| {
         let step = &steps[c.step];
         step.taken.map_or(0.0, |t| step.before - step.tried[t].1.evidence)

@@ -47,6 +47,8 @@ struct Problem<'a> {
     local: Basis,
     /// The free motion that each mean record starts with, as found last: near enough for what is not far.
     starts: Vec<Vec<f64>>,
+    /// The constant torque on each mean record that does not begin at rest (command_unit).
+    constants: Vec<Option<f64>>,
 }
 
 impl Problem<'_> {
@@ -82,14 +84,14 @@ impl Problem<'_> {
             effects: made.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect(),
             own: own.map(|c| (c.effect as &dyn Effect, &c.setting.inner[..])).collect(),
             lines: &[],
-            fit: Some((bench, self.model)),
+            fit: None,
             scene: &bench.scene,
         };
         let away = |run: &Run| Started { error: vec![f64::INFINITY; run.len()], free: vec![0.0; run.len()] };
-        let one = |(run, free): (&Run, &Vec<f64>)| {
-            started(&judged, run, None, free.clone(), rounds).unwrap_or_else(|_| away(run))
+        let one = |((run, free), constant): ((&Run, &Vec<f64>), &Option<f64>)| {
+            started(&judged, run, None, *constant, free.clone(), rounds).unwrap_or_else(|_| away(run))
         };
-        bench.means.par_iter().zip(&self.starts).map(one).collect()
+        bench.means.par_iter().zip(&self.starts).zip(&self.constants).map(one).collect()
     }
 
     /// Whitened simulation error of the mean records, one stacked vector, each record's own directions taken out.
@@ -196,7 +198,10 @@ pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
     }
     let free = Free { knobs, strengths, inner };
     let starts = bench.means.iter().map(|r| vec![0.0; r.len()]).collect();
-    let mut problem = Problem { bench, model, free, local: bench.fit(vec![]).local_basis(), starts };
+    let constant = |run: &Run| (!run.rested).then(|| bench.constant_torque(run, model).ok()).flatten();
+    let constants = bench.means.par_iter().map(constant).collect();
+    let local = bench.fit(vec![]).local_basis();
+    let mut problem = Problem { bench, model, free, local, starts, constants };
     let mut x = problem.start();
     let before = problem.settle(&x);
     let before = dot(&before, &before);
