@@ -190,7 +190,7 @@ pub fn add(name: &str, q: f64, u: &[f64; 8], ts: f64, t: &mut Truth) -> Fact {
         }
         "dead_band" => {
             p.dead_band = grow(q, 1e-5, 0.03);
-            vec![("width", p.dead_band, 0, 1)]
+            vec![("half_width", p.dead_band, 0, 1)]
         }
         "amplifier_lag" => {
             p.amplifier_hz = grow(q, 60e3, 1500.0);

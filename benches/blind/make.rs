@@ -248,7 +248,10 @@ pub fn make(order: &Order, out: &Path, attempt: u64) -> Option<Value> {
         let figures: Map<String, Value> = fact
             .figures
             .iter()
-            .map(|(n, v, l, c)| ((*n).to_owned(), json!(v * scale.length.powi(*l) * scale.command.powi(*c))))
+            .map(|(n, v, l, c)| {
+                let v = if *n == "drop_at_15" { drop_at(15.0 / scale.length, *v) } else { *v };
+                ((*n).to_owned(), json!(v * scale.length.powi(*l) * scale.command.powi(*c)))
+            })
             .collect();
         answer.insert((*named).into(), Value::Object(figures));
         places.insert((*named).into(), fact.place.clone());
@@ -344,6 +347,12 @@ pub fn visibility(stage: &Stage, given: &Plant, recs: &[Recorded]) -> Option<Map
         map.insert(plan.name.clone(), json!((ss / n as f64).sqrt() / stage.noise.sigma));
     }
     Some(map)
+}
+
+/// Fall of the torque factor at `x` tracks, of a machine whose field has fallen by `drop` at 15 tracks.
+fn drop_at(x: f64, drop: f64) -> f64 {
+    let fall = drop / (1.0 - drop) * (x / 15.0).powi(2);
+    fall / (1.0 + fall)
 }
 
 fn units(r: &mut Random, plain: bool) -> Units {

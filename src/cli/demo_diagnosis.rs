@@ -75,12 +75,7 @@ pub(super) struct Made {
 }
 
 /// Makes the records of a machine with `plant` whose bearing sticks, and diagnoses them with `plant` as the model.
-pub(super) fn run(
-    out: &Path,
-    plant: &Plant,
-    controller: &Controller,
-    screen: &mut Screen,
-) -> Result<Made, Failure> {
+pub(super) fn run(out: &Path, plant: &Plant, controller: &Controller, screen: &mut Screen) -> Result<Made, Failure> {
     let folder = out.join("case");
     write_case(&folder, plant, controller)?;
     let to = out.join("diagnosis");

@@ -5,6 +5,7 @@ use super::bump::bump;
 use super::corrected::{Corrected, corrected};
 use super::finding::*;
 use super::fit_report::fit_report;
+use super::held_out::{contradicts, held_out, mean};
 use super::judge::rms;
 use super::line_finding::line_findings;
 use super::logs::check;
@@ -13,9 +14,8 @@ use super::run::{Run, runs};
 use super::select::{self, SelectSettings, Selection};
 use crate::controller::{Controller, ControllerError, Law};
 use crate::lti::{LtiError, Plant};
-use crate::numeric::least_squares::dot;
 use crate::physics::library;
-use crate::recording::{Case, Role};
+use crate::recording::Case;
 use thiserror::Error;
 
 /// How a diagnosis is made.
@@ -132,6 +132,7 @@ pub fn diagnose(
     let (figures, errors) = fit_report(&bench, &selection, given, &refitted, &fixed, closed);
     let sse = bench.stack.total as f64;
     let whitened = [selection.given / sse, selection.baseline.cost / sse, selection.best().cost / sse];
+    let held_out = held_out(&bench, &selection, &fixed)?;
     let mut diagnosis = Diagnosis {
         schema: "servotune.diagnosis/1",
         id: case.id.clone(),
@@ -144,7 +145,8 @@ pub fn diagnose(
         replay: hygiene.replay.clone(),
         sample_faults: hygiene.faults.clone(),
         whitened,
-        holdout_whitened: held_out(&bench, &selection, &fixed)?,
+        holdout_whitened: mean(&held_out),
+        held_out,
         remarks,
         search: search(&selection),
         bootstrap: selection.bootstrap.clone(),
@@ -190,21 +192,6 @@ fn set_aside(
     Ok(found)
 }
 
-/// Whitened error per sample on the records that were not used, along their recorded motion: linear refit and final model. It
-/// does not hide behind the controller.
-fn held_out(bench: &Bench, selection: &Selection, fixed: &Corrected) -> Result<Option<[f64; 2]>, LtiError> {
-    let (mut sums, mut n) = ([0.0; 2], 0);
-    for run in bench.runs.iter().filter(|r| r.role == Role::Holdout) {
-        let own = fixed.judged(bench, selection).columns(run)?;
-        for (sum, model) in sums.iter_mut().zip([&selection.baseline, &selection.model]) {
-            let e = bench.along(run, model, &own)?;
-            *sum += dot(&e, &e);
-        }
-        n += run.len();
-    }
-    Ok((n > 0).then(|| sums.map(|s| s / n as f64)))
-}
-
 fn search(selection: &Selection) -> Vec<Tried> {
     let mut all = Vec::new();
     for (i, step) in selection.steps.iter().enumerate() {
@@ -234,6 +221,7 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
     let simulations: Vec<FitFigures> = d.fit.holdout.into_iter().chain(d.fit.open_loop).collect();
     let holds = d.holdout_whitened.is_none_or(|[refit, after]| after <= 1.05 * refit || after <= HELD_OUT)
         && (simulations.is_empty() || simulations.into_iter().any(simulated));
+    let against = contradicts(&d.held_out, &selection.model).cloned();
     if let Some(f) = logs {
         d.verdict = if f.port == crate::physics::Port::Controller { Verdict::Named } else { Verdict::DataFault };
         d.findings.push(f);
@@ -252,7 +240,13 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
         );
     } else if !model.chosen.is_empty() {
         let decisive = explained >= MOST && rival_share(selection) < RIVAL;
-        if (explained >= NAMED_SHARE || clean || decisive) && holds {
+        if let Some(h) = &against {
+            d.remarks.push(format!(
+                "the nearest law holds on the records that it was fitted to, but not on {}, which stays within their range: whitened error {:.3} after {:.3} under the linear refit, 1 being noise",
+                h.record, h.whitened[1], h.whitened[0]
+            ));
+        }
+        if (explained >= NAMED_SHARE || clean || decisive) && holds && against.is_none() {
             if !clean && explained < NAMED_SHARE {
                 d.remarks.push(format!(
                     "no other law of the library comes near, but {:.1} % of the error in excess of noise stays unexplained",

@@ -1,6 +1,7 @@
 //! What a diagnosis says, as `diagnosis.json` of the contract carries it.
 
 use super::bootstrap::Bootstrap;
+use super::held_out::HeldOut;
 use super::hygiene::{Replay, SampleFault};
 use super::judge::Simulation;
 use super::whiten::NoiseLevels;
@@ -176,6 +177,8 @@ pub struct Diagnosis {
     pub whitened: [f64; 3],
     /// The same on the records that were not used, along their recorded motion: linear refit, final model.
     pub holdout_whitened: Option<[f64; 2]>,
+    /// Record by record.
+    pub held_out: Vec<HeldOut>,
     /// Natural frequency, damping and gain before and after, and other remarks in plain words.
     pub remarks: Vec<String>,
     /// The search.

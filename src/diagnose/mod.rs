@@ -13,6 +13,7 @@ mod diagnosis;
 mod experiment;
 mod finding;
 mod fit_report;
+mod held_out;
 mod hygiene;
 mod judge;
 mod line_finding;
@@ -39,6 +40,7 @@ pub use diagnosis::{DiagnoseError, DiagnoseSettings, Diagnosed, diagnose};
 pub use finding::{
     Diagnosis, Estimate, Finding, FitFigures, FitReport, NextExperiment, RecordFigures, Tried, Verdict, Where,
 };
+pub use held_out::HeldOut;
 pub use hygiene::{Replay, SampleFault};
 pub use judge::Simulation;
 pub use linear::LinearForm;

@@ -48,28 +48,42 @@ pub fn log_tail(g: f64, m: usize) -> f64 {
     if g <= m { 0.0 } else { 0.5 * (m - g) + 0.5 * m * (g / m).ln() }
 }
 
-/// Inner parameters that take more than three magnitudes over the grid, not all whole: neighbours differ little in these.
-fn swept(grid: &[Vec<f64>]) -> Vec<bool> {
+/// Magnitudes of each inner parameter on a grid, ascending, each once; none where all are whole, which are kinds and no measures.
+fn magnitudes(grid: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let count = grid.first().map_or(0, Vec::len);
-    (0..count)
-        .map(|i| {
-            let mut values: Vec<f64> = grid.iter().map(|p| p[i].abs()).collect();
-            values.sort_by(f64::total_cmp);
-            values.dedup();
-            values.len() > 3 && values.iter().any(|v| v.fract() != 0.0)
-        })
-        .collect()
+    let measure = |i: usize| {
+        let mut values: Vec<f64> = grid.iter().map(|p| p[i].abs()).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        if values.iter().all(|v| v.fract() == 0.0) { Vec::new() } else { values }
+    };
+    (0..count).map(measure).collect()
 }
 
-/// Of these, the ones that are never 0: they may be refined, sign kept.
+/// Fewest magnitudes of a parameter that is a grid's sweep: neighbours differ little in it. Of [`COARSE`] it is a measure still, but
+/// its neighbours lie far apart (a damping).
+const SWEPT: usize = 4;
+const COARSE: usize = 3;
+/// How far beyond its ends a coarse parameter may go.
+const BEYOND: f64 = 3.0;
+
+fn swept(grid: &[Vec<f64>]) -> Vec<bool> {
+    magnitudes(grid).iter().map(|m| m.len() >= SWEPT).collect()
+}
+
+/// Measures that are never 0: they may be refined, sign kept.
 fn continuous(grid: &[Vec<f64>]) -> Vec<bool> {
-    swept(grid).into_iter().enumerate().map(|(i, s)| s && grid.iter().all(|p| p[i] != 0.0)).collect()
+    magnitudes(grid).iter().map(|m| m.len() >= COARSE && m[0] != 0.0).collect()
 }
 
 fn range(grid: &[Vec<f64>]) -> Vec<[f64; 2]> {
-    let count = grid.first().map_or(0, Vec::len);
     let over = |i: usize, pick: fn(f64, f64) -> f64, from: f64| grid.iter().map(|p| p[i].abs()).fold(from, pick);
-    (0..count).map(|i| [over(i, f64::min, f64::INFINITY), over(i, f64::max, f64::NEG_INFINITY)]).collect()
+    let ends = |i: usize| [over(i, f64::min, f64::INFINITY), over(i, f64::max, f64::NEG_INFINITY)];
+    let wide = |(i, m): (usize, &Vec<f64>)| {
+        let [low, high] = ends(i);
+        if m.len() == COARSE { [low / BEYOND, high * BEYOND] } else { [low, high] }
+    };
+    magnitudes(grid).iter().enumerate().map(wide).collect()
 }
 
 /// Points that differ in swept parameters only, signs kept; in the order of these.

@@ -7,7 +7,7 @@ use super::refit::{Chosen, Refitted};
 use super::scan::{Candidate, Ground, log_tail};
 use super::settle::{exchange, prune, spare};
 use super::simulated::simulated;
-use crate::physics::{Effect, Setting};
+use crate::physics::{Effect, Port, Setting};
 use rayon::prelude::*;
 
 /// How the search decides.
@@ -340,18 +340,19 @@ pub(super) fn strongest(bench: &Bench, library: &[&'static dyn Effect], model: &
 
 fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
     let mut candidates = scan_at(bench, library, model, &model.refitted.p);
-    // A law without a strength of its own (a lag, a limit) is not straight in the linear parameters that stood in for it: it is
-    // looked for around the given plant too.
+    // A law without a strength of its own (a lag, a limit), or a vibration that a known mode has moved to stand in for, is not straight
+    // in the linear parameters: it is looked for around the given plant too.
     if model.chosen.is_empty() && model.excess_sigma() > CROOKED {
-        let fixed: Vec<&'static dyn Effect> = library.iter().copied().filter(|e| e.facts().fixed).collect();
-        candidates.extend(scan_at(bench, &fixed, model, &vec![0.0; model.refitted.p.len()]));
+        let crooked = |e: &&'static dyn Effect| e.facts().fixed || e.facts().port == Port::Structure;
+        let apart: Vec<&'static dyn Effect> = library.iter().copied().filter(crooked).collect();
+        candidates.extend(scan_at(bench, &apart, model, &vec![0.0; model.refitted.p.len()]));
     }
     candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     Step { before: model.evidence, candidates, tried: Vec::new(), taken: None }
 }
 
 /// Standard deviations of excess above which a linear refit is taken to hide something.
-const CROOKED: f64 = 5.0;
+const CROOKED: f64 = 3.0;
 
 /// The scan around linear parameters `p`; gains count from where the model stands.
 fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Model, p: &[f64]) -> Vec<Candidate> {

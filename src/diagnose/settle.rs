@@ -1,8 +1,8 @@
 //! The final model of a search, looked at again: effects that others made needless go, and rivals are tried in the place of each.
 
 use super::bench::Bench;
-use super::refit::Chosen;
 use super::name::is_drag;
+use super::refit::Chosen;
 use super::select::{MINOR, Model, OWN, Step, fitted, fitted_from_both};
 use super::simulated::simulated;
 

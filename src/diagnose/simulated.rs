@@ -2,7 +2,10 @@
 //!
 //! Along the recorded motion a law sees the sensor's noise: a drag turns round a little early and late, its level comes out too
 //! small (the dilution of a regression whose input is noisy). Simulated from the recorded command it does not. In: the model of the
-//! search. Out: body, delay and the effects' numbers at the least whitened simulation error of the mean records, with their errors.
+//! search. Out: body, delay and the effects' numbers at the least whitened simulation error, with their errors.
+//!
+//! Every repeat is simulated under its own command, and the errors are averaged then: noise that the controller sends into the motor
+//! shakes a drag loose at every reversal, and a mean command shakes less.
 
 use super::bench::Bench;
 use super::corrected::corrected;
@@ -18,9 +21,9 @@ use crate::physics::Effect;
 use rayon::prelude::*;
 
 /// Most Jacobians.
-const ITERATIONS: usize = 6;
+const ITERATIONS: usize = 12;
 /// Relative fall of the sum of squares at which the fit ends.
-const TOLERANCE: f64 = 1e-4;
+const TOLERANCE: f64 = 1e-6;
 /// Rounds in which a start is found.
 const ROUNDS: usize = 3;
 /// Step in a linear parameter.
@@ -45,10 +48,20 @@ struct Problem<'a> {
     model: &'a Model,
     free: Free,
     local: Basis,
-    /// The free motion that each mean record starts with, as found last: near enough for what is not far.
-    starts: Vec<Vec<f64>>,
-    /// The constant torque on each mean record that does not begin at rest (command_unit).
-    constants: Vec<Option<f64>>,
+    /// Every record of every segment.
+    records: Vec<Record<'a>>,
+}
+
+/// One record of the fit.
+struct Record<'a> {
+    run: &'a Run,
+    segment: usize,
+    /// Its share in the mean over its segment.
+    share: f64,
+    /// The free motion that it starts with, as found last: near enough for what is not far.
+    start: Vec<f64>,
+    /// The constant torque on it where it does not begin at rest (command_unit).
+    constant: Option<f64>,
 }
 
 impl Problem<'_> {
@@ -73,7 +86,7 @@ impl Problem<'_> {
         (p, chosen)
     }
 
-    /// Every mean record simulated, from the starts found last; infinite where it runs away.
+    /// Every record simulated, from the starts found last; infinite where it runs away.
     fn simulate(&self, x: &[f64], rounds: usize) -> Vec<Started> {
         let bench = self.bench;
         let (p, chosen) = self.unpack(x);
@@ -88,22 +101,28 @@ impl Problem<'_> {
             scene: &bench.scene,
         };
         let away = |run: &Run| Started { error: vec![f64::INFINITY; run.len()], free: vec![0.0; run.len()] };
-        let one = |((run, free), constant): ((&Run, &Vec<f64>), &Option<f64>)| {
-            started(&judged, run, None, *constant, free.clone(), rounds).unwrap_or_else(|_| away(run))
+        let one = |r: &Record| {
+            started(&judged, r.run, None, r.constant, r.start.clone(), rounds).unwrap_or_else(|_| away(r.run))
         };
-        bench.means.par_iter().zip(&self.starts).zip(&self.constants).map(one).collect()
+        self.records.par_iter().map(one).collect()
     }
 
-    /// Whitened simulation error of the mean records, one stacked vector, each record's own directions taken out.
+    /// Whitened simulation error, the mean over the repeats of each segment, one stacked vector, each segment's own directions taken out.
     fn error(&self, x: &[f64], rounds: usize) -> Vec<f64> {
-        self.whitened(self.simulate(x, rounds))
+        self.whitened(&self.simulate(x, rounds))
     }
 
-    fn whitened(&self, all: Vec<Started>) -> Vec<f64> {
-        let mut out = Vec::with_capacity(self.bench.stack.total);
-        for (segment, mut s) in self.bench.stack.segments.iter().zip(all) {
-            self.bench.whitener.apply(&mut s.error);
-            out.extend(s.error.into_iter().map(|v| segment.weight * v));
+    fn whitened(&self, all: &[Started]) -> Vec<f64> {
+        let stack = &self.bench.stack;
+        let mut out = vec![0.0; stack.total];
+        for (r, s) in self.records.iter().zip(all) {
+            let from = stack.segments[r.segment].start;
+            out[from..].iter_mut().zip(&s.error).for_each(|(o, e)| *o += r.share * e);
+        }
+        for s in &stack.segments {
+            let part = &mut out[s.start..s.start + s.len];
+            self.bench.whitener.apply(part);
+            part.iter_mut().for_each(|v| *v *= s.weight);
         }
         self.local.project(&mut out);
         out
@@ -112,12 +131,12 @@ impl Problem<'_> {
     /// Finds the starts at `x` anew and keeps them; gives the whitened error.
     fn settle(&mut self, x: &[f64]) -> Vec<f64> {
         let all = self.simulate(x, ROUNDS);
-        for (kept, s) in self.starts.iter_mut().zip(&all) {
+        for (r, s) in self.records.iter_mut().zip(&all) {
             if s.free.iter().all(|v| v.is_finite()) {
-                kept.clone_from(&s.free);
+                r.start.clone_from(&s.free);
             }
         }
-        self.whitened(all)
+        self.whitened(&all)
     }
 
     fn step(&self, i: usize, x: f64) -> f64 {
@@ -197,11 +216,15 @@ pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
         }
     }
     let free = Free { knobs, strengths, inner };
-    let starts = bench.means.iter().map(|r| vec![0.0; r.len()]).collect();
-    let constant = |run: &Run| (!run.rested).then(|| bench.constant_torque(run, model).ok()).flatten();
-    let constants = bench.means.par_iter().map(constant).collect();
-    let local = bench.fit(vec![]).local_basis();
-    let mut problem = Problem { bench, model, free, local, starts, constants };
+    let record = |(segment, &r): (usize, &usize)| {
+        let run = &bench.runs[r];
+        let constant = (!run.rested).then(|| bench.constant_torque(run, model).ok()).flatten();
+        let share = 1.0 / bench.stack.segments[segment].runs.len() as f64;
+        Record { run, segment, share, start: vec![0.0; run.len()], constant }
+    };
+    let all = bench.stack.segments.iter().enumerate().flat_map(|(i, s)| s.runs.iter().map(move |r| (i, r)));
+    let records = all.map(record).collect();
+    let mut problem = Problem { bench, model, free, local: bench.fit(vec![]).local_basis(), records };
     let mut x = problem.start();
     let before = problem.settle(&x);
     let before = dot(&before, &before);

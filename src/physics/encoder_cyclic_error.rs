@@ -38,6 +38,9 @@ impl Law for Wave {
     }
 }
 
+/// Second harmonic over the first from which the wave is one of half the period.
+const CARRIES: f64 = 2.0;
+
 impl Effect for EncoderCyclicError {
     fn facts(&self) -> &'static Facts {
         &FACTS
@@ -57,6 +60,12 @@ impl Effect for EncoderCyclicError {
 
     fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
         Box::new(Wave { period: inner[0], second: inner[1] > 1.5 })
+    }
+
+    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
+        // A wave whose second harmonic carries it is one of half the period.
+        let size = |i: usize| setting.strengths[i].hypot(setting.strengths[i + 1]);
+        setting.inner[1] < 1.5 || size(2) < CARRIES * size(0)
     }
 
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {

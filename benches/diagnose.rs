@@ -1,0 +1,134 @@
+//! Time of a whole diagnosis: 20 records of 6000 samples, the whole library, no bootstrap.
+//!
+//! `cargo bench --bench diagnose [-- --out FOLDER]` prints the table; with `--out` it is also written to `FOLDER/speed.md`. Machines: the
+//! paper's tunable one with nothing missing, with a bearing that sticks, with a bearing that sticks and a torque factor that falls
+//! off. Records are made by `twin::recording`, written and read again before the clock starts.
+#![allow(clippy::print_stdout)]
+
+use servotune::diagnose::{DiagnoseSettings, diagnose};
+use servotune::document::write_text;
+use servotune::numeric::random::Random;
+use servotune::physics::{Effect, Setting, effect};
+use servotune::recording::{Case, RecordSettings};
+use servotune::twin::recording::{multisine, record, scene, stroke};
+use servotune::twin::{MachineClass, nominal_controller, paper_machine};
+use std::error::Error;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+const SAMPLES: usize = 6000;
+/// White noise of the encoder, rms (track).
+const NOISE: f64 = 3e-3;
+/// Name, rms of the excitation (V), length of the move (track), repeats, whether it is for judging only: 20 records.
+const RECORDS: [(&str, f64, f64, usize, bool); 8] = [
+    ("multisine_small", 0.02, 0.0, 4, false),
+    ("multisine_large", 0.08, 0.0, 4, false),
+    ("move_short", 0.0, 3.0, 3, false),
+    ("move_long", 0.0, 12.0, 3, false),
+    ("both", 0.04, 8.0, 2, false),
+    ("held_multisine", 0.05, 0.0, 2, true),
+    ("held_move", 0.0, 15.0, 1, true),
+    ("held_both", 0.03, 10.0, 1, true),
+];
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+fn law(name: &str, inner: &[f64], strengths: &[f64]) -> Outcome<(&'static dyn Effect, Setting)> {
+    let found = effect(name).ok_or_else(|| format!("no effect named {name}"))?;
+    Ok((found, Setting { inner: inner.to_vec(), strengths: strengths.to_vec() }))
+}
+
+/// Writes the case of the paper's tunable machine with these effects.
+fn write_case(folder: &Path, effects: &[(&'static dyn Effect, Setting)]) -> Outcome<()> {
+    let plant = paper_machine(MachineClass::Tunable);
+    let controller = nominal_controller();
+    let t = controller.sample_time_s;
+    write_text(&folder.join("plant.toml"), &toml::to_string(&servotune::lti::PlantFile::from(&plant))?)?;
+    write_text(&folder.join("controller.toml"), &toml::to_string(&controller)?)?;
+    let mut case = "id = \"speed\"\nplant = \"plant.toml\"\ncontroller = \"controller.toml\"\n".to_owned();
+    let scene = scene(&plant, t, 15.0, SAMPLES, NOISE);
+    let effects: Vec<(&dyn Effect, &Setting)> = effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
+    let mut draw = 0;
+    for (name, rms, distance, repeats, held) in RECORDS {
+        let excitation = if rms > 0.0 { multisine(SAMPLES, 220, rms) } else { vec![0.0; SAMPLES] };
+        let reference = stroke(SAMPLES, SAMPLES / 10, SAMPLES / 3, distance);
+        for i in 1..=repeats {
+            let mut random = Random::stream(71, draw);
+            draw += 1;
+            let rows = record(&scene, &effects, &controller, &reference, &excitation, &mut random)?;
+            let mut text = "time_s,reference,excitation,command,position\n".to_owned();
+            for (k, [r, d, u, y]) in rows.iter().enumerate() {
+                writeln!(text, "{:.7},{r:.9},{d:.9},{u:.9},{y:.9}", k as f64 * t)?;
+            }
+            let file = format!("records/{name}_{i}.csv");
+            write_text(&folder.join(&file), &text)?;
+            let role = if held { "holdout" } else { "fit" };
+            write!(case, "\n[[records]]\nfile = \"{file}\"\nrole = \"{role}\"\nrepeat_group = \"{name}\"\n")?;
+        }
+    }
+    Ok(write_text(&folder.join("case.toml"), &case)?)
+}
+
+/// Processor time of this process so far (s), ended threads included, where the system tells it.
+fn cpu_s() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let after = text.rsplit(')').next().unwrap_or_default();
+    let ticks: Vec<f64> = after.split_whitespace().skip(11).take(2).filter_map(|v| v.parse().ok()).collect();
+    // Linux counts these in hundredths of a second on every architecture.
+    if ticks.len() == 2 { ticks.iter().sum::<f64>() / 100.0 } else { f64::NAN }
+}
+
+fn run() -> Outcome<()> {
+    let words: Vec<String> = std::env::args().collect();
+    let out = words.iter().position(|w| w == "--out").and_then(|i| words.get(i + 1)).map(PathBuf::from);
+    let friction = || law("pivot_friction", &[2.5, 0.0], &[0.012]);
+    // 8 % less torque at the ends of the travel.
+    let rolloff = || law("torque_factor_rolloff", &[1.0], &[0.0, 0.08, 0.0, 0.0]);
+    let machines = [
+        ("nothing missing", vec![]),
+        ("bearing that sticks", vec![friction()?]),
+        ("bearing that sticks, torque factor that falls off", vec![friction()?, rolloff()?]),
+    ];
+    let mut page = String::from("| machine | verdict | findings | wall (s) | processor (s) |\n|---|---|---|---|---|\n");
+    for (name, effects) in machines {
+        let folder = std::env::temp_dir().join(format!("servotune-speed-{}", std::process::id()));
+        write_case(&folder, &effects)?;
+        let case = Case::read(&folder, &RecordSettings::default())?;
+        let (clock, cpu) = (Instant::now(), cpu_s());
+        let done = diagnose(
+            &case,
+            &paper_machine(MachineClass::Tunable),
+            Some(&nominal_controller()),
+            &DiagnoseSettings::default(),
+            |_| {},
+        )?;
+        let names: Vec<&str> = done.diagnosis.findings.iter().map(|f| f.effect.as_str()).collect();
+        writeln!(
+            page,
+            "| {name} | {:?} | {} | {:.1} | {:.1} |",
+            done.diagnosis.verdict,
+            if names.is_empty() { "none".to_owned() } else { names.join(", ") },
+            clock.elapsed().as_secs_f64(),
+            cpu_s() - cpu
+        )?;
+        std::fs::remove_dir_all(&folder)?;
+    }
+    println!("{page}");
+    if let Some(out) = out {
+        let cores = std::thread::available_parallelism().map_or(0, usize::from);
+        let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+        let load = load.split_whitespace().take(2).collect::<Vec<_>>().join(" and ");
+        write_text(
+            &out.join("speed.md"),
+            &format!(
+                "# Time of a diagnosis\n\nMade by `cargo bench --bench diagnose -- --out results/mismatch`. 20 records of 6000 samples (16 to fit, 4 to judge), the whole library, no\nbootstrap, {cores} cores; the load average of the last one and five minutes at the end was {load}, so other programs lengthen the wall time where it is\nabove {cores}. Aim: 30 s on 2 cores.\n\n{page}"
+            ),
+        )?;
+    }
+    Ok(())
+}
+
+fn main() -> Outcome<()> {
+    run()
+}

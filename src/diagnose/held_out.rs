@@ -1,0 +1,91 @@
+//! The judgement on records that were not used: whitened error along the recorded motion, which does not hide behind a controller.
+
+use super::bench::Bench;
+use super::corrected::Corrected;
+use super::judge::Judged;
+use super::run::Run;
+use super::select::{Model, Selection};
+use crate::lti::LtiError;
+use crate::numeric::least_squares::dot;
+use crate::recording::Role;
+use serde::Serialize;
+
+/// One record that was not used.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// Its name.
+    pub record: String,
+    /// Whether positions and commands stay within those of the fit records: beyond them a law is only continued.
+    pub inside: bool,
+    /// Samples.
+    pub samples: usize,
+    /// Whitened error per sample, 1 being noise alone: linear refit, final model.
+    pub whitened: [f64; 2],
+}
+
+/// Share of the fit records' range by which a record inside it may stick out at either end.
+const MARGIN: f64 = 0.1;
+
+/// Smallest and largest value over several series.
+fn span<'a>(series: impl Iterator<Item = &'a [f64]>) -> [f64; 2] {
+    series.flatten().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
+}
+
+fn within(inner: [f64; 2], outer: [f64; 2]) -> bool {
+    let margin = MARGIN * (outer[1] - outer[0]);
+    inner[0] >= outer[0] - margin && inner[1] <= outer[1] + margin
+}
+
+/// Every record that was not used, under the linear refit and the final model.
+pub(super) fn held_out(bench: &Bench, selection: &Selection, fixed: &Corrected) -> Result<Vec<HeldOut>, LtiError> {
+    let used = || bench.fit_runs.iter().map(|&r| &bench.runs[r]);
+    let positions = span(used().map(|r| &r.position[..]));
+    let commands = span(used().map(|r| &r.input[..]));
+    let judge = |run: &Run| {
+        let per_sample = |model: &Model| -> Result<f64, LtiError> {
+            // Along the recorded motion the arm answers as the carrier does, so it starts as the carrier does.
+            let carrier = bench.form.carrier(&model.refitted.p).plant;
+            let own = Judged { plant: &carrier, ..fixed.judged(bench, selection) }.columns(run)?;
+            let e = bench.along(run, model, &own)?;
+            Ok(dot(&e, &e) / run.len() as f64)
+        };
+        Ok(HeldOut {
+            record: run.name.clone(),
+            inside: within(span([&run.position[..]].into_iter()), positions)
+                && within(span([&run.input[..]].into_iter()), commands),
+            samples: run.len(),
+            whitened: [per_sample(&selection.baseline)?, per_sample(&selection.model)?],
+        })
+    };
+    bench.runs.iter().filter(|r| r.role == Role::Holdout).map(judge).collect()
+}
+
+/// Mean over all records, each sample counting alike; none without records.
+pub(super) fn mean(all: &[HeldOut]) -> Option<[f64; 2]> {
+    let n: usize = all.iter().map(|h| h.samples).sum();
+    let sum = |i: usize| all.iter().map(|h| h.whitened[i] * h.samples as f64).sum::<f64>() / n as f64;
+    (n > 0).then(|| [sum(0), sum(1)])
+}
+
+/// Excess over noise, in its standard deviations and as a share of it, from which a record says more than noise.
+const FAR: f64 = 6.0;
+const CLEAR: f64 = 0.1;
+/// Share of that excess which a law of the machine takes at least, wherever it was fitted.
+const CARRIED: f64 = 0.3;
+
+/// The record inside the fit's range that contradicts the final model most: the linear refit misses it by far more than noise, and the
+/// laws that were found elsewhere take almost nothing of it.
+///
+/// None where a law goes by a clock of its own, which each record starts anew.
+pub(super) fn contradicts<'a>(all: &'a [HeldOut], model: &Model) -> Option<&'a HeldOut> {
+    let clocked = |name: &str| ["gain_drift", "parametric_gain"].contains(&name);
+    if model.chosen.iter().any(|c| c.effect.facts().per_record || clocked(c.effect.facts().name)) {
+        return None;
+    }
+    let [excess, left] = [0, 1].map(|i| move |h: &HeldOut| h.whitened[i] - 1.0);
+    let far = |h: &&HeldOut| {
+        let noise = (2.0 / h.samples as f64).sqrt();
+        h.inside && excess(h) > f64::max(FAR * noise, CLEAR) && left(h) > (1.0 - CARRIED) * excess(h)
+    };
+    all.iter().filter(far).max_by(|a, b| left(a).total_cmp(&left(b)))
+}
