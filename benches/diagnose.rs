@@ -41,8 +41,8 @@ fn law(name: &str, inner: &[f64], strengths: &[f64]) -> Outcome<(&'static dyn Ef
 
 /// Writes the case of the paper's tunable machine with these effects.
 fn write_case(folder: &Path, effects: &[(&'static dyn Effect, Setting)]) -> Outcome<()> {
-    let plant = paper_machine(MachineClass::Tunable);
-    let controller = nominal_controller();
+    let plant = paper_machine(MachineClass::Tunable)?;
+    let controller = nominal_controller()?;
     let t = controller.sample_time_s;
     write_text(&folder.join("plant.toml"), &toml::to_string(&servotune::lti::PlantFile::from(&plant))?)?;
     write_text(&folder.join("controller.toml"), &toml::to_string(&controller)?)?;
@@ -98,8 +98,8 @@ fn run() -> Outcome<()> {
         let (clock, cpu) = (Instant::now(), cpu_s());
         let done = diagnose(
             &case,
-            &paper_machine(MachineClass::Tunable),
-            Some(&nominal_controller()),
+            &paper_machine(MachineClass::Tunable)?,
+            Some(&nominal_controller()?),
             &DiagnoseSettings::default(),
             |_| {},
         )?;

@@ -156,8 +156,8 @@ def main():
     import cvxpy
 
     found = {
-        "taps": n, "bound": ours["sum"]["objective"], "missed": ours["sum"]["missed"], "wall_s": wall,
-        "cvxpy": {"version": cvxpy.__version__, "value": value, "status": status, "stating_s": stated, "solve_s": solved, "clarabel_s": inner},
+        "taps": int(n), "bound": ours["sum"]["objective"], "missed": ours["sum"]["missed"], "wall_s": wall,
+        "cvxpy": {"version": cvxpy.__version__, "value": float(value), "status": status, "stating_s": stated, "solve_s": solved, "clarabel_s": inner},
     }
     out = pathlib.Path(a.out)
     (out / "limit_peers.json").write_text(json.dumps(found, indent=1) + "\n")

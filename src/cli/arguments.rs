@@ -237,6 +237,10 @@ pub(super) struct TuneArguments {
     /// Leave out the certificate that is otherwise proved and written beside each gain table (gains.certificate.json)
     #[arg(long)]
     pub no_certificate: bool,
+    /// Say how far the table is from the best in its structure and from the best of all loops, and write it beside the table
+    /// (gains.limit.json); takes about a minute. Of a sweep, on the model identified from it
+    #[arg(long, conflicts_with = "machines")]
+    pub gap: bool,
     /// Sample time where no start controller gives one (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 39.6e-6)]
     pub sample_time_s: f64,

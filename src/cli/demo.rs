@@ -2,6 +2,7 @@
 //! the model does not explain.
 
 use super::arguments::DemoArguments;
+use super::proof::{self, On, Proof};
 use super::slot::{self, Slot};
 use super::tune::{provenance, text};
 use super::{Ending, Failure, Screen, demo_diagnosis, demo_gate, gated};
@@ -25,6 +26,7 @@ struct Document<'a> {
     #[serde(flatten)]
     outcome: &'a Outcome,
     gain_table: PathBuf,
+    certificate: Proof,
     report: PathBuf,
     machines: &'a [super::gated::Row],
     machines_table: PathBuf,
@@ -79,6 +81,8 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let table = GainTable::of(&outcome, spec.search.seed, sha256_hex(spec_text.as_bytes()), inputs)?;
     let gain_table = file("gains.toml");
     table.write(&gain_table)?;
+    let certificate =
+        proof::beside(&gain_table, &On::Sweep { sweep: &sweep, hold_included: false }, &file("spec.toml"), screen)?;
 
     screen.say("4/6 report");
     let page = slot::page(&Slot {
@@ -106,7 +110,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let words = text(&outcome, Some(&start), slot::units(&id.plant))?;
     let ending = if matches!(outcome, Outcome::Tuned(_)) { Ending::Accepted } else { Ending::Rejected };
     let shown = format!(
-        "{words}\n{}\n{} {}\nOpen this table: {}\n\nRecords that the model does not explain\n{}Open this report: {}\n\nGain table: {}\nOpen this report: {}\n",
+        "{words}\n{}\n{} {}\nOpen this table: {}\n\nRecords that the model does not explain\n{}Open this report: {}\n\nGain table: {}\n{}\nOpen this report: {}\n",
         gated::sheet(&judged.rows)?.text(),
         gated::summary(&judged.rows),
         judged.table.display(),
@@ -114,11 +118,13 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
         found.text,
         found.report.display(),
         gain_table.display(),
+        certificate.says,
         report.display()
     );
     let document = Document {
         outcome: &outcome,
         gain_table,
+        certificate,
         report,
         machines: &judged.rows,
         machines_table: judged.table,

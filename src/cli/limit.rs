@@ -2,13 +2,16 @@
 
 use super::limit_arguments::LimitArguments;
 use super::{Ending, Failure, Screen, load};
+use crate::controller::Controller;
 use crate::document::write_text;
+use crate::lti::Plant;
 use crate::report::limit::{limit_sentences, limit_table};
 use crate::tune::{
     Limit, LimitError, LimitPlant, LimitSettings, Machine, Spec, Standing, TuneError, TuneSettings, Verdict, limit,
     standing, tune,
 };
 use serde::Serialize;
+use std::path::{Path, PathBuf};
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -19,6 +22,66 @@ struct Document<'a> {
     /// The best gains that a wide search found in the spec's structure: evidence, no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     best_in_structure: Option<&'a Standing>,
+}
+
+impl<'a> Document<'a> {
+    fn of(limit: &'a Limit, gains: Option<&'a Standing>, best_in_structure: Option<&'a Standing>) -> Document<'a> {
+        Document { schema: "servotune.limit/1", limit, gains, best_in_structure }
+    }
+
+    fn write(&self, file: &Path, screen: &mut Screen) -> Result<(), Failure> {
+        let text = serde_json::to_string_pretty(self).map_err(|source| Failure::Json { source })?;
+        write_text(file, &(text + "\n"))?;
+        screen.say(&format!("wrote {}", file.display()));
+        Ok(())
+    }
+}
+
+/// The standing of the best gains that a search from many starts finds in the spec's structure.
+fn searched(
+    plant: &Plant,
+    seen: &LimitPlant,
+    spec: &Spec,
+    gains: Option<&Controller>,
+    sample_time_s: f64,
+    starts: usize,
+) -> Result<Standing, Failure> {
+    let wide = TuneSettings { sample_time_s, starts, ..TuneSettings::default() };
+    let best = tune(&Machine::Model(plant), spec, gains, &wide)?;
+    Ok(standing(seen, best.controller(), spec)?)
+}
+
+/// How far a gain table is from the best possible, as `tune --gap` writes it beside the table.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Gap {
+    /// The document that `limit --gains` would write.
+    pub file: PathBuf,
+    /// The gaps in sentences.
+    pub says: String,
+}
+
+/// Starts of the search that a table is compared with.
+const STARTS: usize = 24;
+
+/// Bounds what any loop of the class could do for this plant, searches the spec's structure from many starts, and writes both beside the
+/// table (`gains.limit.json`).
+pub(super) fn beside(
+    gains: &Path,
+    controller: &Controller,
+    plant: &Plant,
+    spec: &Spec,
+    screen: &mut Screen,
+) -> Result<Gap, Failure> {
+    let t = controller.sample_time_s;
+    let seen = LimitPlant::of_model(plant, t).map_err(LimitError::from)?;
+    screen.say("how far from the best possible: bound and search, about a minute");
+    let settings = LimitSettings { alone: 0, ..LimitSettings::default() };
+    let bound = limit(&seen, t, controller.feedforward.as_ref(), spec, &settings)?;
+    let own = standing(&seen, controller, spec)?;
+    let best = searched(plant, &seen, spec, Some(controller), t, STARTS)?;
+    let file = gains.with_extension("limit.json");
+    Document::of(&bound, Some(&own), Some(&best)).write(&file, screen)?;
+    Ok(Gap { file, says: limit_sentences(&bound, Some(&own), Some((&best, STARTS))) })
 }
 
 pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Failure> {
@@ -36,22 +99,11 @@ pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Fai
     let figures = gains.as_ref().map(|g| standing(&seen, g, &spec)).transpose()?;
     let searched = match a.search {
         0 => None,
-        starts => {
-            let wide = TuneSettings { sample_time_s: t, starts, ..TuneSettings::default() };
-            let best = tune(&Machine::Model(&plant), &spec, gains.as_ref(), &wide)?;
-            Some(standing(&seen, best.controller(), &spec)?)
-        }
+        starts => Some(searched(&plant, &seen, &spec, gains.as_ref(), t, starts)?),
     };
-    let document = Document {
-        schema: "servotune.limit/1",
-        limit: &found,
-        gains: figures.as_ref(),
-        best_in_structure: searched.as_ref(),
-    };
+    let document = Document::of(&found, figures.as_ref(), searched.as_ref());
     if let Some(file) = &a.out {
-        let text = serde_json::to_string_pretty(&document).map_err(|source| Failure::Json { source })?;
-        write_text(file, &(text + "\n"))?;
-        screen.say(&format!("wrote {}", file.display()));
+        document.write(file, screen)?;
     }
     let mut text = limit_table(&found, figures.as_ref(), &plant.position_unit)?.text();
     text += &limit_sentences(&found, figures.as_ref(), searched.as_ref().map(|s| (s, a.search)));

@@ -3,7 +3,7 @@
 use super::arguments::{ModelArguments, TuneArguments};
 use super::proof::{self, On, Proof};
 use super::slot::{self, Slot};
-use super::{Ending, Failure, Screen, load, physics, tune_machines};
+use super::{Ending, Failure, Screen, limit, load, physics, tune_machines};
 use crate::document::{read_text, sha256_hex, write_text};
 use crate::feedback::Amplitudes;
 use crate::frf::Sweep;
@@ -26,6 +26,9 @@ struct Document<'a> {
     gain_table: Option<&'a Path>,
     /// The proof of the table; absent without a table or by --no-certificate.
     certificate: Option<&'a Proof>,
+    /// How far the table is from the best possible; absent without --gap.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gap: Option<&'a limit::Gap>,
     report: Option<&'a Path>,
     /// Names and judgement of the physics; absent without any.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -65,6 +68,14 @@ impl Given {
         match self {
             Given::Model(plant, _) => slot::units(plant),
             Given::Response { .. } => Units { position: &words.position_unit, command: &words.command_unit },
+        }
+    }
+
+    /// The linear plant: as given, or as identified from the sweep.
+    fn plant(&self) -> &Plant {
+        match self {
+            Given::Model(plant, _) => plant,
+            Given::Response { identified, .. } => &identified.plant,
         }
     }
 
@@ -130,7 +141,7 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
             (outcome, table, tuned)
         }
     };
-    let (mut written, mut proof) = (None, None);
+    let (mut written, mut proof, mut gap) = (None, None, None);
     if tuned || a.keep_infeasible {
         table.write(&a.out)?;
         screen.say(&format!("wrote {}", a.out.display()));
@@ -141,6 +152,9 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
                 (Given::Model(..), file) => On::Plant(file.as_deref().ok_or(Failure::NoMachine)?),
             };
             proof = Some(proof::beside(&a.out, &on, &a.spec, screen)?);
+        }
+        if a.gap {
+            gap = Some(limit::beside(&a.out, outcome.controller(), given.plant(), &spec, screen)?);
         }
     } else {
         screen.say("no gain table was written: the limits are not met (--keep-infeasible writes the compromise)");
@@ -166,9 +180,16 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     };
     let certificate = proof.as_ref();
     let said = certificate.map_or_else(String::new, |p| format!("{}\n", p.says));
-    let document =
-        Document { outcome: &outcome, gain_table: written, certificate, report: a.report.as_deref(), physics };
-    screen.result(&document, &(text + &said))?;
+    let far = gap.as_ref().map_or_else(String::new, |g| g.says.clone());
+    let document = Document {
+        outcome: &outcome,
+        gain_table: written,
+        certificate,
+        gap: gap.as_ref(),
+        report: a.report.as_deref(),
+        physics,
+    };
+    screen.result(&document, &(text + &said + &far))?;
     Ok(if tuned { Ending::Accepted } else { Ending::Rejected })
 }
 

@@ -246,7 +246,14 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
                 h.record, h.whitened[1], h.whitened[0]
             ));
         }
-        if (explained >= NAMED_SHARE || clean || decisive) && holds && against.is_none() {
+        if selection.mixture() {
+            let laws: Vec<&str> = model.chosen.iter().map(|c| c.effect.facts().name).collect();
+            d.remarks.push(format!(
+                "it takes {} together to explain the records and none leads: likelier one thing that the library lacks; the corrected plant carries the mixture as a stand-in",
+                laws.join(", ")
+            ));
+        }
+        if (explained >= NAMED_SHARE || clean || decisive) && holds && against.is_none() && !selection.mixture() {
             if !clean && explained < NAMED_SHARE {
                 d.remarks.push(format!(
                     "no other law of the library comes near, but {:.1} % of the error in excess of noise stays unexplained",

@@ -49,7 +49,7 @@ pub struct Where {
     pub records: Vec<String>,
     /// Intervals of the strongest record (s).
     pub time_s: Vec<[f64; 2]>,
-    /// Band that holds nine tenths of it (Hz).
+    /// Fewest bands that hold nine tenths of it, strongest first (Hz).
     pub frequency_hz: Vec<[f64; 2]>,
     /// Range of positions that holds nine tenths of it (position_unit).
     pub position: Vec<[f64; 2]>,

@@ -85,6 +85,12 @@ fn estimate(values: &[f64], scale: f64, unit: &str) -> Estimate {
     Estimate { value: scale * mean, low: scale * (mean - off), high: scale * (mean + off), unit: unit.into() }
 }
 
+/// A line's place: as narrow as the longest record resolves (Hz).
+fn resolved(bench: &Bench, hz: f64) -> [f64; 2] {
+    let width = 1.0 / bench.scene.duration_s.max(bench.scene.sample_time_s);
+    [(hz - width).max(0.0), hz + width]
+}
+
 /// One finding for all orders of the spindle, one for each other line; and the frequencies (Hz) of those that are none, but narrow
 /// bands of noise or something that rings.
 pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Finding>, Vec<f64>) {
@@ -96,7 +102,7 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Findin
     let make = |effect: &str, family: &[&str], lines: &[&Line], parameters: BTreeMap<String, Estimate>| {
         let (says, port) = text_of(effect);
         let strongest = lines.iter().map(|l| l.log_p).fold(0.0, f64::min);
-        let place = Where { frequency_hz: lines.iter().map(|l| [l.hz, l.hz]).collect(), ..everywhere(&runs) };
+        let place = Where { frequency_hz: lines.iter().map(|l| resolved(bench, l.hz)).collect(), ..everywhere(&runs) };
         let at: Vec<String> = lines.iter().map(|l| format!("{:.3}", l.hz)).collect();
         Finding {
             effect: effect.into(),
@@ -152,7 +158,6 @@ pub(super) fn unsteady(bench: &Bench, frequencies_hz: &[f64]) -> Finding {
     let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
     let (_, port) = text_of("unexplained");
     let strongest = bench.lines.iter().filter(|l| frequencies_hz.contains(&l.hz)).map(|l| l.log_p).fold(0.0, f64::min);
-    let width = 1.0 / bench.scene.duration_s.max(bench.scene.sample_time_s);
     let at: Vec<String> = frequencies_hz.iter().map(|f| format!("{f:.3}")).collect();
     Finding {
         effect: "unexplained".into(),
@@ -165,7 +170,7 @@ pub(super) fn unsteady(bench: &Bench, frequencies_hz: &[f64]) -> Finding {
         ),
         parameters: BTreeMap::new(),
         place: Where {
-            frequency_hz: frequencies_hz.iter().map(|f| [(f - width).max(0.0), f + width]).collect(),
+            frequency_hz: frequencies_hz.iter().map(|&f| resolved(bench, f)).collect(),
             ..everywhere(&runs)
         },
     }

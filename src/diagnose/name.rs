@@ -117,8 +117,8 @@ fn effect_signal(bench: &Bench, selection: &Selection, at: usize) -> Vec<f64> {
     signal
 }
 
-/// Parameters of the chosen effect `at` with 95 % intervals: each free number moved by its standard error, the changes of
-/// each parameter added as squares; widened where the model leaves more than noise.
+/// Parameters of the chosen effect `at` with 95 % intervals: its numbers moved together along each direction that errs independently,
+/// the changes of each parameter added as squares; widened where the model leaves more than noise.
 fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String, Estimate> {
     let model = selection.last();
     let scene = &bench.scene;
@@ -126,26 +126,21 @@ fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String
     let effect = chosen.effect;
     let base = effect.parameters(&chosen.setting, scene);
     let widen = (model.cost / model.freedom).max(1.0).sqrt() * 1.96;
-    let mut place = bench.form.knobs.len();
-    let strengths_of =
-        |i: usize| if model.chosen[i].effect.facts().fixed { 0 } else { model.chosen[i].setting.strengths.len() };
-    place += (0..at).map(strengths_of).sum::<usize>();
-    let mut moved: Vec<Vec<Parameter>> = Vec::new();
-    let spread = &model.refitted.spread;
-    for i in 0..strengths_of(at) {
+    let strengths_of = |c: &Chosen| if c.effect.facts().fixed { 0 } else { c.setting.strengths.len() };
+    let moving = |c: &Chosen| c.continuous.iter().filter(|c| **c).count();
+    let (before, all) = (&model.chosen[..at], &model.chosen);
+    let strength = bench.form.knobs.len() + before.iter().map(strengths_of).sum::<usize>();
+    let inner =
+        bench.form.knobs.len() + all.iter().map(strengths_of).sum::<usize>() + before.iter().map(moving).sum::<usize>();
+    let moved = |direction: &Vec<f64>| -> Vec<Parameter> {
+        let by = |i: usize| direction.get(i).copied().unwrap_or(0.0) * widen;
         let mut s: Setting = chosen.setting.clone();
-        s.strengths[i] += spread.get(place + i).copied().unwrap_or(0.0) * widen;
-        moved.push(effect.parameters(&s, scene));
-    }
-    let mut inner = bench.form.knobs.len() + (0..model.chosen.len()).map(strengths_of).sum::<usize>();
-    let free = |i: usize| model.chosen[i].continuous.iter().filter(|c| **c).count();
-    inner += (0..at).map(free).sum::<usize>();
-    for (i, _) in chosen.continuous.iter().enumerate().filter(|(_, c)| **c) {
-        let mut s = chosen.setting.clone();
-        s.inner[i] *= (spread.get(inner).copied().unwrap_or(0.0) * widen).min(2.0).exp();
-        inner += 1;
-        moved.push(effect.parameters(&s, scene));
-    }
+        (0..strengths_of(chosen)).for_each(|i| s.strengths[i] += by(strength + i));
+        let free = (0..s.inner.len()).filter(|&i| chosen.continuous[i]);
+        free.enumerate().for_each(|(k, i)| s.inner[i] *= by(inner + k).clamp(-2.0, 2.0).exp());
+        effect.parameters(&s, scene)
+    };
+    let moved: Vec<Vec<Parameter>> = model.refitted.directions.iter().map(moved).collect();
     let (position, command) = (&bench.form.given.position_unit, &bench.form.given.command_unit);
     let out: BTreeMap<String, Estimate> = base
         .iter()
@@ -306,7 +301,7 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
         let t = bench.scene.sample_time_s;
         let value = p[0] * t;
         let sigma =
-            bench.form.knobs.iter().position(|k| *k == Knob::Delay).map_or(0.0, |i| selection.model.refitted.spread[i])
+            bench.form.knobs.iter().position(|k| *k == Knob::Delay).map_or(0.0, |i| selection.model.refitted.spread(i))
                 * t;
         let (says, port) = text_of("extra_delay");
         let mut family = vec!["extra_delay".to_owned()];

@@ -26,6 +26,46 @@ fn range(mut weighted: Vec<(f64, f64)>) -> [f64; 2] {
     [ends[0], ends[1]]
 }
 
+/// Width of a band of the spectrum, as a ratio; never narrower than a record resolves.
+const BAND: f64 = 1.12;
+
+/// The fewest bands of a spectrum (frequency in Hz, power) that hold `HELD` of its power, joined where they touch; strongest first.
+/// `resolution` is the width that the longest record resolves (Hz).
+fn bands(spectrum: &[(f64, f64)], resolution: f64) -> Vec<[f64; 2]> {
+    let highest = spectrum.iter().map(|s| s.0).fold(0.0, f64::max);
+    let mut edges = vec![0.5 * resolution];
+    while let Some(&last) = edges.last().filter(|e| **e <= highest) {
+        edges.push((BAND * last).max(last + resolution));
+    }
+    let mut power = vec![0.0; edges.len()];
+    for (hz, p) in spectrum {
+        power[edges.partition_point(|e| e <= hz).saturating_sub(1)] += p;
+    }
+    let total: f64 = power.iter().sum();
+    let mut order: Vec<usize> = (0..power.len()).collect();
+    order.sort_by(|&a, &b| power[b].total_cmp(&power[a]));
+    let mut held = 0.0;
+    let mut kept: Vec<usize> = order
+        .into_iter()
+        .take_while(|&i| {
+            let more = held < HELD * total;
+            held += power[i];
+            more
+        })
+        .collect();
+    kept.sort_unstable();
+    let mut out: Vec<([usize; 2], f64)> = Vec::new();
+    for i in kept {
+        match out.last_mut() {
+            Some(([_, end], p)) if *end == i => (*end, *p) = (i + 1, *p + power[i]),
+            _ => out.push(([i, i + 1], power[i])),
+        }
+    }
+    out.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let edge = |i: usize| edges.get(i).copied().unwrap_or(highest).min(highest + 0.5 * resolution);
+    out.into_iter().map(|([from, to], _)| [edge(from), edge(to)]).collect()
+}
+
 /// Where `signal`, stacked and whitened, has its energy.
 pub fn place(bench: &Bench, stack: &Stack, signal: &[f64]) -> Where {
     let t = bench.scene.sample_time_s;
@@ -71,6 +111,7 @@ pub fn place(bench: &Bench, stack: &Stack, signal: &[f64]) -> Where {
         }
     }
     let mut spectrum = Vec::new();
+    let longest = stack.segments.iter().map(|s| s.len).max().unwrap_or(1);
     let mut zone = Vec::new();
     let (mut ahead, mut back) = (0.0, 0.0);
     for (i, s) in stack.segments.iter().enumerate() {
@@ -90,5 +131,6 @@ pub fn place(bench: &Bench, stack: &Stack, signal: &[f64]) -> Where {
     } else {
         "both"
     };
-    Where { records, time_s, frequency_hz: vec![range(spectrum)], position: vec![range(zone)], velocity_sign }
+    let frequency_hz = bands(&spectrum, 1.0 / (longest as f64 * t));
+    Where { records, time_s, frequency_hz, position: vec![range(zone)], velocity_sign }
 }

@@ -67,10 +67,23 @@ pub struct Refitted {
     pub plant: Plant,
     /// Sum of squares of the whitened error.
     pub cost: f64,
-    /// Standard errors of the linear parameters, then of the effects' strengths and inner parameters, in their order.
-    pub spread: Vec<f64>,
+    /// Errors of the linear parameters, then of the effects' strengths and inner parameters, in their order: directions that err
+    /// independently, each by one standard deviation. The covariance is the sum of their squares d dᵀ.
+    pub directions: Vec<Vec<f64>>,
     /// Whether the method met its tolerance.
     pub converged: bool,
+}
+
+impl Refitted {
+    /// How many numbers were fitted.
+    pub fn count(&self) -> usize {
+        self.directions.first().map_or(0, Vec::len)
+    }
+
+    /// Standard error of number `i`.
+    pub fn spread(&self, i: usize) -> f64 {
+        self.directions.iter().filter_map(|d| d.get(i)).map(|v| v * v).sum::<f64>().sqrt()
+    }
 }
 
 /// Step of a finite difference in a linear parameter: the answer is smooth and known to ten digits.
@@ -312,8 +325,7 @@ impl Fit<'_> {
         let moved = problem.settings(&x);
         // The covariance of the last factorised Jacobian, one step before the end: the same to first order.
         let root = work.qr.inverse_root();
-        let n = work.qr.cols();
-        let spread = (0..n).map(|i| (0..n).map(|j| root[j * n + i].powi(2)).sum::<f64>().sqrt()).collect();
+        let directions = root.chunks_exact(work.qr.cols().max(1)).map(<[f64]>::to_vec).collect();
         let knobs = self.form.knobs.len();
         for (c, s) in self.chosen.iter_mut().zip(moved) {
             c.setting = s;
@@ -322,7 +334,7 @@ impl Fit<'_> {
             plant: self.form.plant(&x[..knobs]),
             p: x[..knobs].to_vec(),
             cost: outcome.cost,
-            spread,
+            directions,
             converged: outcome.converged,
         }
     }

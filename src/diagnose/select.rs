@@ -58,9 +58,9 @@ impl Model {
         let mut from = knobs;
         self.chosen.iter().all(|c| {
             let count = if c.effect.facts().fixed { 0 } else { c.setting.strengths.len() };
-            let errors = self.refitted.spread.get(from..from + count).unwrap_or(&[]);
+            let errors: Vec<f64> = (from..from + count).map(|i| self.refitted.spread(i)).collect();
             from += count;
-            c.effect.possible(&c.setting, errors)
+            c.effect.possible(&c.setting, &errors)
         })
     }
 
@@ -113,6 +113,18 @@ impl Selection {
         if self.last().cost < self.model.cost { self.last() } else { &self.model }
     }
 
+    /// What effect `at` of the model explained when it was taken: fall of minus twice the logarithm of the likelihood.
+    pub fn gain(&self, at: usize) -> f64 {
+        let step = &self.steps[self.model.chosen[at].step];
+        step.taken.map_or(0.0, |t| step.before - step.tried[t].1.evidence)
+    }
+
+    /// Whether several laws share the work and none leads: one thing that the library lacks is likelier than so many that it has.
+    pub fn mixture(&self) -> bool {
+        let gains: Vec<f64> = (0..self.model.chosen.len()).map(|at| self.gain(at)).collect();
+        gains.len() >= MANY && gains.iter().copied().fold(0.0, f64::max) < LEADS * gains.iter().sum::<f64>()
+    }
+
     /// The model that numbers are taken from.
     pub fn last(&self) -> &Model {
         self.simulated.as_ref().unwrap_or(&self.model)
@@ -131,6 +143,10 @@ const REST: f64 = 0.75;
 /// is left.
 const LOOK: f64 = 8.0;
 
+/// Laws that together are many, and the share of what they explain by which one of them leads.
+const MANY: usize = 3;
+const LEADS: f64 = 0.8;
+
 /// Share of a law that the linear parameters can imitate above which these records say nothing of it.
 const CONCEALED: f64 = 0.9995;
 /// Most rounds of refit and noise where no repeat tells what noise is.
@@ -144,7 +160,7 @@ pub(super) fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64], iterations: 
     let mut fit = bench.fit(chosen);
     let refitted = fit.refit(p, iterations);
     let chosen = fit.chosen;
-    let used = refitted.spread.len() + 3 * bench.stack.segments.len();
+    let used = refitted.count() + 3 * bench.stack.segments.len();
     let freedom = bench.stack.total as f64 - used as f64;
     let known = bench.repeats.iter().map(|r| r.1.len()).sum::<usize>() as f64 - bench.stack.total as f64;
     let level = if bench.repeats.is_empty() { 0.0 } else { freedom * freedom / known.max(1.0) };

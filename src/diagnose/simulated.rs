@@ -242,17 +242,16 @@ pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
         return None;
     }
     // The errors of what was not moved stay those of the search.
-    let mut spread = model.refitted.spread.clone();
-    let root = work.qr.inverse_root();
-    let n = work.qr.cols();
-    let own = |i: usize| (0..n).map(|j| root[j * n + i].powi(2)).sum::<f64>().sqrt();
-    for (i, at) in places(&problem.free, model).into_iter().enumerate() {
-        if let Some(s) = spread.get_mut(at) {
-            *s = own(i);
-        }
+    let at = places(&problem.free, model);
+    let mut directions = model.refitted.directions.clone();
+    directions.iter_mut().for_each(|d| at.iter().for_each(|&i| d[i] = 0.0));
+    for own in work.qr.inverse_root().chunks_exact(at.len().max(1)) {
+        let mut d = vec![0.0; model.refitted.count()];
+        at.iter().zip(own).for_each(|(&i, v)| d[i] = *v);
+        directions.push(d);
     }
     let plant = bench.form.plant(&p);
-    let refitted = Refitted { p, plant, cost: outcome.cost, spread, converged: outcome.converged };
+    let refitted = Refitted { p, plant, cost: outcome.cost, directions, converged: outcome.converged };
     Some(Model { chosen, refitted, cost: outcome.cost, ..model.clone() })
 }
 
