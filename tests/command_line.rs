@@ -108,6 +108,10 @@ fn the_demo_runs_the_chain_and_names_its_report() {
     let report = last.strip_prefix("Open this report: ").unwrap();
     let page = std::fs::read_to_string(report).unwrap();
     assert!(page.starts_with("<!DOCTYPE html>") && page.contains("Model or measured response"));
+    // The tester at the end has its page, which leads to the reports of its worst slots.
+    let floor = std::fs::read_to_string(dir.join("floor_results/fleet.html")).unwrap();
+    let reports = std::fs::read_dir(dir.join("floor_results/slots")).unwrap().count();
+    assert!(reports > 0 && floor.matches("href=\"slots/").count() >= reports);
     // The table is a controller again, and meets its limits by the margins command too.
     let gains = dir.join("gains.toml");
     let machine = "specs/machines/tunable.toml";

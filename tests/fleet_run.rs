@@ -162,6 +162,23 @@ fn two_workers_share_a_store_and_a_finished_run_is_not_done_again() {
 }
 
 #[test]
+fn the_database_of_another_program_is_refused_and_left_as_it_is() {
+    let place = folder("foreign");
+    let file = place.join("other.db");
+    // Written by a store, so that it is a database; its version is taken away and its tables are another program's.
+    drop(Store::open(&file).unwrap());
+    let other = rusqlite::Connection::open(&file).unwrap();
+    other.execute_batch("PRAGMA journal_mode = DELETE; PRAGMA user_version = 0; DROP TABLE claims;").unwrap();
+    drop(other);
+    let before = std::fs::read(&file).unwrap();
+    assert!(matches!(Store::open(&file), Err(FleetError::Foreign { tables, .. }) if tables > 0));
+    assert!(std::fs::read(&file).unwrap() == before);
+    std::fs::write(&file, "a letter, not a database, and longer than the header of one is: sixteen bytes at least")
+        .unwrap();
+    assert!(matches!(Store::open(&file), Err(FleetError::NoDatabase { .. })));
+}
+
+#[test]
 fn a_bad_slot_is_a_row_and_revisions_keep_everything() {
     let (source, _place, context) = floor(4);
     let place = folder("bad");

@@ -1,11 +1,11 @@
 //! `servotune demo`: the whole chain on a built-in machine, from a sweep to a report, then eight machines at the gate, then records that
-//! the model does not explain.
+//! the model does not explain, then a tester of sixteen slots.
 
 use super::arguments::DemoArguments;
 use super::proof::{self, On, Proof};
 use super::slot::{self, Slot};
 use super::tune::{provenance, text};
-use super::{Ending, Failure, Screen, demo_diagnosis, demo_gate, gated};
+use super::{Ending, Failure, Screen, demo_diagnosis, demo_fleet, demo_gate, gated};
 use crate::document::{read_text, sha256_hex, write_text, write_whole};
 use crate::frf::{PhaseDisplay, ReadSettings, read_file, write_bod_as};
 use crate::identify::{IdentifySettings, identify};
@@ -33,6 +33,8 @@ struct Document<'a> {
     machines_report: PathBuf,
     diagnosis: crate::diagnose::Diagnosis,
     diagnosis_report: PathBuf,
+    fleet: super::fleet::Document,
+    fleet_page: PathBuf,
 }
 
 pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Failure> {
@@ -44,7 +46,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let spec_text = include_str!("../../specs/limits/paper.toml").replace("../profiles/spiral.toml", "profile.toml");
     write_text(&file("spec.toml"), &spec_text)?;
 
-    screen.say(&format!("1/6 sweep of the paper's tunable machine, 40-5000 Hz, 400 points, {} % noise", 100.0 * NOISE));
+    screen.say(&format!("1/7 sweep of the paper's tunable machine, 40-5000 Hz, 400 points, {} % noise", 100.0 * NOISE));
     let taken = measure(&machine, &log_grid(40.0, 5000.0, 400), NOISE, &mut Random::new(1))?;
     let mut bod = Vec::new();
     write_bod_as(&taken, PhaseDisplay::Margin, &mut bod)?;
@@ -54,7 +56,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
         screen.say(&format!("    {note}"));
     }
 
-    screen.say("2/6 identification");
+    screen.say("2/7 identification");
     let id = identify(&sweep.frf, &IdentifySettings::default())
         .map_err(|source| Failure::Identify { file: file("response.bod"), source })?;
     for sentence in identified_sentences(&id) {
@@ -63,7 +65,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let plant = toml::to_string(&PlantFile::from(&id.plant)).map_err(|source| Failure::Toml { source })?;
     write_text(&file("plant.toml"), &plant)?;
 
-    screen.say("3/6 tuning, straight on the measured response and over the model");
+    screen.say("3/7 tuning, straight on the measured response and over the model");
     let spec = Spec::read(&file("spec.toml")).map_err(TuneError::from)?;
     let settings = TuneSettings::default();
     let hold = Hold::NotIncluded;
@@ -84,7 +86,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let certificate =
         proof::beside(&gain_table, &On::Sweep { sweep: &sweep, hold_included: false }, &file("spec.toml"), screen)?;
 
-    screen.say("4/6 report");
+    screen.say("4/7 report");
     let page = slot::page(&Slot {
         name: "demo, the paper's tunable machine",
         plant: &id.plant,
@@ -101,22 +103,26 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let report = file("report.html");
     write_text(&report, &page.html())?;
 
-    screen.say("5/6 eight more machines at the gate; those worth it are tuned");
+    screen.say("5/7 eight more machines at the gate; those worth it are tuned");
     let start_digest = sha256_hex(controller_text.as_bytes());
     let spec_digest = sha256_hex(spec_text.as_bytes());
     let judged = demo_gate::run(&a.out, &spec, spec_digest, (start.clone(), start_digest), screen)?;
-    screen.say("6/6 records of a machine whose bearing sticks, diagnosed with the linear model");
+    screen.say("6/7 records of a machine whose bearing sticks, diagnosed with the linear model");
     let found = demo_diagnosis::run(&a.out, &machine, &start, screen)?;
+    screen.say("7/7 a tester of sixteen slots: gate, identification, tables for each slot and shared ones");
+    let floor = demo_fleet::run(&a.out, screen)?;
     let words = text(&outcome, Some(&start), slot::units(&id.plant))?;
     let ending = if matches!(outcome, Outcome::Tuned(_)) { Ending::Accepted } else { Ending::Rejected };
     let shown = format!(
-        "{words}\n{}\n{} {}\nOpen this table: {}\n\nRecords that the model does not explain\n{}Open this report: {}\n\nGain table: {}\n{}\nOpen this report: {}\n",
+        "{words}\n{}\n{} {}\nOpen this table: {}\n\nRecords that the model does not explain\n{}Open this report: {}\n\nA tester of sixteen slots\n{}Open this page: {}\n\nGain table: {}\n{}\nOpen this report: {}\n",
         gated::sheet(&judged.rows)?.text(),
         gated::summary(&judged.rows),
         judged.table.display(),
         judged.page.display(),
         found.text,
         found.report.display(),
+        floor.text,
+        floor.page.display(),
         gain_table.display(),
         certificate.says,
         report.display()
@@ -131,6 +137,8 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
         machines_report: judged.page,
         diagnosis: found.diagnosis,
         diagnosis_report: found.report,
+        fleet: floor.document,
+        fleet_page: floor.page,
     };
     screen.result(&document, &shown)?;
     Ok(ending)

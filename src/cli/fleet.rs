@@ -1,8 +1,9 @@
 //! `servotune fleet`: all slots of all testers, from raw files to tables and report; history, revisions, differences.
 
 use super::fleet_arguments::{FleetArguments, FleetCommand, FleetRunArguments};
+use super::fleet_clock::Clocked;
 use super::fleet_progress::Progress;
-use super::{Ending, Failure, Screen, fleet_page, fleet_slot, fleet_store};
+use super::{Ending, Failure, Screen, fleet_page, fleet_progress, fleet_slot, fleet_store};
 use crate::document::write_text;
 use crate::fleet::{
     self, Action, Asked, Context, Effort, FileSource, Fleet, Job, SlotRow, SlotSource, Stamp, Store, Verdict, Worker,
@@ -10,15 +11,18 @@ use crate::fleet::{
 };
 use crate::study::TwinSource;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
+/// What a run came to.
 #[derive(Serialize)]
-struct Document {
+pub(super) struct Document {
     run: String,
     slots: usize,
     verdicts: BTreeMap<&'static str, usize>,
+    /// Tuned slots whose table the second prover certifies on the models of all cases.
+    certified: usize,
     shared: Option<fleet::Shared>,
     store: PathBuf,
     files: Vec<PathBuf>,
@@ -27,6 +31,13 @@ struct Document {
     files_seconds: f64,
     /// Slots worked on by this process in a second, pilots included in the time.
     slots_per_s: f64,
+    /// From the first slot of the stage of every slot to its last (s), pilots and shared tables left out.
+    slots_stage_s: f64,
+    /// Processor time of that stage and of the run without its files (s), where the system tells.
+    slots_stage_cpu_s: Option<f64>,
+    cpu_s: Option<f64>,
+    /// Time of all threads together that went into reading or drawing slots (s).
+    loading_thread_s: f64,
     /// Most memory that this process ever held (MiB), where the system tells.
     peak_memory_mib: Option<f64>,
 }
@@ -88,14 +99,22 @@ fn source(file: &Path, fleet: &Fleet) -> Result<Box<dyn SlotSource>, Failure> {
 }
 
 fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let (document, text) = make(a, screen)?;
+    screen.result(&document, &text)?;
+    let served = document.verdicts[Verdict::Keeps.word()] + document.verdicts[Verdict::Tuned.word()];
+    Ok(if served == document.slots { Ending::Accepted } else { Ending::Rejected })
+}
+
+/// Works on a floor and writes its files; what it came to, as a document and in words.
+pub(super) fn make(a: &FleetRunArguments, screen: &mut Screen) -> Result<(Document, String), Failure> {
     let fleet = Fleet::read(&a.fleet)?;
     let context = Context::of(&fleet)?;
-    let source = source(&a.fleet, &fleet)?;
+    let source = Clocked::of(source(&a.fleet, &fleet)?);
     let store_file = fleet.file.store.clone().unwrap_or_else(|| a.out.join("fleet.db"));
     let mut store = Store::open(&store_file)?;
     let worker = Worker::at(&store_file, &format!("process-{}", std::process::id()))?;
     let job = Job {
-        source: source.as_ref(),
+        source: &source,
         context: &context,
         store: &store_file,
         run: a.run.as_deref(),
@@ -108,10 +127,12 @@ fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failu
     let run = fleet::run(&job, &progress);
     progress.close();
     let run = run?;
-    let seconds = begun.elapsed().as_secs_f64();
+    let (seconds, cpu_s) = (begun.elapsed().as_secs_f64(), fleet_progress::cpu_s());
     let mut verdicts: BTreeMap<&'static str, usize> = Verdict::ALL.iter().map(|v| (v.word(), 0)).collect();
+    let mut certified = 0;
     store.each_row(&run, None, |row| {
         *verdicts.entry(row.verdict.word()).or_default() += 1;
+        certified += usize::from(row.certified.as_ref().is_some_and(|c| c.passes));
         Ok(())
     })?;
     let all = store.runs()?;
@@ -119,10 +140,11 @@ fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failu
     let before = all[..own].iter().filter(|r| r.finished.is_some()).map(|r| r.run.clone()).collect();
     let asked = Asked { gains: source.count() <= MOST_GAIN_FILES, before };
     let mut files = write_tables(&store, &run, &context, &a.out, &asked)?;
+    let (slots, reports) = slot_pages(&store, &run, &context, &source, a, screen)?;
     let page = a.out.join("fleet.html");
-    write_text(&page, &fleet_page::html(&store, &run, &context, &asked.before)?)?;
+    write_text(&page, &fleet_page::html(&store, &run, &context, &asked.before, &reports)?)?;
     files.push(page);
-    files.extend(slot_pages(&store, &run, &context, source.as_ref(), a, screen)?);
+    files.extend(slots);
     store.finish(&run, &stamp(a.who.as_deref()))?;
     files.iter().for_each(|f| screen.say(&format!("wrote {}", f.display())));
     let files_seconds = begun.elapsed().as_secs_f64() - seconds;
@@ -133,21 +155,24 @@ fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failu
     text += &shared.as_ref().map(shared_words).unwrap_or_default();
     let slots_per_s = progress.earned() as f64 / seconds.max(1e-9);
     text += &format!("{seconds:.1} s, {slots_per_s:.1} slots/s\n");
-    let accepted = verdicts[Verdict::Keeps.word()] + verdicts[Verdict::Tuned.word()] == slots;
     let document = Document {
         run,
         slots,
         verdicts,
+        certified,
         shared,
         store: store_file,
         files,
         seconds,
         files_seconds,
         slots_per_s,
+        slots_stage_s: progress.slots_stage_s(),
+        slots_stage_cpu_s: progress.slots_stage_cpu_s(),
+        cpu_s,
+        loading_thread_s: source.seconds(),
         peak_memory_mib: peak_memory_mib(),
     };
-    screen.result(&document, &text)?;
-    Ok(if accepted { Ending::Accepted } else { Ending::Rejected })
+    Ok((document, text))
 }
 
 /// Full reports of the slots whose limits are missed most, or nearest to it.
@@ -158,7 +183,7 @@ fn slot_pages(
     source: &dyn SlotSource,
     a: &FleetRunArguments,
     screen: &mut Screen,
-) -> Result<Vec<PathBuf>, Failure> {
+) -> Result<(Vec<PathBuf>, BTreeSet<String>), Failure> {
     let mut worst: Vec<(f64, SlotRow)> = Vec::new();
     store.each_row(run, None, |row| {
         let best = row.table.as_ref().or(row.nearest.as_ref()).map(|t| &t.proved).or(row.current.as_ref());
@@ -171,19 +196,20 @@ fn slot_pages(
         }
         Ok(())
     })?;
-    let mut files = Vec::new();
+    let (mut files, mut slots) = (Vec::new(), BTreeSet::new());
     for (_, row) in &worst {
-        let file = a.out.join("slots").join(format!("{}_{}.html", row.tester, row.slot));
+        let file = a.out.join(fleet_slot::file(row));
         match fleet_slot::html(context, source, row) {
             Ok(Some(page)) => {
                 write_text(&file, &page)?;
                 files.push(file);
+                slots.insert(row.id());
             }
             Ok(None) => {}
             Err(e) => screen.say(&format!("note: no page of {}: {e}", row.id())),
         }
     }
-    Ok(files)
+    Ok((files, slots))
 }
 
 /// The shared tables in words.

@@ -1,16 +1,22 @@
 //! From the store to the page of a fleet.
 
-use super::Failure;
+use super::{Failure, fleet_slot};
 use crate::fleet::{Context, Proved, SlotRow, Store, Verdict, assigned, drift, work_list};
 use crate::lti::Plant;
 use crate::report::fleet::{CoverageLine, FleetView, SlotLine, fleet_page};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Slots that a page holds; of a larger floor every second, third, ... one is shown and counted in its distributions.
 const SHOWN: usize = 20_000;
 
-/// The page of a run as HTML; `before` are the runs whose drift is told.
-pub(super) fn html(store: &Store, run: &str, context: &Context, before: &[String]) -> Result<String, Failure> {
+/// The page of a run as HTML; `before` are the runs whose drift is told, `reports` the slots with a report of their own.
+pub(super) fn html(
+    store: &Store,
+    run: &str,
+    context: &Context,
+    before: &[String],
+    reports: &BTreeSet<String>,
+) -> Result<String, Failure> {
     let count = store.count_done(run)?;
     let step = count.div_ceil(SHOWN).max(1);
     let shared = store.shared(run)?.unwrap_or_default();
@@ -26,12 +32,14 @@ pub(super) fn html(store: &Store, run: &str, context: &Context, before: &[String
             if let (true, Some(model)) = (view.position_unit.is_empty(), &row.model) {
                 view.position_unit = Plant::try_from(model.plant.clone()).map(|p| p.position_unit).unwrap_or_default();
             }
-            view.slots.push(line(&row, name));
+            let report = reports.contains(&row.id()).then(|| fleet_slot::file(&row));
+            view.slots.push(SlotLine { report, ..line(&row, name) });
         }
         Ok(())
     })?;
     view.verdicts = Verdict::ALL.iter().map(|v| (v.word().to_owned(), verdicts.get(v).copied().unwrap_or(0))).collect();
-    let share = |n: usize| n as f64 / shared.slots.max(1) as f64;
+    // What no table of its own serves, no shared one can.
+    let share = |n: usize| n as f64 / shared.own.max(1) as f64;
     let curve = shared.curve.iter();
     view.coverage = curve
         .map(|c| CoverageLine { tables: c.tables.len(), share: share(c.served), at_most: share(c.at_most) })
@@ -104,6 +112,7 @@ fn line(row: &SlotRow, shared: Option<String>) -> SlotLine {
         worst: of(&|p| Some(p.worst)),
         limit: limit.unwrap_or_default(),
         shared: shared.unwrap_or_default(),
+        report: None,
         note: note.split("; decided by").next().unwrap_or_default().to_owned(),
     }
 }

@@ -9,8 +9,16 @@ use std::time::{Duration, Instant};
 pub(super) struct Progress {
     terminal: bool,
     state: Mutex<Option<State>>,
-    /// Slots done when they were counted first and last.
-    slots: Mutex<Option<(usize, usize)>>,
+    /// Slots done when they were counted first and last, and when that was.
+    slots: Mutex<Option<[Count; 2]>>,
+}
+
+/// Slots done, when, and the processor's time till then (s).
+#[derive(Clone, Copy)]
+struct Count {
+    done: usize,
+    at: Instant,
+    cpu_s: Option<f64>,
 }
 
 struct State {
@@ -34,7 +42,18 @@ impl Progress {
 
     /// Slots that this process has seen done since it began.
     pub(super) fn earned(&self) -> usize {
-        self.slots.lock().map_or(0, |s| s.map_or(0, |(first, last)| last.saturating_sub(first)))
+        self.slots.lock().map_or(0, |s| s.map_or(0, |[first, last]| last.done.saturating_sub(first.done)))
+    }
+
+    /// Time from the first to the last count of slots (s).
+    pub(super) fn slots_stage_s(&self) -> f64 {
+        let between = |[first, last]: [Count; 2]| last.at.duration_since(first.at).as_secs_f64();
+        self.slots.lock().map_or(0.0, |s| s.map_or(0.0, between))
+    }
+
+    /// Processor time of all threads from the first to the last count of slots (s), where the system tells.
+    pub(super) fn slots_stage_cpu_s(&self) -> Option<f64> {
+        self.slots.lock().ok()?.and_then(|[first, last]| Some(last.cpu_s? - first.cpu_s?))
     }
 
     /// Ends the bar's line.
@@ -43,6 +62,18 @@ impl Progress {
             let _ = writeln!(std::io::stderr());
         }
     }
+}
+
+/// Ticks of the kernel's clock in a second, the same on every Linux.
+const TICKS: f64 = 100.0;
+
+/// Processor time of this process so far (s), as Linux tells it.
+pub(super) fn cpu_s() -> Option<f64> {
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The name before the last bracket may hold blanks; user and system time are the 12th and 13th words after it.
+    let mut words = stat.rsplit_once(')')?.1.split_whitespace().skip(11);
+    let ticks = words.next()?.parse::<f64>().ok()? + words.next()?.parse::<f64>().ok()?;
+    Some(ticks / TICKS)
 }
 
 fn name(stage: Stage) -> &'static str {
@@ -82,7 +113,8 @@ impl Watch for Progress {
         if stage == Stage::Slots
             && let Ok(mut slots) = self.slots.lock()
         {
-            *slots = Some((slots.map_or(done, |s| s.0), done));
+            let now = Count { done, at: Instant::now(), cpu_s: cpu_s() };
+            *slots = Some([slots.map_or(now, |[first, _]| first), now]);
         }
         // A poisoned lock only means that another thread failed while it printed.
         let Ok(mut state) = self.state.lock() else { return };

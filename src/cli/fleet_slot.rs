@@ -8,6 +8,11 @@ use crate::frf::Sweep;
 use crate::lti::Plant;
 use crate::tune::{Machine, Outcome, Route, Tuned, Work, judge};
 
+/// Where the page of a slot lies beside the fleet's page.
+pub(super) fn file(row: &SlotRow) -> String {
+    format!("slots/{}_{}.html", row.tester, row.slot)
+}
+
 /// The page of a slot; none where it could not be identified or judged.
 pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) -> Result<Option<String>, Failure> {
     let loaded = source.load(row.index);

@@ -1,26 +1,24 @@
 //! Studies of the fleet: they run this very program as other processes, so that time, memory and kills are those of a real run.
 //!
-//! In: the folder for results. Out: `fleet.md`, `fleet_shared.md`, `fleet_scale.md`, `fleet_kills.md`. Work is done in a temporary folder.
+//! In: the folder for results. Out: `fleet.md`, `fleet_shared.md`, `fleet_scale.md`. Work is done in a temporary folder.
 
 use super::{Failure, Screen};
 use crate::document::{read_text, write_text};
-use crate::numeric::random::Random;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
 /// A folder for the work, gone afterwards.
-struct Place(PathBuf);
+pub(super) struct Place(PathBuf);
 
 impl Place {
-    fn new(name: &str) -> Result<Place, Failure> {
+    pub(super) fn new(name: &str) -> Result<Place, Failure> {
         let folder = std::env::temp_dir().join(format!("servotune-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).map_err(|source| Failure::Child { what: "make a folder".into(), source })?;
         Ok(Place(folder))
     }
 
-    fn at(&self, name: &str) -> PathBuf {
+    pub(super) fn at(&self, name: &str) -> PathBuf {
         self.0.join(name)
     }
 }
@@ -32,7 +30,7 @@ impl Drop for Place {
 }
 
 /// This program with these words.
-fn program(words: &[&str]) -> Result<Command, Failure> {
+pub(super) fn program(words: &[&str]) -> Result<Command, Failure> {
     let fail = |source| Failure::Child { what: "find this program".into(), source };
     let mut c = Command::new(std::env::current_exe().map_err(fail)?);
     c.args(words).stdin(Stdio::null()).stderr(Stdio::null());
@@ -46,23 +44,23 @@ fn json(words: &[&str]) -> Result<Value, Failure> {
     serde_json::from_slice(&out.stdout).map_err(|source| Failure::Json { source })
 }
 
-fn text(path: &Path) -> String {
+pub(super) fn text(path: &Path) -> String {
     path.display().to_string()
 }
 
-fn number(v: &Value, key: &str) -> f64 {
+pub(super) fn number(v: &Value, key: &str) -> f64 {
     v[key].as_f64().unwrap_or(f64::NAN)
 }
 
 /// One run of FLEET.toml.
-fn run(fleet: &Path, out: &Path, more: &[&str]) -> Result<Value, Failure> {
+pub(super) fn run(fleet: &Path, out: &Path, more: &[&str]) -> Result<Value, Failure> {
     let (fleet, out) = (text(fleet), text(out));
     let mut words = vec!["fleet", "run", &fleet, "--out", &out];
     words.extend(more);
     json(&words)
 }
 
-fn twin(out: &Path, more: &[&str]) -> Result<(), Failure> {
+pub(super) fn twin(out: &Path, more: &[&str]) -> Result<(), Failure> {
     let out = text(out);
     let mut words = vec!["twin", "fleet", "--out", &out];
     words.extend(more);
@@ -75,7 +73,7 @@ fn verdicts(v: &Value) -> String {
 }
 
 /// What every page says about the machine that it was measured on.
-fn machine() -> String {
+pub(super) fn machine() -> String {
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     format!(
         "Machine: {cores} cores, shared with other work while this was measured (load average when the page was written: {}).",
@@ -91,21 +89,23 @@ fn machine() -> String {
 /// The coverage table of a run.
 fn coverage(v: &Value) -> String {
     let s = &v["shared"];
-    let slots = number(s, "slots");
-    let share = |x: f64| format!("{:.1} %", 100.0 * x / slots);
-    let mut t =
-        String::from("| tables | slots served | no choice of as many candidates serves more than |\n|---|---|---|\n");
+    let (slots, own) = (number(s, "slots"), number(s, "own"));
+    let share = |x: f64| format!("{:.1} %, {:.1} %", 100.0 * x / own, 100.0 * x / slots);
+    let mut t = format!(
+        "Of {slots} slots to be served {own} can be: they keep proven gains or have a proven table of their own. Shares are of those {own}, then of all {slots}.\n\n\
+         | tables | slots served | no choice of as many candidates serves more than |\n|---|---|---|\n"
+    );
     for c in s["curve"].as_array().into_iter().flatten() {
         let k = c["tables"].as_array().map_or(0, Vec::len);
         let (served, most) = (number(c, "served"), number(c, "at_most"));
         t += &format!("| {k} | {served} ({}) | {most} ({}) |\n", share(served), share(most));
     }
-    t += &format!("\n| another way | slots served of {slots} |\n|---|---|\n");
+    t += "\n| another way | slots served |\n|---|---|\n";
     for (way, key) in [
         ("gains as they stand in each slot today", "today"),
         ("the one table of FLEET.toml for all slots", "base"),
         ("a table of its own for each slot", "own"),
-        ("any candidate of the library", "coverable"),
+        ("all shared candidates together", "coverable"),
     ] {
         t += &format!("| {way} | {} ({}) |\n", number(s, key), share(number(s, key)));
     }
@@ -118,6 +118,9 @@ fn coverage(v: &Value) -> String {
     }
     t
 }
+
+/// Full reports kept with the page of the floor.
+const REPORTS: usize = 4;
 
 /// 64 testers of 16 slots from raw files, three runs of the same floor.
 pub(super) fn floor(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Failure> {
@@ -132,12 +135,15 @@ pub(super) fn floor(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Fai
         // One store for all three, beside their folders.
         let file = floor.join("FLEET.toml");
         write_text(&file, &format!("store = {store:?}\n{}", read_text(&file)?))?;
-        runs.push(run(&file, &result, &["--run", &format!("age-{age}")])?);
+        let pages = REPORTS.to_string();
+        runs.push(run(&file, &result, &["--run", &format!("age-{age}"), "--pages", &pages])?);
     }
     let last = &runs[runs.len() - 1];
     let lines = |name: &str, n: usize| -> Result<String, Failure> {
         Ok(read_text(&result.join(name))?.lines().take(n).collect::<Vec<_>>().join("\n"))
     };
+    let tuned: f64 = last["verdicts"]["tuned"].as_f64().unwrap_or(f64::NAN);
+    let certified = number(last, "certified");
     let mut rows = String::new();
     for (v, age) in runs.iter().zip(["0", "6", "12"]) {
         rows += &format!(
@@ -155,16 +161,29 @@ pub(super) fn floor(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Fai
          time all 1024 slots go from their files through gate, identification, judgement and tuning into one store. Every table stands two\n\
          temperatures and two drawn plants. {}\n\n\
          | age | slots | s | slots/s | peak MiB | verdicts |\n|---|---|---|---|---|---|\n{rows}\n\
-         The page of the last run: [fleet.html](fleet.html).\n\n## Shared tables, last run\n\n{}\n\
+         Slots/s counts all of a run: pilots, the library, every slot, explanations of untunable slots, shared tables.\n\n\
+         The page of the last run, with the reports of its {REPORTS} worst slots: [fleet.html](fleet.html).\n\n\
+         Second opinion, last run: of {tuned} tables of tuned slots the prover of `specs/certificate.md` certifies {certified} ({:.1} %): on the identified plant, the\n\
+         drawn plants and at each temperature every limit of a margin is kept at every frequency. The others keep them on the measured curve, and miss one on a\n\
+         model by what the model leaves over; `slots.csv` says which.\n\n## Shared tables, last run\n\n{}\n\
          ## Work list, its first lines\n\n```text\n{}\n```\n\n## Drift over the three runs, its first lines\n\n```text\n{}\n```\n",
         machine(),
+        100.0 * certified / tuned,
         coverage(last),
         lines("work_list.csv", 16)?,
         lines("drift.csv", 8)?
     );
-    let files = vec![out.join("fleet.md"), out.join("fleet.html")];
+    let mut files = vec![out.join("fleet.md"), out.join("fleet.html")];
     write_text(&files[0], &page)?;
     write_text(&files[1], &read_text(&result.join("fleet.html"))?)?;
+    // Reports that the page leads to; those of an earlier page have no reader any more.
+    let _ = std::fs::remove_dir_all(out.join("slots"));
+    for file in last["files"].as_array().into_iter().flatten().filter_map(Value::as_str).map(Path::new) {
+        if let (Some("slots"), Some(name)) = (file.parent().and_then(|p| p.file_name()?.to_str()), file.file_name()) {
+            files.push(out.join("slots").join(name));
+            write_text(&files[files.len() - 1], &read_text(file)?)?;
+        }
+    }
     Ok(files)
 }
 
@@ -176,17 +195,24 @@ pub(super) fn shared(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Fa
     twin(&floor, &["--slots", "1000"])?;
     let v = run(&floor.join("FLEET.toml"), &place.at("out"), &[])?;
     let s = &v["shared"];
-    let enough = s["curve"].as_array().into_iter().flatten().find(|c| number(c, "served") >= 0.99 * number(s, "slots"));
-    let words = match enough {
-        Some(c) => format!("{} tables serve 99 %", c["tables"].as_array().map_or(0, Vec::len)),
-        None => "99 % was not reached".into(),
+    let words = |of: &str| {
+        let enough = |c: &&Value| number(c, "served") >= 0.99 * number(s, of);
+        match s["curve"].as_array().into_iter().flatten().find(enough) {
+            Some(c) => format!("{} serve 99 %", c["tables"].as_array().map_or(0, Vec::len)),
+            None => "99 % is not reached".into(),
+        }
     };
+    let (can, all) = (words("own"), words("slots"));
     let page = format!(
         "# Shared tables for 1000 slots\n\n\
          Made by `servotune study fleet-shared --out results`. {}\n\n\
          A slot counts as served where the table meets every limit of `specs/limits/floor.toml` as measured, at 18 and 30 deg C, and on two plants\n\
          drawn from its model's covariance. Slots that the gate sends to repair or to a person are not among them. Verdicts: {}.\n\n{}\n\
-         Aim: 99 % with at most 8 tables; {words}.\n",
+         Aim: 99 % with at most 8 tables. Of the slots that any table serves: {can}. Of all slots to be served: {all}, since what no table of its own serves no shared\n\
+         one can; `fleet run` explains each of those slots and what would have to change in it.\n\n\
+         How the tables come about: `specs/fleet.md`, \"Shared tables\". \"Groups\" is cluster-then-tune: k-means on ln P(jw) of the pilots, a table with the most room for\n\
+         each group's most different members, every slot bound to its nearest group. The tables are candidates from a sample of 192 slots, completed on the\n\
+         slots that the sample's tables leave.\n",
         machine(),
         verdicts(&v),
         coverage(&v)
@@ -196,11 +222,12 @@ pub(super) fn shared(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Fa
     Ok(files)
 }
 
-/// Slots per second and memory over the size of the floor.
+/// Slots per second and memory over the size of the floor. The page is written again after each size.
 pub(super) fn scale(out: &Path, sizes: &[usize], screen: &mut Screen) -> Result<Vec<PathBuf>, Failure> {
     let place = Place::new("scale")?;
-    let mut rows = String::new();
-    let mut last: Option<(usize, f64, f64, f64)> = None;
+    let page = out.join("fleet_scale.md");
+    let threads = std::thread::available_parallelism().map_or(1, usize::from) as f64;
+    let (mut runs, mut slots) = (String::new(), String::new());
     for &size in sizes {
         screen.say(&format!("scale: {size} slots"));
         let floor = place.at(&format!("floor{size}"));
@@ -208,39 +235,48 @@ pub(super) fn scale(out: &Path, sizes: &[usize], screen: &mut Screen) -> Result<
         let result = place.at(&format!("out{size}"));
         let v = run(&floor.join("FLEET.toml"), &result, &[])?;
         let store = std::fs::metadata(result.join("fleet.db")).map_or(f64::NAN, |m| m.len() as f64 / 1048576.0);
-        let (seconds, files) = (number(&v, "seconds"), number(&v, "files_seconds"));
-        let memory = number(&v, "peak_memory_mib");
-        rows += &format!(
-            "| {size} | {seconds:.1} | {files:.1} | {:.1} | {memory:.0} | {store:.0} | {} |\n",
-            number(&v, "slots_per_s"),
+        let (seconds, files, cpu) = (number(&v, "seconds"), number(&v, "files_seconds"), number(&v, "cpu_s"));
+        let (memory, stage, stage_cpu) =
+            (number(&v, "peak_memory_mib"), number(&v, "slots_stage_s"), number(&v, "slots_stage_cpu_s"));
+        let n = size as f64;
+        runs += &format!(
+            "| {size} | {seconds:.0} | {cpu:.0} | {:.1} | {files:.1} | {memory:.0} | {store:.0} | {} |\n",
+            n / seconds,
             verdicts(&v)
         );
-        last = Some((size, seconds + files, memory, store));
+        slots += &format!(
+            "| {size} | {stage:.0} | {:.1} | {stage_cpu:.0} | {:.1} | {:.0} % |\n",
+            n / stage,
+            n * threads / stage_cpu,
+            100.0 * number(&v, "loading_thread_s") / (stage * threads)
+        );
+        let times = 1e7 / n;
+        let ahead = format!(
+            "A floor of 10 000 000 slots, a hundred times 100 000, by the largest run above in proportion: {:.0} h on one such machine, a store of {:.0} GiB.",
+            (seconds + files) * times / 3600.0,
+            store * times / 1024.0,
+        );
+        let text = format!(
+            "# How a run grows with the floor\n\n\
+             Made by `servotune study fleet-scale --out results` (`--sizes` chooses the floors). Slots are made up when they are needed, which is part of the time. {}\n\n\
+             ## The stage that grows: every slot\n\n\
+             Each slot is drawn, goes through gate, identification, judgement, tuning, proof and the second prover, and is stored. Aim: 100 slots/s on 2 cores.\n\n\
+             | slots | wall (s) | slots/s | processor (s) | slots/s on {threads} cores without other work | share of drawing slots |\n|---|---|---|---|---|---|\n{slots}\n\
+             The fifth column is slots times cores over processor seconds: what the same work takes where nobody else uses the cores.\n\n\
+             ## The whole run\n\n\
+             With pilots, library, explanations of untunable slots (40 at most) and shared tables. Aim: below 1024 MiB.\n\n\
+             | slots | wall (s) | processor (s) | slots/s | files after it (s) | peak MiB | store MiB | verdicts |\n|---|---|---|---|---|---|---|---|\n{runs}\n\
+             {BEFORE}\n{AHEAD}\n{ahead}\n",
+            machine()
+        );
+        write_text(&page, &text)?;
         let _ = std::fs::remove_dir_all(&result);
     }
-    let mut ahead = String::new();
-    if let Some((size, seconds, memory, store)) = last {
-        let times = 10_000_000.0 / size as f64;
-        ahead = format!(
-            "A floor of 10 000 000 slots, a hundred times 100 000, by the largest run above in proportion: {:.0} h on one such machine, a store of {:.0} GiB,\n\
-             {:.0} MiB of memory and what the last steps hold for each slot.\n",
-            seconds * times / 3600.0,
-            store * times / 1024.0,
-            memory
-        );
-    }
-    let page = format!(
-        "# How a run grows with the floor\n\n\
-         Made by `servotune study fleet-scale --out results`. Slots are made up when they are needed, which is part of the time. {}\n\n\
-         | slots | run (s) | files (s) | slots/s | peak MiB | store MiB | verdicts |\n|---|---|---|---|---|---|---|\n{rows}\n\
-         Slots/s counts all of a run: pilots, every slot, explanations, shared tables. Aim: 100 slots/s on 2 cores, below 1024 MiB.\n\n\
-         {AHEAD}\n{ahead}",
-        machine()
-    );
-    let files = vec![out.join("fleet_scale.md")];
-    write_text(&files[0], &page)?;
-    Ok(files)
+    Ok(vec![page])
 }
+
+/// Where the costs and what brought them down are told.
+const BEFORE: &str = "Where the time goes, and what it was before: `specs/fleet.md`, \"Speed\".\n";
 
 /// What fails first, in the order of its coming.
 const AHEAD: &str = "## What fails first when the fleet is a hundred times larger\n\n\
@@ -254,107 +290,3 @@ library; (2) tables of slots, partitioned by tester, go out as Parquet; every wo
 Parquet; (3) one machine reads them into the store, chooses the shared tables and writes the files. Apache DataFusion Ballista runs step 2 where the\n\
 function is registered on every executor; its limits for such functions are in the project's notes on dependencies. Each partition is idempotent by run,\n\
 slot and digest, so that a partition done twice changes nothing.\n";
-
-/// Slots of the floor that is killed.
-const KILLED_SLOTS: &str = "32";
-
-/// Files that must be equal to the last byte.
-const COMPARED: [&str; 6] =
-    ["slots.csv", "slots.jsonl", "coverage.csv", "shared.json", "work_list.csv", "untunable.json"];
-
-fn bytes(folder: &Path) -> Result<Vec<Vec<u8>>, Failure> {
-    let read = |name: &&str| {
-        std::fs::read(folder.join(name)).map_err(|source| Failure::Child { what: format!("read {name}"), source })
-    };
-    COMPARED.iter().map(read).collect()
-}
-
-/// Kills a run at random instants until it has been killed `kills` times; every finished run is compared with an undisturbed one.
-pub(super) fn kills(out: &Path, kills: usize, screen: &mut Screen) -> Result<Vec<PathBuf>, Failure> {
-    let place = Place::new("kills")?;
-    let floor = place.at("floor");
-    twin(&floor, &["--slots", KILLED_SLOTS])?;
-    let fleet = floor.join("FLEET.toml");
-    let smaller = read_text(&fleet)?.replace("pilots = 32", "pilots = 4\ncandidates = 12");
-    write_text(&fleet, &smaller.replace("most = 16", "most = 8"))?;
-    let calm = run(&fleet, &place.at("calm"), &[])?;
-    let whole = number(&calm, "seconds") + number(&calm, "files_seconds");
-    let wanted = bytes(&place.at("calm"))?;
-    let mut random = Random::new(1);
-    let (mut done, mut finished, mut before, mut unsound, mut lost, mut doubled, mut differ) = (0, 0, 0, 0, 0, 0, 0);
-    while done < kills {
-        let result = place.at(&format!("killed{finished}"));
-        let words = [text(&fleet), text(&result)];
-        let mut most = 0usize;
-        loop {
-            let fail = |source| Failure::Child { what: "start a run".into(), source };
-            let mut child = program(&[
-                "fleet", "run", &words[0], "--out", &words[1], "--chunk", "2", "--run", "one", "--pages", "0",
-            ])?
-            .stdout(Stdio::null())
-            .spawn()
-            .map_err(fail)?;
-            let wait = Duration::from_secs_f64(random.between(0.0, 0.6 * whole));
-            let begun = Instant::now();
-            let ended = loop {
-                if child.try_wait().map_err(fail)?.is_some() {
-                    break true;
-                }
-                if begun.elapsed() >= wait || done >= kills {
-                    break false;
-                }
-                std::thread::sleep(Duration::from_millis(1));
-            };
-            if ended {
-                break;
-            }
-            if done >= kills {
-                child.wait().map_err(fail)?;
-                break;
-            }
-            child.kill().map_err(fail)?;
-            child.wait().map_err(fail)?;
-            done += 1;
-            let file = result.join("fleet.db");
-            if file.exists() {
-                let store = crate::fleet::Store::open(&file)?;
-                unsound += usize::from(!store.sound()?);
-                let rows = store.runs()?.first().map_or(Ok(0), |r| store.count_done(&r.run))?;
-                // What was committed must still be there.
-                lost += most.saturating_sub(rows);
-                most = most.max(rows);
-                before += usize::from(rows > 0);
-            }
-            if done % 50 == 0 {
-                screen.say(&format!("kills: {done} of {kills}"));
-            }
-        }
-        let store = crate::fleet::Store::open(&result.join("fleet.db"))?;
-        let runs = store.runs()?;
-        doubled += runs.len().saturating_sub(1);
-        let name = runs.first().map(|r| r.run.clone()).unwrap_or_default();
-        let mut names = std::collections::BTreeSet::new();
-        store.each_row(&name, None, |r| {
-            doubled += usize::from(!names.insert(r.id()));
-            Ok(())
-        })?;
-        lost += KILLED_SLOTS.parse::<usize>().unwrap_or(0).saturating_sub(names.len());
-        differ += usize::from(bytes(&result)? != wanted);
-        finished += 1;
-        let _ = std::fs::remove_dir_all(&result);
-    }
-    let page = format!(
-        "# {kills} kills at random instants\n\n\
-         Made by `servotune study fleet-kills --out results`. A run of {KILLED_SLOTS} slots (4 pilots, chunks of 2) is killed by SIGKILL at instants drawn evenly over 0 to\n\
-         0.6 of the time that an undisturbed run takes ({whole:.1} s), started again, killed again, until it ends; then the next run begins. {}\n\n\
-         | what | count |\n|---|---|\n| kills | {done} |\n| of them with rows already in the store | {before} |\n| runs that ended | {finished} |\n\
-         | stores that failed the database's own check after a kill | {unsound} |\n| slots lost | {lost} |\n| slots or runs doubled | {doubled} |\n\
-         | runs whose files differ from the undisturbed one | {differ} |\n\n\
-         Compared byte by byte: {}. Full disk, power cut and two processes on one store: `tests/fleet_run.rs`.\n",
-        machine(),
-        COMPARED.join(", ")
-    );
-    let files = vec![out.join("fleet_kills.md")];
-    write_text(&files[0], &page)?;
-    Ok(files)
-}

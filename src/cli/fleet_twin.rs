@@ -9,10 +9,11 @@ use crate::twin::fleet::{FREQUENCY_PER_C, FleetSettings, GAIN_PER_C};
 use serde::Serialize;
 use std::path::Path;
 
+/// What was written.
 #[derive(Serialize)]
-struct Made {
-    slots: usize,
-    fleet: String,
+pub(super) struct Made {
+    pub slots: usize,
+    pub fleet: String,
 }
 
 /// Slots that the gate learns from, on a floor of its own.
@@ -20,6 +21,14 @@ const LEARNED: usize = 480;
 const LEARNED_SEED: u64 = 0x6a7e;
 
 pub(super) fn run(a: &TwinFleetArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let made = make(a, screen)?;
+    let text = format!("{} slots; run them: servotune fleet run {} --out DIR\n", made.slots, made.fleet);
+    screen.result(&made, &text)?;
+    Ok(Ending::Accepted)
+}
+
+/// Writes a made-up floor.
+pub(super) fn make(a: &TwinFleetArguments, screen: &mut Screen) -> Result<Made, Failure> {
     let settings = FleetSettings { seed: a.seed, testers: a.testers, run: a.run, ..FleetSettings::default() };
     screen.say(&format!("gate: learning from {LEARNED} slots of another made-up floor"));
     write_text(&a.out.join("gate.json"), &gate(screen)?)?;
@@ -44,9 +53,7 @@ pub(super) fn run(a: &TwinFleetArguments, screen: &mut Screen) -> Result<Ending,
             }
         }
     }
-    let made = Made { slots: count, fleet: fleet.display().to_string() };
-    screen.result(&made, &format!("{count} slots; run them: servotune fleet run {} --out DIR\n", made.fleet))?;
-    Ok(Ending::Accepted)
+    Ok(Made { slots: count, fleet: fleet.display().to_string() })
 }
 
 fn write_files(folder: &Path, files: Vec<(&'static str, String)>) -> Result<(), Failure> {
@@ -63,7 +70,7 @@ fn document(input: &str) -> String {
          [input]\n{input}\n\n[robust]\ndraws = 2\nguard = 0.01\n\n\
          # The hall's range, and what a degree does to torque constant and frequencies.\n\
          [temperature]\ncases_c = [18.0, 30.0]\ngain_per_c = {GAIN_PER_C:e}\nfrequency_per_c = {FREQUENCY_PER_C:e}\n\n\
-         [tables]\npilots = 32\nmost = 16\ncoverage = 0.99\n\n[untunable]\nexplained = 40\n"
+         [tables]\npilots = 32\nscouts = 192\nmost = 12\ncoverage = 0.99\n\n[untunable]\nexplained = 40\n"
     )
 }
 

@@ -22,6 +22,7 @@ mod measured;
 mod nyquist;
 mod open_loop;
 mod poles;
+mod pull;
 mod sampled;
 mod sweep_plan;
 mod trace;
@@ -38,6 +39,7 @@ pub use measured::{Interval, MarginIntervals, MeasuredLoop, MeasuredMargins, hol
 pub use nyquist::{NyquistCount, nyquist_count};
 pub use open_loop::{FeedbackError, ModelLoop, OpenLoop, angle_from_rest};
 pub use poles::closed_loop_poles;
+pub use pull::Pulls;
 pub use sampled::{LoopOnGrid, SampledPlant};
 pub use sweep_plan::{PlanSettings, SweepPlan, Tone, sweep_plan};
 pub use trace::Trace;

@@ -8,6 +8,7 @@ use super::cubic::Cubic;
 use super::events::{Event, GRAZE, Graze, QuickMargins};
 use super::frequency_grid;
 use crate::lti::{DiscretePlant, FrequencyResponse, Section, Sections};
+use crate::numeric::wide::wide;
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
@@ -19,7 +20,7 @@ const NEAR_ONE: f64 = 0.07;
 const DEEP: f64 = 4.0;
 
 /// Numbers handled side by side.
-const LANES: usize = 4;
+pub(super) const LANES: usize = 4;
 
 /// A plant's response on a fixed ascending grid, each quantity in an array of its own.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,10 +34,10 @@ pub struct SampledPlant {
     re: Vec<[f64; LANES]>,
     im: Vec<[f64; LANES]>,
     /// z⁻¹ = cos - j sin, and z⁻².
-    cos: Vec<[f64; LANES]>,
-    sin: Vec<[f64; LANES]>,
-    cos2: Vec<[f64; LANES]>,
-    sin2: Vec<[f64; LANES]>,
+    pub(super) cos: Vec<[f64; LANES]>,
+    pub(super) sin: Vec<[f64; LANES]>,
+    pub(super) cos2: Vec<[f64; LANES]>,
+    pub(super) sin2: Vec<[f64; LANES]>,
     /// (1 - z⁻¹)^m for m of the plant alone and for one more in the chain.
     lift: [[Vec<[f64; LANES]>; 2]; 2],
 }
@@ -131,6 +132,11 @@ impl SampledPlant {
 
     /// L = P C on the grid, into `on`.
     pub fn close(&self, chain: &[Section], on: &mut LoopOnGrid) {
+        wide(|| self.close_lanes(chain, on));
+    }
+
+    #[inline(always)]
+    fn close_lanes(&self, chain: &[Section], on: &mut LoopOnGrid) {
         let chunks = self.re.len();
         for a in [&mut on.re, &mut on.im, &mut on.gain, &mut on.distance] {
             a.resize(chunks * LANES, 0.0);

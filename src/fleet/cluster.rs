@@ -7,7 +7,7 @@ use super::slot::Prepared;
 use super::{Context, Ready};
 use crate::controller::Controller;
 use crate::lti::{FrequencyResponse, Plant};
-use crate::tune::{Bench, Machine, Parameters, polish_table};
+use crate::tune::{Bench, Machine, Parameters, roomiest_table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -100,7 +100,7 @@ pub(super) fn groups(looks: &[Vec<f64>], k: usize) -> (Vec<Vec<f64>>, Vec<Vec<us
     (centres, members)
 }
 
-/// The table of a group: polished on its most different members at once, from the tables that miss least there.
+/// The table of a group: the one with the most room on its most different members at once, from the tables that miss least there.
 pub(super) fn group_table(
     context: &Context,
     pilots: &[Prepared],
@@ -117,12 +117,8 @@ pub(super) fn group_table(
     let score = |c: &Controller, desk: &mut _| bench.score(&bench.parameters().vector(c), desk).violation;
     let mut starts: Vec<(f64, usize)> = from.iter().enumerate().map(|(i, c)| (score(c, &mut desk), i)).collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let polished = starts.iter().take(STARTS).filter_map(|(_, i)| polish_table(&bench, &from[*i], STEPS, &mut desk));
-    let key = |violation: f64, objective: f64| if violation <= 0.0 { (0, objective) } else { (1, violation) };
-    let best = polished
-        .map(|(c, s)| (key(s.violation, s.objective), c))
-        .min_by(|a, b| a.0.0.cmp(&b.0.0).then(a.0.1.total_cmp(&b.0.1)));
-    best.map(|(_, c)| c)
+    let polished = starts.iter().take(STARTS).filter_map(|(_, i)| roomiest_table(&bench, &from[*i], STEPS, &mut desk));
+    polished.min_by(|a, b| a.1.violation.total_cmp(&b.1.violation)).map(|(c, _)| c)
 }
 
 /// Candidates that add most to what the pilots are served by, in the order in which they add it, until nothing more is added thrice over.

@@ -19,6 +19,10 @@ pub enum FleetError {
     Range { file: PathBuf, key: &'static str, found: f64, expected: &'static str },
     #[error("{}: cannot list the folder: {source}", folder.display())]
     Folder { folder: PathBuf, source: std::io::Error },
+    #[error("{}: cannot make the folder of the store: {source}; name another --out, or a `store` elsewhere in FLEET.toml", folder.display())]
+    NoPlace { folder: PathBuf, source: std::io::Error },
+    #[error("{}: found a file that is no database, expected a store or nothing; name another `store` in FLEET.toml, or another --out", file.display())]
+    NoDatabase { file: PathBuf },
     #[error("{}: no slot found; expected folders such as T001/slots/S01 with a response.bod", folder.display())]
     NoSlot { folder: PathBuf },
     #[error("{}: {source}", file.display())]
@@ -46,7 +50,9 @@ pub enum FleetError {
     GainTable(#[from] GainTableError),
     #[error("{}: the store cannot {action}: {source}", file.display())]
     Store { file: PathBuf, action: &'static str, source: rusqlite::Error },
-    #[error("{}: the store has schema {found}; this program knows {expected}", file.display())]
+    #[error("{}: this is the database of another program, with {tables} tables of its own; name another file as `store` in FLEET.toml, or another --out", file.display())]
+    Foreign { file: PathBuf, tables: i64 },
+    #[error("{}: the store has schema {found}; this program knows {expected}: use the version that made it, or name another store", file.display())]
     Schema { file: PathBuf, found: i64, expected: i64 },
     #[error("{}: the store is full ({action}): nothing is lost, free space and run again", file.display())]
     Full { file: PathBuf, action: &'static str },

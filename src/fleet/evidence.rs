@@ -135,6 +135,11 @@ impl Evidence {
         Ok(Evidence { cases: self.cases.iter().map(of).collect::<Result<_, _>>()?, hold: self.hold })
     }
 
+    /// The plants of the cases, in their order.
+    pub fn plants(&self) -> impl Iterator<Item = &Plant> {
+        self.cases.iter().map(|c| &c.plant)
+    }
+
     /// How many cases.
     pub fn count(&self) -> usize {
         self.cases.len()

@@ -4,6 +4,7 @@
 //! leaves untunable is explained. Each change is tried at its largest; where a table is then found, the smallest change is sought by bisection,
 //! with a table polished anew for every trial and proven at the end.
 
+use super::certified::{Certified, certified};
 use super::prove::{Proved, prove};
 use super::row::{OwnTable, SlotRow};
 use super::slot::{Prepared, search};
@@ -98,6 +99,9 @@ pub struct Explained {
     pub slot: String,
     /// A table that the full search found after all; then there is nothing to explain.
     pub table: Option<OwnTable>,
+    /// What the second prover says of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certified: Option<Certified>,
     /// The nearest that any search came.
     pub nearest: Option<OwnTable>,
     /// The cause.
@@ -189,10 +193,17 @@ impl Changed<'_> {
 
 /// Explains an untunable slot.
 pub(super) fn explain(context: &Context, slot: &Prepared, row: &SlotRow) -> Explained {
-    let mut found =
-        Explained { slot: row.id(), table: None, nearest: row.nearest.clone(), cause: None, remedies: Vec::new() };
+    let mut found = Explained {
+        slot: row.id(),
+        table: None,
+        certified: None,
+        nearest: row.nearest.clone(),
+        cause: None,
+        remedies: Vec::new(),
+    };
     if let Ok(table) = search(context, &slot.evidence) {
         if table.proved.passes {
+            found.certified = Some(certified(context, &slot.evidence, &table.gains));
             found.table = Some(table);
             return found;
         }

@@ -5,6 +5,7 @@
 //! Convention: a slot's row depends on the slot, the settings and the library only, so bytes are equal for any number of threads and after
 //! any interruption. Spec: `specs/fleet.md`.
 
+mod certified;
 mod claims;
 mod cluster;
 mod context;
@@ -13,6 +14,7 @@ mod drift;
 mod error;
 mod evidence;
 mod explain;
+mod grow;
 mod library;
 mod output;
 #[cfg(feature = "parquet")]
@@ -20,6 +22,7 @@ mod parquet;
 mod pilot;
 mod prove;
 mod ready;
+mod rest;
 mod revision;
 mod row;
 mod run;
@@ -32,6 +35,7 @@ mod store_run;
 mod table_source;
 mod work_list;
 
+pub use certified::{Certified, certified};
 pub use claims::Worker;
 pub use cluster::{LEVELS, Level, looks, nearest};
 pub use context::Context;

@@ -60,7 +60,7 @@ fn io(file: &Path, action: &'static str, source: std::io::Error) -> FleetError {
 const COLUMNS: &str = "tester,slot,verdict,class,probability,action,temperature_c,dc_gain,first_resonance_hz,model_rms,\
 before_passes,before_worst,before_limit,before_case,before_phase_margin_deg,before_gain_margin_db,before_max_sensitivity,before_dft_low,before_dft_high,\
 after_worst,after_limit,after_case,after_phase_margin_deg,after_gain_margin_db,after_max_sensitivity,after_dft_low,after_dft_high,\
-way,kp,ki_per_s,kd_s,lowpass_hz,notch_hz,notch_zero_damping,notch_pole_damping,shared_table,error,why,digest";
+certified,way,kp,ki_per_s,kd_s,lowpass_hz,notch_hz,notch_zero_damping,notch_pole_damping,shared_table,error,why,digest";
 
 fn number(x: Option<f64>) -> String {
     x.map(|x| format!("{x}")).unwrap_or_default()
@@ -103,6 +103,7 @@ fn fields(r: &SlotRow, shared: Option<String>) -> Vec<String> {
     f.push(after.map(|p| p.limit.to_string()).unwrap_or_default());
     f.push(after.map(|p| p.case.clone()).unwrap_or_default());
     f.extend(figures(after.map(|p| &p.figures)));
+    f.push(r.certified.as_ref().map(|c| c.passes.to_string()).unwrap_or_default());
     f.push(table.map(|t| t.way.word().to_owned()).unwrap_or_default());
     f.extend([gains.map(|g| g.pid.kp), gains.map(|g| g.pid.ki_per_s), gains.map(|g| g.pid.kd_s)].map(number));
     f.push(number(gains.and_then(|g| g.lowpass.first()).map(|l| l.frequency_hz)));
@@ -120,7 +121,7 @@ fn fields(r: &SlotRow, shared: Option<String>) -> Vec<String> {
 
 /// Columns of slots.csv that hold words; all others hold numbers.
 #[cfg(feature = "parquet")]
-const WORDS: [&str; 15] = [
+const WORDS: [&str; 16] = [
     "tester",
     "slot",
     "verdict",
@@ -131,6 +132,7 @@ const WORDS: [&str; 15] = [
     "before_case",
     "after_limit",
     "after_case",
+    "certified",
     "way",
     "shared_table",
     "error",

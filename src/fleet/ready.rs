@@ -25,6 +25,8 @@ pub struct Quick {
 
 /// Relative difference at which two numbers of a table are the same: a logarithm and back.
 const SAME: f64 = 1e-12;
+/// Share of a limit of a margin that a table may miss and still be looked at closer: far beyond the guard and the grid's error.
+const HOPELESS: f64 = 0.08;
 /// Violation above which the loop was unstable and the write was not looked at; any limit's own violation is far below.
 const NO_WRITE: f64 = 50.0;
 
@@ -44,11 +46,20 @@ impl<'a> Ready<'a> {
 
     /// The score of a table of the fleet's shape.
     pub fn quick(&mut self, gains: &Controller) -> Quick {
+        self.within(gains, f64::INFINITY)
+    }
+
+    /// The same; of a table whose margins alone are hopeless only their violation, and no objective.
+    pub fn screened(&mut self, gains: &Controller) -> Quick {
+        self.within(gains, HOPELESS)
+    }
+
+    fn within(&mut self, gains: &Controller, hopeless: f64) -> Quick {
         if !self.shaped(gains) {
             return Quick { violation: f64::INFINITY, objective: 0.0 };
         }
         let x = self.bench.parameters().vector(gains);
-        let s = self.bench.score(&x, &mut self.desk);
+        let s = self.bench.score_within(&x, hopeless, &mut self.desk);
         Quick { violation: s.violation, objective: s.objective }
     }
 

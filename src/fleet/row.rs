@@ -2,6 +2,7 @@
 //!
 //! Units stand in the fields' names; figures are those of [`super::prove`].
 
+use super::certified::Certified;
 use super::prove::Proved;
 use crate::controller::Controller;
 use crate::lti::PlantFile;
@@ -148,6 +149,9 @@ pub struct SlotRow {
     pub current: Option<Proved>,
     /// The table found for it.
     pub table: Option<OwnTable>,
+    /// What the second prover says of that table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certified: Option<Certified>,
     /// The best that was found where none passes.
     pub nearest: Option<OwnTable>,
     /// Candidates of the library that are proven in it.

@@ -8,6 +8,7 @@ use super::claims::Worker;
 use super::explain::{Explained, explain};
 use super::library::Library;
 use super::pilot::{self, Pilot};
+use super::rest::rest;
 use super::row::{SlotRow, Verdict};
 use super::share::share;
 use super::slot::{Prepared, work};
@@ -109,7 +110,9 @@ fn conclude(
 ) -> Result<(), FleetError> {
     explanations(job, store, run, library, pool, watch)?;
     watch.step(Stage::Share, 0, 1);
-    let shared = share(job.context, store, run, library)?;
+    pool.install(|| rest(job.context, job.source, store, run, library))?;
+    let Some(library) = store.library(run)? else { return Ok(()) };
+    let shared = share(job.context, store, run, &library)?;
     let begun = store.run(run)?;
     store.propose(job.context, &begun)?;
     // Last: that they are there says that all is done.
@@ -151,8 +154,9 @@ fn explanations(
         let served: Vec<SlotRow> = group
             .iter()
             .filter_map(|row| {
-                let table = found.iter().find(|(i, _)| *i == row.index)?.1.table.clone()?;
-                Some(SlotRow { verdict: Verdict::Tuned, table: Some(table), nearest: None, ..row.clone() })
+                let found = &found.iter().find(|(i, _)| *i == row.index)?.1;
+                let (table, certified) = (Some(found.table.clone()?), found.certified.clone());
+                Some(SlotRow { verdict: Verdict::Tuned, table, certified, nearest: None, ..row.clone() })
             })
             .collect();
         store.add_explained(run, &found, &served)?;

@@ -115,6 +115,8 @@ impl Default for Temperature {
 pub struct Tables {
     /// Slots that are identified and tuned in full first; the others start from what these found.
     pub pilots: usize,
+    /// Slots on which tables are grown that many share.
+    pub scouts: usize,
     /// Most candidates for shared tables.
     pub candidates: usize,
     /// Most shared tables.
@@ -125,7 +127,7 @@ pub struct Tables {
 
 impl Default for Tables {
     fn default() -> Self {
-        Tables { pilots: 32, candidates: 32, most: 16, coverage: 0.99 }
+        Tables { pilots: 32, scouts: 192, candidates: 20, most: 12, coverage: 0.99 }
     }
 }
 
@@ -211,6 +213,7 @@ impl FleetFile {
         range("temperature.delay_per_c", t.delay_per_c, t.delay_per_c.abs() <= 1e-5, "-1e-5 to 1e-5 s per deg C")?;
         let s = &self.tables;
         range("tables.pilots", s.pilots as f64, s.pilots >= 1, "at least 1")?;
+        range("tables.scouts", s.scouts as f64, s.scouts <= 4096, "0 to 4096")?;
         let most = MOST_CANDIDATES;
         range("tables.candidates", s.candidates as f64, (1..=most).contains(&s.candidates), "1 to 256")?;
         range("tables.most", s.most as f64, (1..=s.candidates).contains(&s.most), "1 to tables.candidates")?;

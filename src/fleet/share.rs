@@ -5,7 +5,7 @@
 
 use super::cluster::{looks, nearest};
 use super::cover::{Choice, Collect};
-use super::library::Library;
+use super::library::{Candidate, Library};
 use super::row::{SlotRow, Verdict};
 use super::store_run::Part;
 use super::{Context, FleetError, Store};
@@ -55,6 +55,7 @@ pub fn assigned(row: &SlotRow, chosen: &[usize]) -> Option<usize> {
 /// Chooses the shared tables of a run from what is in the store.
 pub fn share(context: &Context, store: &Store, run: &str, library: &Library) -> Result<Shared, FleetError> {
     let n = library.tables.len();
+    let groups = library.groups();
     let mut collect = Collect::new(n);
     let mut s = Shared { groups: library.levels.iter().map(|l| (l.centres.len(), 0)).collect(), ..Shared::default() };
     store.each_row(run, None, |row| {
@@ -65,7 +66,8 @@ pub fn share(context: &Context, store: &Store, run: &str, library: &Library) -> 
         s.own += usize::from(matches!(row.verdict, Verdict::Keeps | Verdict::Tuned));
         s.today += usize::from(row.current.as_ref().is_some_and(|p| p.passes));
         s.base += usize::from(row.served_by(0).is_some());
-        collect.add(|i| row.served_by(i).is_some());
+        // Tables of groups are known in their own slots only: they are for comparison.
+        collect.add(|i| !groups.contains(&i) && row.served_by(i).is_some());
         let plant = row.model.as_ref().and_then(|m| Plant::try_from(m.plant.clone()).ok());
         let Some(look) = plant.as_ref().map(looks) else { return Ok(()) };
         for (level, (_, served)) in library.levels.iter().zip(&mut s.groups) {
@@ -78,7 +80,8 @@ pub fn share(context: &Context, store: &Store, run: &str, library: &Library) -> 
     let t = &context.file.tables;
     s.coverable = coverage.coverable();
     s.curve = coverage.choices(t.most.min(n));
-    let enough = |c: &Choice| c.served as f64 >= t.coverage * s.slots as f64;
+    // What no table serves, no choice of tables can.
+    let enough = |c: &Choice| c.served as f64 >= t.coverage * s.own.max(s.coverable) as f64;
     let at = s.curve.iter().position(enough).unwrap_or(s.curve.len().saturating_sub(1));
     if let Some(choice) = s.curve.get(at) {
         s.chosen = choice.tables.len();
@@ -104,8 +107,13 @@ impl Store {
         self.part(run, Part::Shared)
     }
 
-    /// The library of a run, once it is made.
+    /// The library of a run, once it is made, with the tables of the rest where there are any.
     pub fn library(&self, run: &str) -> Result<Option<Library>, FleetError> {
-        self.part(run, Part::Library)
+        let mut library: Option<Library> = self.part(run, Part::Library)?;
+        if let (Some(library), Some(rest)) = (&mut library, self.part::<Vec<Candidate>>(run, Part::Rest)?) {
+            library.rest = library.tables.len();
+            library.tables.extend(rest);
+        }
+        Ok(library)
     }
 }

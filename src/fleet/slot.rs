@@ -3,6 +3,8 @@
 //! In: a loaded slot, the [`Context`], the [`Library`]. Out: a [`SlotRow`]. No state is kept between slots: the row is the same whoever works
 //! it out, on whichever thread, in whichever order. What goes wrong with a slot is written into its row.
 
+use super::certified::certified;
+use super::cluster::looks;
 use super::library::Library;
 use super::prove::prove;
 use super::ready::{Quick, Ready};
@@ -67,6 +69,7 @@ pub fn work(
         own_gains: loaded.controller.filter(|c| *c != context.base),
         current: None,
         table: None,
+        certified: None,
         nearest: None,
         serves: Vec::new(),
     };
@@ -89,6 +92,7 @@ pub fn work(
             own_gains: None,
             current: None,
             table: None,
+            certified: None,
             nearest: None,
             serves: Vec::new(),
             ..row
@@ -121,7 +125,8 @@ fn fill(
         return Ok(());
     }
     let Some(frf) = &machine.response else { return Ok(()) };
-    let (evidence, model) = evidence(context, plants, frf, row.index, row.temperature_c)?;
+    let (plant, evidence, model) = evidence(context, plants, frf, row.index, row.temperature_c)?;
+    let look = looks(&plant);
     row.model = Some(model);
     let mut ready = Ready::of(&evidence, &context.spec, &context.guarded, &context.base)?;
     row.current = Some(prove(&mut ready, row.own_gains.as_ref().unwrap_or(&context.base))?);
@@ -133,15 +138,16 @@ fn fill(
     if !row.verdict.served() {
         return Ok(());
     }
-    let (quick, covered) = covered(context, library, &mut ready)?;
-    row.serves = covered.clone();
+    let looked = covered(context, library, &look, &mut ready)?;
+    row.serves.clone_from(&looked.serves);
     if row.current.as_ref().is_some_and(|p| p.passes) && (action == Action::None || context.gate.is_none()) {
         row.verdict = Verdict::Keeps;
         return Ok(());
     }
-    let (table, nearest) = own_table(library, &mut ready, &quick, &covered)?;
-    if table.is_some() {
+    let (table, nearest) = own_table(library, &mut ready, &looked)?;
+    if let Some(t) = &table {
         row.verdict = Verdict::Tuned;
+        row.certified = Some(certified(context, &evidence, &t.gains));
     }
     (row.table, row.nearest) = (table, nearest);
     Ok(())
@@ -174,7 +180,7 @@ pub(super) fn evidence(
     frf: &Frf,
     index: usize,
     temperature_c: f64,
-) -> Result<(Evidence, ModelRow), SlotError> {
+) -> Result<(Plant, Evidence, ModelRow), SlotError> {
     let r = &context.file.robust;
     let (seed, temperature) = (r.seed_of(index), &context.file.temperature);
     let (plant, drawn, rms, near) = match identify_near(frf, plants, &context.identify)? {
@@ -189,7 +195,8 @@ pub(super) fn evidence(
         }
     };
     let evidence = Evidence::of(frf, context.hold, &plant, &drawn, temperature_c, temperature)?;
-    Ok((evidence, model_row(&plant, rms, near)))
+    let row = model_row(&plant, rms, near);
+    Ok((plant, evidence, row))
 }
 
 /// A slot with its plant and its cases.
@@ -201,11 +208,22 @@ pub(super) struct Prepared {
 impl Prepared {
     /// The slot at `index`; none where it cannot be read or identified.
     pub fn of(context: &Context, plants: &[Plant], source: &dyn SlotSource, index: usize) -> Option<Prepared> {
+        Prepared::loaded(context, plants, index, &source.load(index))
+    }
+
+    /// The same, of a slot that the gate sends neither to repair nor to a person.
+    pub fn tunable(context: &Context, plants: &[Plant], source: &dyn SlotSource, index: usize) -> Option<Prepared> {
         let loaded = source.load(index);
+        let action = gate_action(context, &loaded.machine)?;
+        let meant = loaded.problems.is_empty() && matches!(action, Action::None | Action::Tune);
+        if meant { Prepared::loaded(context, plants, index, &loaded) } else { None }
+    }
+
+    fn loaded(context: &Context, plants: &[Plant], index: usize, loaded: &Loaded) -> Option<Prepared> {
         let frf = loaded.machine.response.as_ref()?;
         let temperature_c = loaded.temperature_c.unwrap_or(context.file.temperature.measured_c);
-        let (evidence, model) = evidence(context, plants, frf, index, temperature_c).ok()?;
-        Some(Prepared { plant: Plant::try_from(model.plant).ok()?, evidence })
+        let (plant, evidence, _) = evidence(context, plants, frf, index, temperature_c).ok()?;
+        Some(Prepared { plant, evidence })
     }
 }
 
@@ -230,22 +248,25 @@ pub(super) fn model_row(plant: &Plant, rms_relative_error: f64, near: bool) -> M
     }
 }
 
-/// What every candidate scores, and those that serve.
+/// What the candidates score, by index, and those that serve.
+struct Looked {
+    all: Vec<(usize, Quick)>,
+    serves: Vec<Serves>,
+}
+
+/// What the candidates score that are looked at in this slot, and those that serve.
 ///
 /// A candidate that the grid sees inside the guarded limits counts as serving: the guard stands for the grid's error (`specs/fleet.md`, "Proof").
 /// Closer to a limit the exact judgement decides.
-fn covered(
-    context: &Context,
-    library: &Library,
-    ready: &mut Ready<'_>,
-) -> Result<(Vec<Quick>, Vec<Serves>), TuneError> {
+fn covered(context: &Context, library: &Library, look: &[f64], ready: &mut Ready<'_>) -> Result<Looked, TuneError> {
     let guard = context.file.robust.guard;
-    let mut serves = Vec::new();
+    let mut serves: Vec<Serves> = Vec::new();
     let mut all = Vec::with_capacity(library.tables.len());
-    for (candidate, t) in library.tables.iter().enumerate() {
-        let q = ready.quick(&t.gains);
+    for candidate in library.looked_at(look) {
+        let t = &library.tables[candidate];
+        let q = ready.screened(&t.gains);
         let dft = ready.dft();
-        all.push(q);
+        all.push((candidate, q));
         // Today's table may lie outside the bounds, where the grid has not looked.
         let clear = candidate > 0 && guard >= CLEAR_GUARD && q.violation <= 0.0;
         if clear {
@@ -258,25 +279,22 @@ fn covered(
             }
         }
     }
-    Ok((all, serves))
+    serves.sort_by_key(|s| s.candidate);
+    Ok(Looked { all, serves })
 }
 
 /// A table of the slot's own: polished from the best candidates; else the best candidate that is proven. Where none is, the nearest.
 fn own_table(
     library: &Library,
     ready: &mut Ready<'_>,
-    quick: &[Quick],
-    serves: &[Serves],
+    looked: &Looked,
 ) -> Result<(Option<OwnTable>, Option<OwnTable>), TuneError> {
-    let mut order: Vec<usize> = (0..quick.len()).collect();
     // Candidates that pass by objective, the others by violation; of equals the earlier stays ahead.
-    let key = |i: usize| {
-        let q = quick[i];
-        if q.violation <= 0.0 { (0, q.objective) } else { (1, q.violation) }
-    };
-    order.sort_by(|&a, &b| key(a).0.cmp(&key(b).0).then(key(a).1.total_cmp(&key(b).1)));
+    let key = |q: &Quick| if q.violation <= 0.0 { (0, q.objective) } else { (1, q.violation) };
+    let mut order: Vec<&(usize, Quick)> = looked.all.iter().collect();
+    order.sort_by(|(_, a), (_, b)| key(a).0.cmp(&key(b).0).then(key(a).1.total_cmp(&key(b).1)));
     let mut nearest: Option<OwnTable> = None;
-    for &i in order.iter().take(POLISHED) {
+    for &&(i, _) in order.iter().take(POLISHED) {
         let Some((gains, _)) = ready.polish(&library.tables[i].gains, POLISH_STEPS) else { continue };
         let table = OwnTable { proved: prove(ready, &gains)?, gains, way: Way::Polished };
         if table.proved.passes {
@@ -284,7 +302,7 @@ fn own_table(
         }
         keep(&mut nearest, table);
     }
-    if let Some(best) = serves.iter().min_by(|a, b| a.dft.total_cmp(&b.dft)) {
+    if let Some(best) = looked.serves.iter().min_by(|a, b| a.dft.total_cmp(&b.dft)) {
         let gains = library.tables[best.candidate].gains.clone();
         return Ok((Some(OwnTable { proved: prove(ready, &gains)?, gains, way: Way::Library }), None));
     }

@@ -10,14 +10,14 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Version of the schema.
-const SCHEMA: i64 = 1;
+const SCHEMA: i64 = 2;
 /// How long a writer waits for another one; transactions are short.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 const TABLES: &str = "
 CREATE TABLE IF NOT EXISTS runs (
   seq INTEGER PRIMARY KEY, run TEXT NOT NULL UNIQUE, config TEXT NOT NULL, slots INTEGER NOT NULL, started TEXT NOT NULL, who TEXT NOT NULL,
-  library TEXT, shared TEXT, finished TEXT);
+  library TEXT, rest TEXT, shared TEXT, finished TEXT);
 CREATE TABLE IF NOT EXISTS pilots (run TEXT NOT NULL, place INTEGER NOT NULL, found TEXT NOT NULL, PRIMARY KEY (run, place)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS slots (
   run TEXT NOT NULL, place INTEGER NOT NULL, slot TEXT NOT NULL, digest TEXT NOT NULL, verdict TEXT NOT NULL, row TEXT NOT NULL,
@@ -55,17 +55,23 @@ impl Store {
     /// Opens the store, or makes it.
     pub fn open(file: &Path) -> Result<Store, FleetError> {
         if let Some(folder) = file.parent().filter(|f| !f.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder).map_err(|source| FleetError::Folder { folder: folder.into(), source })?;
+            std::fs::create_dir_all(folder).map_err(|source| FleetError::NoPlace { folder: folder.into(), source })?;
         }
         let fail = |source| failure(file, "be opened", source);
         let connection = Connection::open(file).map_err(fail)?;
         let store = Store { connection, file: file.into() };
         store.connection.busy_timeout(PATIENCE).map_err(fail)?;
+        // Counted before the version is read: of a store that another process is making at this moment both or the version alone is seen.
+        let tables = "SELECT count(*) FROM sqlite_master WHERE type = 'table'";
+        let tables: i64 = store.connection.query_row(tables, [], |r| r.get(0)).map_err(fail)?;
+        let found: i64 = store.connection.query_row("PRAGMA user_version", [], |r| r.get(0)).map_err(fail)?;
+        if found == 0 && tables > 0 {
+            return Err(FleetError::Foreign { file: file.into(), tables });
+        }
         // The mode stays in the file. Another process may be setting it at the same time: the timeout covers that.
         store.connection.pragma_update(None, "journal_mode", "WAL").map_err(fail)?;
         store.connection.pragma_update(None, "synchronous", "FULL").map_err(fail)?;
         store.connection.pragma_update(None, "foreign_keys", true).map_err(fail)?;
-        let found: i64 = store.connection.query_row("PRAGMA user_version", [], |r| r.get(0)).map_err(fail)?;
         match found {
             0 => {
                 let version = format!("BEGIN IMMEDIATE; {TABLES} PRAGMA user_version = {SCHEMA}; COMMIT;");
@@ -116,6 +122,7 @@ impl Store {
 
 fn failure(file: &Path, action: &'static str, source: rusqlite::Error) -> FleetError {
     match source.sqlite_error_code() {
+        Some(rusqlite::ErrorCode::NotADatabase) => FleetError::NoDatabase { file: file.into() },
         Some(rusqlite::ErrorCode::DiskFull) => FleetError::Full { file: file.into(), action },
         _ => FleetError::Store { file: file.into(), action, source },
     }

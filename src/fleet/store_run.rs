@@ -65,6 +65,7 @@ pub(super) fn of_json<T: DeserializeOwned>(text: &str) -> Result<T, FleetError> 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     Library,
+    Rest,
     Shared,
 }
 
@@ -72,6 +73,7 @@ impl Part {
     fn column(self) -> &'static str {
         match self {
             Part::Library => "library",
+            Part::Rest => "rest",
             Part::Shared => "shared",
         }
     }
@@ -195,7 +197,8 @@ impl Store {
         self.places(run, Places::Explained)
     }
 
-    /// Adds explanations, and the rows of slots that the full search has served after all.
+    /// Adds explanations, and puts rows in the place of those that they go on from: of slots that the full search or a table of the rest has served
+    /// after all.
     pub(super) fn add_explained(
         &mut self,
         run: &str,

@@ -7,8 +7,8 @@
 use super::network::{Desk, Network, TILE, softmax};
 use super::settings::FitSettings;
 use super::split::shuffle;
-use super::wide::wide;
 use crate::numeric::random::Random;
+use crate::numeric::wide::wide;
 use serde::Serialize;
 
 /// Losses and accuracies of one epoch.

@@ -50,7 +50,7 @@ pub fn shares(network: &Network, from: &[f32], to: &[f32], class: usize, other: 
                 desk.activations[0][r * d + j] = from[j] + at * (to[j] - from[j]);
             }
         }
-        super::wide::wide(|| network.forward(rows, desk));
+        crate::numeric::wide::wide(|| network.forward(rows, desk));
         for r in 0..rows {
             let top = &mut desk.deltas[last][r * k..(r + 1) * k];
             top.fill(0.0);

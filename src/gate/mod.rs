@@ -33,7 +33,6 @@ mod split;
 mod table;
 mod train;
 mod verdict;
-mod wide;
 
 pub use adam::{Epoch, Fitted, Rows, fit, judge};
 pub use attribution::{Decided, Direction, shares};

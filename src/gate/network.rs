@@ -3,8 +3,8 @@
 //! In: normalised features. Out: logits, one a class. Weights lie one row an input (`weights[input * outputs + output]`), so that a
 //! layer is a sum of rows and an input that ReLU has put to zero costs nothing. Spec: `specs/gate.md`.
 
-use super::wide::wide;
 use crate::numeric::random::Random;
+use crate::numeric::wide::wide;
 
 /// A network of dense layers.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,6 +4,7 @@
 //! Columns are scaled to length 1 before the factorisation, so that the condition number does not depend on units
 //! (van der Sluis, Numer. Math. 14, 1969). Sources: Golub & Van Loan, Matrix Computations, ch. 5.
 
+use super::wide::wide;
 use nalgebra::DMatrix;
 
 /// The factors of a tall matrix, reusable without allocation.
@@ -20,6 +21,7 @@ pub struct Qr {
 }
 
 /// Dot product with eight running sums: the order of additions is fixed, and the compiler can use vector registers.
+#[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let (a8, a_rest) = a[..n].split_at(n - n % 8);
@@ -52,6 +54,12 @@ impl Qr {
             column.iter_mut().for_each(|v| *v *= inverse);
             self.scale.push(length);
         }
+        wide(|| self.reflections());
+    }
+
+    #[inline(always)]
+    fn reflections(&mut self) {
+        let (rows, cols) = (self.rows, self.cols);
         let mut k = 0;
         // Four reflections at a time go over the columns behind them, which then travel through memory once, not four times.
         while k + PANEL < cols.min(rows) && k + 2 * PANEL < rows {
@@ -157,6 +165,7 @@ const PANEL: usize = 4;
 
 /// Turns column `i` of `columns` into a Householder vector from row `k` on, applies it to the columns behind it in the
 /// slice, and returns the diagonal entry of R; 0 for a column without content, which needs no reflection.
+#[inline(always)]
 fn make_reflection(columns: &mut [f64], rows: usize, k: usize, i: usize) -> f64 {
     let (head, tail) = columns.split_at_mut((i + 1) * rows);
     let v = &mut head[i * rows + k..];
@@ -186,6 +195,7 @@ struct Panel<'a> {
 }
 
 impl<'a> Panel<'a> {
+    #[inline(always)]
     fn new(columns: &'a [f64], rows: usize, k: usize, diagonal: &[f64]) -> Self {
         let mut head = [[0.0; PANEL]; PANEL];
         let mut tail: [&[f64]; PANEL] = [&[]; PANEL];
@@ -206,7 +216,7 @@ impl<'a> Panel<'a> {
     }
 
     /// Applies all four to a column from the panel's first row on.
-    #[inline]
+    #[inline(always)]
     fn apply(&self, column: &mut [f64]) {
         let (top, below) = column.split_at_mut(PANEL);
         let n = below.len();
@@ -240,7 +250,7 @@ impl<'a> Panel<'a> {
 }
 
 /// column -= v (v · column)
-#[inline]
+#[inline(always)]
 fn reflect(v: &[f64], column: &mut [f64]) {
     let part = dot(v, column);
     for (c, v) in column.iter_mut().zip(v) {

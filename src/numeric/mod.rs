@@ -11,3 +11,4 @@ pub mod random;
 pub mod root;
 pub mod spectrum;
 pub mod unwrap;
+pub mod wide;

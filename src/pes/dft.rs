@@ -82,10 +82,13 @@ impl WindowDft {
     }
 
     /// Euclidean norm of the amplitudes of bins in `low_hz..=high_hz`, eqs. (42) and (43).
-    pub fn band(&self, amplitude: &[f64], [low_hz, high_hz]: [f64; 2]) -> f64 {
-        let inside = |k: usize| (low_hz..=high_hz).contains(&self.hz(k));
-        let sum: f64 = self.bins.iter().zip(amplitude).filter(|(k, _)| inside(**k)).map(|(_, a)| a * a).sum();
-        sum.sqrt()
+    pub fn band(&self, amplitude: &[f64], hz: [f64; 2]) -> f64 {
+        self.inside(hz).map(|i| amplitude[i] * amplitude[i]).sum::<f64>().sqrt()
+    }
+
+    /// Which of the bins, by index, lie in `low_hz..=high_hz`.
+    pub fn inside(&self, [low_hz, high_hz]: [f64; 2]) -> impl Iterator<Item = usize> {
+        (0..self.bins.len()).filter(move |&i| (low_hz..=high_hz).contains(&self.hz(self.bins[i])))
     }
 }
 

@@ -151,7 +151,7 @@ fn kernel(turns: f64, n: usize) -> f64 {
 }
 
 /// Sum of products in four running sums, so that vector lanes change the order of none.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a4, a1) = a.as_chunks::<4>();
     let (b4, b1) = b.as_chunks::<4>();
     let mut sum = [0.0; 4];

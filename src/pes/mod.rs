@@ -14,6 +14,7 @@ mod quick;
 mod reference;
 mod simulation;
 mod spectral;
+mod spectral_slopes;
 mod window_frame;
 
 pub use budget::{Budget, PredictSettings, Prediction, Range, Source, SourceShare, budget, predict, predict_each};

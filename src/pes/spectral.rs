@@ -4,12 +4,13 @@
 //! Between its lines nothing is left out; what is neglected: images above half the sample rate, the output limit, and the rest
 //! of one move that the next one still sees. Noise enters as expected power. Spec: `specs/tuning.md`, "The measured route".
 
-use super::expected::dot;
-use super::window_frame::{FrameKey, WindowFrame, frame, kernel};
+use super::spectral_slopes::Adjoint;
+use super::window_frame::{FrameKey, LANES, WindowFrame, frame, kernel};
 use super::{PesError, Profile, Reference, WindowDft};
 use crate::controller::{Controller, Feedforward};
 use crate::feedback::{LoopOnGrid, ResponseCurve, SampledPlant};
 use crate::lti::{FrequencyResponse, Section};
+use crate::numeric::wide::wide;
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -19,14 +20,14 @@ use std::sync::Arc;
 pub struct SpectralPes {
     lines: SampledPlant,
     dft: WindowDft,
-    /// For every bin, the weights of Re S and Im S of every line, to Re X and Im X: X = sum S A + conj(S) B.
-    weight: Vec<[Vec<f64>; 4]>,
+    /// (1 - P F) R on every line, real and imaginary part; filled up with zeros to the frame's width, as are the arrays of `SpectralWork`.
+    error: [Vec<f64>; 2],
     /// Run-out of every bin, added at the head.
     runout: Vec<Complex<f64>>,
-    /// For every bin, the share of every line's noise density that falls into it, leakage of the window included.
-    frame: Arc<WindowFrame>,
-    /// Densities (per hertz, both signs) of the encoder noise, and of the windage on every line.
-    encoder: f64,
+    /// What the window sees of every line.
+    pub(super) frame: Arc<WindowFrame>,
+    /// Densities (per hertz, both signs) of the encoder noise, and of the windage times |P|² on every line.
+    pub(super) encoder: f64,
     windage: Vec<f64>,
     command: Option<Box<CommandLines>>,
     /// Which lines lie outside the sweep.
@@ -36,9 +37,10 @@ pub struct SpectralPes {
 /// What the command's peak needs.
 #[derive(Clone, Debug)]
 struct CommandLines {
-    /// Reference of every line, (1 - P F) included, and the feed-forward's share of the command.
-    error: Vec<Complex<f64>>,
+    /// The feed-forward's share of the command on every line.
     forward: Vec<Complex<f64>>,
+    /// Density of the windage on every line.
+    windage: Vec<f64>,
     /// Angle steps: instants (s) at which the command is looked at.
     instants: Vec<f64>,
     /// The plant next to rest, and the mean of the reference: half the distance.
@@ -49,14 +51,22 @@ struct CommandLines {
     samples: f64,
 }
 
-/// Buffers for one thread.
+/// Buffers for one thread; after [`SpectralPes::write`] they hold what [`SpectralPes::slopes`] needs.
 #[derive(Clone, Debug, Default)]
 pub struct SpectralWork {
-    lines: LoopOnGrid,
+    pub(super) lines: LoopOnGrid,
     rest: LoopOnGrid,
-    density: Vec<f64>,
-    s_re: Vec<f64>,
-    s_im: Vec<f64>,
+    /// S on every line.
+    pub(super) s_re: Vec<f64>,
+    pub(super) s_im: Vec<f64>,
+    /// What the window's frame is applied to: the line S E, folded, and the density of the noise, folded.
+    pub(super) g_re: Vec<f64>,
+    pub(super) g_im: Vec<f64>,
+    pub(super) density: Vec<f64>,
+    /// X of every bin, run-out included, and its expected power.
+    pub(super) x: Vec<Complex<f64>>,
+    pub(super) power: Vec<f64>,
+    pub(super) adjoint: Adjoint,
 }
 
 /// Rest after the move before the way back, where the record itself leaves less (s).
@@ -104,19 +114,6 @@ impl SpectralPes {
             bins: dft.bins().to_vec(),
             spacing_hz,
         });
-        let mut weight = Vec::with_capacity(dft.bins().len());
-        for turned in &frame.turned {
-            let mut rows: [Vec<f64>; 4] = std::array::from_fn(|_| Vec::with_capacity(w.len()));
-            for ([there, back], e) in turned.iter().zip(&error) {
-                let (a, b) = (e * there, e.conj() * back);
-                let (sum, difference) = (a + b, (a - b) * Complex::i());
-                rows[0].push(sum.re);
-                rows[1].push(difference.re);
-                rows[2].push(sum.im);
-                rows[3].push(difference.im);
-            }
-            weight.push(rows);
-        }
         let noise = &profile.noise;
         let keep = (-TAU * noise.windage_corner_hz * t).exp();
         let coloured = |w: f64| {
@@ -124,10 +121,14 @@ impl SpectralPes {
             noise.windage_rms.powi(2) * t * (1.0 - keep * keep) / back.norm_sqr()
         };
         let runout = runout(profile, &dft, from_s, n);
+        let windage: Vec<f64> = w.iter().map(|w| coloured(*w)).collect();
+        let padded = |x: &mut dyn Iterator<Item = f64>| -> Vec<f64> {
+            x.chain(std::iter::repeat(0.0)).take(frame.width()).collect()
+        };
         let command = command.then(|| {
             Box::new(CommandLines {
                 forward: forward.iter().zip(&reference).map(|(f, r)| f * r).collect(),
-                error,
+                windage: windage.clone(),
                 instants: (0..INSTANTS)
                     .map(|i| spiral.start_s + (end_s + 0.5 * REST_S - spiral.start_s) * i as f64 / INSTANTS as f64)
                     .collect(),
@@ -140,15 +141,14 @@ impl SpectralPes {
                 samples: spiral.duration_s / t,
             })
         });
-        let windage = w.iter().map(|w| coloured(*w)).collect();
         Ok(SpectralPes {
             outside: w.iter().map(|w| !plant.covers(*w)).collect(),
-            frame,
             encoder: noise.encoder_rms.powi(2) * t,
-            windage,
+            windage: padded(&mut windage.iter().zip(&p).map(|(d, p)| d * p.norm_sqr())),
+            error: [padded(&mut error.iter().map(|e| e.re)), padded(&mut error.iter().map(|e| e.im))],
             lines: SampledPlant::of_points(t, plant.integrators(), w, &p),
+            frame,
             dft,
-            weight,
             runout,
             command,
         })
@@ -159,34 +159,52 @@ impl SpectralPes {
         &self.dft
     }
 
+    /// Whether the command's peak is asked for.
+    pub fn has_command(&self) -> bool {
+        self.command.is_some()
+    }
+
+    /// Whether two writes have the same lines, so that what holds on those of one holds on those of the other.
+    pub fn same_lines(&self, other: &SpectralPes) -> bool {
+        Arc::ptr_eq(&self.frame, &other.frame)
+    }
+
+    /// The lines, with the plant on them.
+    pub fn lines(&self) -> &SampledPlant {
+        &self.lines
+    }
+
     /// Root of the expected |X_k|²/N² for every bin, into `amplitude`; returns the command's peak, 0 where it is not asked for.
     pub fn write(&self, chain: &[Section], work: &mut SpectralWork, amplitude: &mut Vec<f64>) -> f64 {
-        self.sensitivities(chain, work);
-        work.density.clear();
-        for i in 0..self.outside.len() {
-            let s = work.s_re[i] * work.s_re[i] + work.s_im[i] * work.s_im[i];
-            let l = work.lines.re[i] * work.lines.re[i] + work.lines.im[i] * work.lines.im[i];
-            work.density.push(s * (self.encoder * l + self.windage[i] * self.lines.value(i).norm_sqr()));
+        self.lines.close(chain, &mut work.lines);
+        wide(|| self.fold(work));
+        work.x.clear();
+        work.power.clear();
+        let f = &*self.frame;
+        for (k, runout) in self.runout.iter().enumerate() {
+            let [x, y, noise] = wide(|| seen([&work.g_re, &work.g_im, &work.density], &f.sum[k], &f.difference[k]));
+            work.x.push(runout + Complex::new(x, y));
+            work.power.push(noise);
         }
+        for t in &f.touching {
+            let z = self.line(work, t.line);
+            work.x[t.bin] += t.weight * if t.mirror { z.conj() } else { z };
+            work.power[t.bin] += t.leak * self.noise_density(work, t.line);
+        }
+        work.power.iter_mut().zip(&work.x).for_each(|(p, x)| *p += x.norm_sqr());
         amplitude.clear();
-        for (k, rows) in self.weight.iter().enumerate() {
-            let [a, b, c, d] = rows;
-            let re = dot(a, &work.s_re) + dot(b, &work.s_im) + self.runout[k].re;
-            let im = dot(c, &work.s_re) + dot(d, &work.s_im) + self.runout[k].im;
-            let noise = dot(&self.frame.leak[k], &work.density);
-            amplitude.push((re * re + im * im + noise).sqrt());
-        }
+        amplitude.extend(work.power.iter().map(|p| p.sqrt()));
         self.command.as_ref().map_or(0.0, |c| self.command_peak(c, chain, work))
     }
 
     /// Share of the energy in the bins that comes from lines outside the sweep, where the plant is a continuation.
     pub fn continuation_share(&self, chain: &[Section], work: &mut SpectralWork) -> f64 {
-        self.sensitivities(chain, work);
+        self.write(chain, work, &mut Vec::new());
         let (mut outside, mut all) = (0.0, 0.0);
-        for [a, b, c, d] in &self.weight {
+        for (sum, difference) in self.frame.sum.iter().zip(&self.frame.difference) {
             for (i, out) in self.outside.iter().enumerate() {
-                let (re, im) = (work.s_re[i], work.s_im[i]);
-                let energy = (a[i] * re + b[i] * im).powi(2) + (c[i] * re + d[i] * im).powi(2);
+                let (re, im) = (work.g_re[i], work.g_im[i]);
+                let energy = (im * sum[i] - re).powi(2) + (re * difference[i]).powi(2);
                 all += energy;
                 outside += if *out { energy } else { 0.0 };
             }
@@ -194,17 +212,42 @@ impl SpectralPes {
         if all > 0.0 { outside / all } else { 0.0 }
     }
 
-    /// S on every line.
-    fn sensitivities(&self, chain: &[Section], work: &mut SpectralWork) {
-        self.lines.close(chain, &mut work.lines);
-        let n = self.outside.len();
-        work.s_re.resize(n, 0.0);
-        work.s_im.resize(n, 0.0);
-        let l = work.lines.re[..n].iter().zip(&work.lines.im[..n]);
-        for ((s_re, s_im), (x, y)) in work.s_re.iter_mut().zip(&mut work.s_im).zip(l) {
+    /// S E on one line, not folded.
+    pub(super) fn line(&self, work: &SpectralWork, i: usize) -> Complex<f64> {
+        Complex::new(work.s_re[i], work.s_im[i]) * Complex::new(self.error[0][i], self.error[1][i])
+    }
+
+    /// Density of the noise in the PES on one line, not folded.
+    pub(super) fn noise_density(&self, work: &SpectralWork, i: usize) -> f64 {
+        let s = work.s_re[i] * work.s_re[i] + work.s_im[i] * work.s_im[i];
+        let l = work.lines.re[i] * work.lines.re[i] + work.lines.im[i] * work.lines.im[i];
+        s * (self.encoder * l + self.windage[i])
+    }
+
+    /// S on every line, and what the frame is applied to.
+    #[inline(always)]
+    fn fold(&self, work: &mut SpectralWork) {
+        let (n, width) = (self.outside.len(), self.frame.width());
+        let SpectralWork { lines, s_re, s_im, g_re, g_im, density, .. } = work;
+        for a in [&mut *s_re, &mut *s_im, &mut *g_re, &mut *g_im, &mut *density] {
+            a.resize(width, 0.0);
+        }
+        // Slices of one known length: no index is checked in the loop.
+        let (l_re, l_im) = (&lines.re[..n], &lines.im[..n]);
+        let (s_re, s_im, density) = (&mut s_re[..n], &mut s_im[..n], &mut density[..n]);
+        let (g_re, g_im) = (&mut g_re[..n], &mut g_im[..n]);
+        let ([e_re, e_im], [f_re, f_im]) = (&self.error, &self.frame.fold);
+        let (e_re, e_im, f_re, f_im) = (&e_re[..n], &e_im[..n], &f_re[..n], &f_im[..n]);
+        let (windage, power) = (&self.windage[..n], &self.frame.fold_power[..n]);
+        for i in 0..n {
+            let (x, y) = (l_re[i], l_im[i]);
             let scale = 1.0 / ((1.0 + x) * (1.0 + x) + y * y);
-            *s_re = (1.0 + x) * scale;
-            *s_im = -y * scale;
+            let (a, b) = ((1.0 + x) * scale, -y * scale);
+            let (u, v) = (a * e_re[i] - b * e_im[i], a * e_im[i] + b * e_re[i]);
+            (s_re[i], s_im[i]) = (a, b);
+            (g_re[i], g_im[i]) = (u * f_re[i] - v * f_im[i], u * f_im[i] + v * f_re[i]);
+            // |S|² is the scale itself.
+            density[i] = scale * (self.encoder * (x * x + y * y) + windage[i]) * power[i];
         }
     }
 
@@ -218,8 +261,8 @@ impl SpectralPes {
             let (p, l) = (self.lines.value(i), Complex::new(work.lines.re[i], work.lines.im[i]));
             let s = Complex::new(work.s_re[i], work.s_im[i]);
             let gain = if p.norm_sqr() > 0.0 { l / p } else { Complex::new(0.0, 0.0) };
-            command.push(gain * s * c.error[i] + c.forward[i]);
-            power += (self.encoder * (gain * s).norm_sqr() + self.windage[i] * (l * s).norm_sqr()) * c.spacing_hz;
+            command.push(gain * self.line(work, i) + c.forward[i]);
+            power += (self.encoder * (gain * s).norm_sqr() + c.windage[i] * (l * s).norm_sqr()) * c.spacing_hz;
         }
         // What holds the mean position: C S next to rest, where it is real.
         c.rest.close(chain, &mut work.rest);
@@ -239,6 +282,26 @@ impl SpectralPes {
         let peak = c.instants.iter().map(|t| at(*t)).fold(0.0, f64::max);
         peak + (power * 2.0 * c.samples.max(2.0).ln()).sqrt()
     }
+}
+
+/// Real and imaginary part of a bin, and the noise in it, from folded lines. Sums run in lanes, in a fixed order.
+#[inline(always)]
+fn seen([re, im, density]: [&[f64]; 3], sum: &[f64], difference: &[f64]) -> [f64; 3] {
+    let chunks = sum.len() / LANES;
+    let (re, im) = (&re.as_chunks::<LANES>().0[..chunks], &im.as_chunks::<LANES>().0[..chunks]);
+    let density = &density.as_chunks::<LANES>().0[..chunks];
+    let (sum, difference) = (&sum.as_chunks::<LANES>().0[..chunks], &difference.as_chunks::<LANES>().0[..chunks]);
+    let (mut x, mut y, mut noise) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for c in 0..chunks {
+        for j in 0..LANES {
+            let (u, v) = (sum[c][j], difference[c][j]);
+            x[j] += im[c][j] * u - re[c][j];
+            y[j] -= re[c][j] * v;
+            noise[j] += density[c][j] * (0.5 + 0.5 * (u * u + v * v));
+        }
+    }
+    let total = |a: [f64; LANES]| ((a[0] + a[1]) + (a[2] + a[3])) + ((a[4] + a[5]) + (a[6] + a[7]));
+    [total(x), total(y), total(noise)]
 }
 
 /// The feed-forward's response: central differences of the reference.

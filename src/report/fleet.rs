@@ -8,7 +8,7 @@ use super::figure::{Axis, Figure, Ink, Kind, Mark, Panel, Series, Tile};
 use super::histogram::{Group, histogram};
 use super::number::NumberFormat;
 use super::page::{Block, Card, Page, Section};
-use super::table::{Column, Table, Verdict};
+use super::table::{Cell, Column, Table, Verdict};
 
 /// One slot as the page shows it; NaN where there is no number.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +37,8 @@ pub struct SlotLine {
     pub shared: String,
     /// What is wrong with it, or why it is not tuned.
     pub note: String,
+    /// Its own report, relative to the page.
+    pub report: Option<String>,
 }
 
 /// One number of shared tables.
@@ -116,7 +118,7 @@ pub fn fleet_page(v: &FleetView) -> Result<Page, ReportError> {
             label: "shared tables".into(),
             value: tables.to_string(),
             unit: String::new(),
-            note: format!("serve {:.1} % of the slots to be served", 100.0 * last.share),
+            note: format!("serve {:.1} % of the slots that can be served", 100.0 * last.share),
             verdict: Some(if last.share >= 0.99 { Verdict::Ok } else { Verdict::Warn }),
         });
     }
@@ -124,7 +126,7 @@ pub fn fleet_page(v: &FleetView) -> Result<Page, ReportError> {
         Section { heading: "The floor".into(), blocks: floor(v) },
         Section { heading: "Before and after".into(), blocks: distributions(v)? },
         Section { heading: "Shared tables".into(), blocks: shared(v)? },
-        Section { heading: "Worst slots".into(), blocks: vec![Block::Table(worst(v)?)] },
+        Section { heading: "Worst slots".into(), blocks: vec![Block::Prose(REPORTS.into()), Block::Table(worst(v)?)] },
         Section { heading: "Work list".into(), blocks: vec![Block::Table(work(v)?)] },
     ];
     if !v.drift.is_empty() {
@@ -182,7 +184,10 @@ fn floor(v: &FleetView) -> Vec<Block> {
                 panel.marks.push(Mark::Tile(Tile { x, y, shade, text: letter(&s.verdict), ink }));
             }
         }
-        let title = format!("Testers {} to {}", names.first().unwrap_or(&""), names.last().unwrap_or(&""));
+        let title = match names.as_slice() {
+            [only] => format!("Tester {only}"),
+            _ => format!("Testers {} to {}", names.first().unwrap_or(&""), names.last().unwrap_or(&"")),
+        };
         figures.push(Block::Figure(Figure { title, caption: words.join(", "), share_x: false, panels: vec![panel] }));
     }
     figures
@@ -216,7 +221,9 @@ fn distributions(v: &FleetView) -> Result<Vec<Block>, ReportError> {
 }
 
 fn shared(v: &FleetView) -> Result<Vec<Block>, ReportError> {
-    let mut blocks = Vec::new();
+    let mut blocks = vec![Block::Prose(
+        "A slot counts as served by a table that meets every limit in it, in every case. Shares are of the slots that can be served: those that keep proven gains or have a proven table of their own.".into(),
+    )];
     if !v.coverage.is_empty() {
         let k: Vec<f64> = v.coverage.iter().map(|c| c.tables as f64).collect();
         let served: Vec<f64> = v.coverage.iter().map(|c| 100.0 * c.share).collect();
@@ -272,7 +279,7 @@ fn slot_columns() -> Vec<Column> {
 fn put(t: &mut Table, s: &SlotLine) -> Result<(), ReportError> {
     let name = format!("{}/{}", s.tester, s.slot);
     t.push(vec![
-        name.as_str().into(),
+        Cell::link(&name, s.report.as_deref()),
         s.verdict.as_str().into(),
         s.class.as_str().into(),
         (100.0 * s.worst[0]).into(),
@@ -286,6 +293,9 @@ fn put(t: &mut Table, s: &SlotLine) -> Result<(), ReportError> {
         s.note.as_str().into(),
     ])
 }
+
+/// What the names of slots lead to.
+const REPORTS: &str = "Where a slot has a full report of its own, its name leads there; `--pages N` writes as many.";
 
 fn worst(v: &FleetView) -> Result<Table, ReportError> {
     let mut t = Table::new("Limits missed most, with the best gains there are", slot_columns());

@@ -65,6 +65,8 @@ pub enum Value {
     Number(f64),
     /// Words.
     Text(String),
+    /// Words that lead to a file, by its path relative to the page.
+    Link(String, String),
     /// Nothing is known.
     Missing,
 }
@@ -247,11 +249,26 @@ impl Column {
     }
 }
 
+/// A path as a link: bytes that mean something in an address are escaped (RFC 3986).
+fn encoded(path: &str) -> String {
+    let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._~/".contains(&b);
+    path.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
+}
+
 impl Cell {
+    /// Words that lead to a file beside the page, where there is one.
+    pub fn link(words: &str, to: Option<&str>) -> Cell {
+        let value = match to {
+            Some(to) => Value::Link(words.to_owned(), to.to_owned()),
+            None => Value::Text(words.to_owned()),
+        };
+        Cell { value, flag: None }
+    }
+
     fn plain(&self, format: NumberFormat) -> String {
         let value = match &self.value {
             Value::Number(number) => format.text(*number),
-            Value::Text(words) => words.clone(),
+            Value::Text(words) | Value::Link(words, _) => words.clone(),
             Value::Missing => MISSING.to_owned(),
         };
         match &self.flag {
@@ -265,6 +282,7 @@ impl Cell {
             @match &self.value {
                 Value::Number(number) => (format.page(*number)),
                 Value::Text(words) => (words),
+                Value::Link(words, to) => a href=(encoded(to)) { (words) },
                 Value::Missing => (MISSING),
             }
             @if let Some((verdict, words)) = &self.flag { " " span class={ "flag " (verdict.class()) } { (words) } }

@@ -3,13 +3,13 @@
 //! In: a decision vector. Out: the objective and the largest violation. One [`Desk`] a thread holds every buffer, so that a
 //! candidate allocates nothing.
 
-use super::machine::{Buffers, PesScore, Prepared};
+use super::machine::{Buffers, PesScore, PesSlopes, Prepared};
 use super::parameters::chain_of;
 use super::requirements::{Found, Requirement};
 use super::spec::Limits;
 use super::{Machine, Parameters, Spec, TuneError, What};
 use crate::controller::Controller;
-use crate::feedback::{Event, GRAZE, Graze, QuickMargins};
+use crate::feedback::{Event, GRAZE, Graze, Pulls, QuickMargins};
 use crate::lti::Section;
 use std::f64::consts::TAU;
 
@@ -22,9 +22,9 @@ pub struct Bench {
     pub(super) wanted: Vec<Requirement>,
     /// The limits as the search aims at them, machine by machine: the spec's, and a little inside after a back-off.
     pub(super) aimed: Vec<Vec<Requirement>>,
-    harmonics: Vec<usize>,
-    weight_low: f64,
-    weight_high: f64,
+    pub(super) harmonics: Vec<usize>,
+    pub(super) weight_low: f64,
+    pub(super) weight_high: f64,
 }
 
 /// The buffers of one thread.
@@ -34,6 +34,8 @@ pub struct Desk {
     pub(super) chain: Vec<Section>,
     pub(super) buffers: Vec<Buffers>,
     pub(super) scores: Vec<MachineScore>,
+    pub(super) pulls: Pulls,
+    pub(super) slopes: PesSlopes,
     /// Candidates scored so far.
     pub evaluations: usize,
 }
@@ -117,6 +119,8 @@ impl Bench {
             chain: Vec::with_capacity(sections),
             buffers: self.machines.iter().map(Prepared::buffers).collect(),
             scores: vec![MachineScore::default(); self.machines.len()],
+            pulls: Pulls::default(),
+            slopes: PesSlopes::default(),
             controller,
             evaluations: 0,
         }
@@ -124,6 +128,12 @@ impl Bench {
 
     /// Scores a candidate: margins of every machine, then the write of every machine unless one is unstable.
     pub fn score(&self, x: &[f64], desk: &mut Desk) -> Score {
+        self.score_within(x, f64::INFINITY, desk)
+    }
+
+    /// The same; where margins alone miss a limit by more than `hopeless` (share of the limit) the write is not looked at: the violation is that of
+    /// the margins, at most the whole one, and the objective is 0.
+    pub fn score_within(&self, x: &[f64], hopeless: f64, desk: &mut Desk) -> Score {
         desk.evaluations += 1;
         self.parameters.put(x, &mut desk.controller);
         if !chain_of(&desk.controller, &mut desk.chain) {
@@ -131,6 +141,12 @@ impl Bench {
         }
         if let Some(violation) = self.judge_margins(desk) {
             return Score { objective: 0.0, violation };
+        }
+        if hopeless < f64::INFINITY {
+            let missed = self.margins_missed(desk);
+            if missed > hopeless {
+                return Score { objective: 0.0, violation: missed };
+            }
         }
         self.judge_writes(desk);
         let mut score = Score { objective: f64::NEG_INFINITY, violation: f64::NEG_INFINITY };
@@ -149,6 +165,17 @@ impl Bench {
             score.objective = score.objective.max(s.objective);
         }
         score
+    }
+
+    /// The largest violation of a limit of a margin, from the figures in the desk.
+    fn margins_missed(&self, desk: &Desk) -> f64 {
+        let margin = |w: &&Requirement| {
+            matches!(w.what, What::PhaseMargin | What::GainMargin | What::MaxSensitivity | What::GainCrossover)
+        };
+        let of = |(s, aimed): (&MachineScore, &Vec<Requirement>)| {
+            aimed.iter().filter(margin).map(|w| w.violation_of(&s.found, &mut 0)).fold(f64::NEG_INFINITY, f64::max)
+        };
+        desk.scores.iter().zip(&self.aimed).map(of).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Margins of every machine into the desk; the violation where one is unstable.

@@ -3,6 +3,7 @@
 //! In: a [`Bench`], a table of its shape. Out: the table that meets the bench's limits with the smallest objective near it, by the search's grid.
 //! Nothing is judged exactly here: whoever takes the table proves it. A fleet tunes most of its slots this way.
 
+use super::polish::{Goal, polish};
 use super::search::refine;
 use super::{Bench, Desk, Score};
 use crate::controller::Controller;
@@ -11,5 +12,13 @@ use crate::controller::Controller;
 pub fn polish_table(bench: &Bench, start: &Controller, steps: usize, desk: &mut Desk) -> Option<(Controller, Score)> {
     let x = bench.parameters().vector(start);
     let end = refine(bench, &x, steps, desk)?;
+    Some((bench.parameters().controller(&end.x), end.score))
+}
+
+/// The table near `start` that keeps the largest share of its nearest limit as room, on the worst machine of the bench, whatever its objective;
+/// none where the start's loop is unstable. Such a table stands machines that lie between those of the bench.
+pub fn roomiest_table(bench: &Bench, start: &Controller, steps: usize, desk: &mut Desk) -> Option<(Controller, Score)> {
+    let x = bench.parameters().vector(start);
+    let end = polish(bench, &x, Goal::Room, steps, desk)?;
     Some((bench.parameters().controller(&end.x), end.score))
 }

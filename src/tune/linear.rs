@@ -1,10 +1,11 @@
 //! A candidate with its derivatives: objective and limits as straight lines around one decision vector.
 //!
 //! Margins: analytic, from d ln L = d ln C at the events of the curve, whose frequencies move along with the slope of ln L.
-//! The write: forward differences of the exact simulation, one run a parameter; an adjoint would cost as much.
+//! The write read off the spectrum: one backward pass a figure ([`crate::pes::SpectralPes::slopes`]). The simulated write, and wherever the
+//! command's peak counts: forward differences, one run a parameter; an adjoint of a simulation would cost as much.
 
 use super::bench::{figure_of_write, graze_violation, harmful_grazes, named_crossings};
-use super::machine::PesScore;
+use super::machine::{PesScore, Prepared};
 use super::parameters::chain_of;
 use super::requirements::Requirement;
 use super::{Bench, Desk, Score, Side, What};
@@ -138,8 +139,63 @@ pub(super) fn linearise(bench: &Bench, x: &[f64], desk: &mut Desk) -> Option<Lin
             })
             .collect();
     }
+    if bench.machines.iter().all(Prepared::has_slopes) {
+        backward(bench, &sections, desk, &mut objectives, &mut rows);
+    } else {
+        differences(bench, x, &base, desk, &mut objectives, &mut rows);
+        desk.evaluations += n;
+    }
+    Some(Linear { score, objectives, rows })
+}
+
+/// Gradients of the write by one backward pass for each figure of each machine; the desk holds the candidate's own write.
+fn backward(
+    bench: &Bench,
+    sections: &[[Section; 2]],
+    desk: &mut Desk,
+    objectives: &mut [(f64, Vec<f64>)],
+    rows: &mut [Row],
+) {
+    let Desk { buffers, scores, pulls, slopes, .. } = desk;
+    let mut done = None;
+    for (i, ((machine, b), s)) in bench.machines.iter().zip(buffers).zip(&*scores).enumerate() {
+        machine.pull(done, sections, SECTION_STEP, pulls);
+        done = Some(machine);
+        machine.slopes(&s.pes, pulls, b, &bench.harmonics, slopes);
+        let (low, high) = (bench.weight_low, bench.weight_high);
+        let all = (low * s.pes.dft_low + high * s.pes.dft_high).max(f64::MIN_POSITIVE);
+        objectives[i].1.extend(slopes.dft_low.iter().zip(&slopes.dft_high).map(|(a, b)| (low * a + high * b) / all));
+        for row in rows.iter_mut().filter(|r| r.machine == i && matches!(r.from, From::Write)) {
+            let w = &bench.aimed[i][row.wanted];
+            let of: &[f64] = match w.what {
+                What::DftLow => &slopes.dft_low,
+                What::DftHigh => &slopes.dft_high,
+                What::Harmonic { .. } => &slopes.harmonics[harmonics_before(bench, row)],
+                _ => continue,
+            };
+            // A figure of the write has a limit that it must not exceed.
+            row.gradient.extend(of.iter().map(|d| d / w.limit));
+        }
+    }
+}
+
+/// How many limits of harmonics stand before a row's.
+fn harmonics_before(bench: &Bench, row: &Row) -> usize {
+    let before = &bench.aimed[row.machine][..row.wanted];
+    before.iter().filter(|w| matches!(w.what, What::Harmonic { .. })).count()
+}
+
+/// Gradients of the write by forward differences: one write a parameter.
+fn differences(
+    bench: &Bench,
+    x: &[f64],
+    base: &[PesScore],
+    desk: &mut Desk,
+    objectives: &mut [(f64, Vec<f64>)],
+    rows: &mut [Row],
+) {
     let mut moved = x.to_vec();
-    for j in 0..n {
+    for j in 0..x.len() {
         moved[j] = x[j] + STEP;
         bench.parameters.put(&moved, &mut desk.controller);
         chain_of(&desk.controller, &mut desk.chain);
@@ -149,17 +205,14 @@ pub(super) fn linearise(bench: &Bench, x: &[f64], desk: &mut Desk) -> Option<Lin
             gradient.push((s.objective - *value) / STEP);
         }
         for row in rows.iter_mut().filter(|r| matches!(r.from, From::Write)) {
-            let aimed = &bench.aimed[row.machine];
-            let before = aimed[..row.wanted].iter().filter(|w| matches!(w.what, What::Harmonic { .. })).count();
-            let w = &aimed[row.wanted];
+            let before = harmonics_before(bench, row);
+            let w = &bench.aimed[row.machine][row.wanted];
             let figure = |p: &PesScore| figure_of_write(w.what, p, &mut { before }).unwrap_or(0.0);
             let difference =
                 w.violation(figure(&desk.scores[row.machine].pes)) - w.violation(figure(&base[row.machine]));
             row.gradient.push(difference / STEP);
         }
     }
-    desk.evaluations += n;
-    Some(Linear { score, objectives, rows })
 }
 
 /// The section that each parameter acts on, a little to either side.
@@ -209,4 +262,62 @@ fn margin_slope(w: &Requirement, e: &Event, pull: Complex<f64>, named: bool) -> 
     };
     let direction = if w.side == Side::AtLeast { -1.0 } else { 1.0 };
     sign * direction * change / w.limit
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::frf::Frf;
+    use crate::lti::{FrequencyResponse, Plant, PlantFile};
+    use crate::tune::{Hold, Machine, Parameters, Spec};
+    use std::path::Path;
+
+    #[test]
+    fn backward_slopes_are_those_of_differences() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let spec = Spec::read(&folder.join("specs/limits/floor.toml")).unwrap();
+        let text = std::fs::read_to_string(folder.join("specs/controllers/nominal.toml")).unwrap();
+        let start: crate::controller::Controller = toml::from_str(&text).unwrap();
+        let text = std::fs::read_to_string(folder.join("specs/machines/healthy.toml")).unwrap();
+        let plant: Plant = toml::from_str::<PlantFile>(&text).unwrap().try_into().unwrap();
+        let w: Vec<f64> = (0..400).map(|i| TAU * 20.0 * 1.0155f64.powi(i)).collect();
+        let frf = |gain: f64| Frf::new(w.clone(), w.iter().map(|w| plant.at(*w) * gain).collect(), None).unwrap();
+        let frfs = [frf(1.0), frf(0.9)];
+        let machines: Vec<Machine<'_>> = frfs
+            .iter()
+            .map(|frf| Machine::Response { frf, hold: Hold::NotIncluded, continuation: Some(&plant) })
+            .collect();
+        let parameters = Parameters::of(&spec, Some(&start), start.sample_time_s);
+        let bench = Bench::new(&machines, &spec, parameters).unwrap();
+        let mut desk = bench.desk();
+        let mut x = bench.parameters().vector(&start);
+        // Off the bounds, so that every parameter moves the loop: a notch beside the mode, half as deep.
+        for (x, [from, to]) in x.iter_mut().zip(bench.parameters().bounds()) {
+            *x = x.clamp(from + 0.2 * (to - from), to - 0.2 * (to - from));
+        }
+        bench.score(&x, &mut desk);
+        let sections = sections_around(&bench, &x, &mut desk);
+        bench.score(&x, &mut desk);
+        let new = || rows(&bench, &desk).into_iter().filter(|r| matches!(r.from, From::Write)).collect::<Vec<Row>>();
+        let (mut back, mut forth) = (new(), new());
+        let base: Vec<PesScore> = desk.scores.iter().map(|s| s.pes.clone()).collect();
+        let objective = || desk.scores.iter().map(|s| (s.objective, Vec::new())).collect::<Vec<_>>();
+        let (mut a, mut b) = (objective(), objective());
+        backward(&bench, &sections, &mut desk, &mut a, &mut back);
+        differences(&bench, &x, &base, &mut desk, &mut b, &mut forth);
+        // Half the second derivative, about 1, times the step of the differences, and their rounding: 1e-10 over the step.
+        let near = |a: &[f64], b: &[f64]| {
+            a.len() == x.len()
+                && b.len() == x.len()
+                && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-4 * (0.1 + b.abs()))
+        };
+        assert!(back.len() == 8 && a.len() == 2);
+        for (p, q) in a.iter().zip(&b) {
+            assert!(near(&p.1, &q.1) && p.1.iter().all(|d| *d != 0.0), "{p:?} {q:?}");
+        }
+        for (p, q) in back.iter().zip(&forth) {
+            assert!(near(&p.gradient, &q.gradient), "{p:?} {q:?}");
+        }
+    }
 }

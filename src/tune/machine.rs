@@ -2,7 +2,7 @@
 
 use super::TuneError;
 use crate::controller::Controller;
-use crate::feedback::{LoopOnGrid, MeasuredLoop, ResponseCurve, SampledPlant, hold};
+use crate::feedback::{LoopOnGrid, MeasuredLoop, Pulls, ResponseCurve, SampledPlant, hold};
 use crate::frf::Frf;
 use crate::lti::{DiscretePlant, Plant, Section, Sections};
 use crate::pes::{
@@ -116,6 +116,14 @@ pub(super) struct PesScore {
     pub command_peak: f64,
 }
 
+/// How the figures of one write change with each parameter.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PesSlopes {
+    pub dft_low: Vec<f64>,
+    pub dft_high: Vec<f64>,
+    pub harmonics: Vec<Vec<f64>>,
+}
+
 impl Prepared {
     /// `harmonics`: the limited ones; `peak`: whether the command's peak counts, which needs the whole write.
     pub fn of(
@@ -185,6 +193,37 @@ impl Prepared {
         out.harmonics.clear();
         let at = |k: &usize| dft.bins().iter().position(|b| b == k).map_or(0.0, |i| b.amplitude[i]);
         out.harmonics.extend(harmonics.iter().map(at));
+    }
+
+    /// Whether the slopes of the write come from one backward pass: it is read off the spectrum, and its command does not count.
+    pub fn has_slopes(&self) -> bool {
+        matches!(&self.source, Source::Response(s) if !s.has_command())
+    }
+
+    /// The pulls of sections given at -h and +h, on the lines of the write; left as they are where they are those of `done`, another machine.
+    pub fn pull(&self, done: Option<&Prepared>, sections: &[[Section; 2]], h: f64, pulls: &mut Pulls) {
+        let Source::Response(s) = &self.source else { return };
+        if !matches!(done.map(|d| &d.source), Some(Source::Response(other)) if s.same_lines(other)) {
+            s.lines().pull(sections, h, pulls);
+        }
+    }
+
+    /// Slopes of the write that the buffers have seen last, whose figures are `at`; only where [`Prepared::has_slopes`].
+    pub fn slopes(&self, at: &PesScore, pulls: &Pulls, b: &mut Buffers, harmonics: &[usize], out: &mut PesSlopes) {
+        let Source::Response(s) = &self.source else { return };
+        let Buffers { spectral, amplitude, .. } = b;
+        // d norm = sum of power changes over twice the norm; of a norm of 0 nothing is known.
+        let share = |norm: f64| if norm > 0.0 { 0.5 / norm } else { 0.0 };
+        let dft = s.dft();
+        let low = dft.inside(LOW_BAND_HZ).map(|i| (i, share(at.dft_low)));
+        s.slopes(low, pulls, spectral, &mut out.dft_low);
+        let high = dft.inside(HIGH_BAND_HZ).map(|i| (i, share(at.dft_high)));
+        s.slopes(high, pulls, spectral, &mut out.dft_high);
+        out.harmonics.resize_with(harmonics.len(), Vec::new);
+        for (k, out) in harmonics.iter().zip(&mut out.harmonics) {
+            let bin = dft.bins().iter().position(|b| b == k).map(|i| (i, share(amplitude[i])));
+            s.slopes(bin.into_iter(), pulls, spectral, out);
+        }
     }
 }
 

@@ -26,7 +26,7 @@ mod tuning;
 
 pub use bench::{Bench, Desk, Score};
 pub use confidence::margin_intervals;
-pub use from_table::polish_table;
+pub use from_table::{polish_table, roomiest_table};
 pub use gain_table::{CrossingRow, GainTable, GainTableError, InputDigest, Provenance, Summary};
 pub use judge::{Proof, judge};
 pub use limit::{

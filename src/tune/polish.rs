@@ -15,6 +15,8 @@ pub(super) enum Goal {
     Best,
     /// The smallest largest violation, whatever the objective; ends where all limits are met.
     Reach,
+    /// The most room to the nearest limit, whatever the objective.
+    Room,
 }
 
 /// Where a polish ended.
@@ -31,6 +33,10 @@ const LAST_RADIUS: f64 = 1e-6;
 const WIDEST_RADIUS: f64 = 1.0;
 /// Predicted gain (ln of the objective) at which a polish is done: a millionth.
 const WORTHLESS: f64 = 1e-7;
+/// Predicted gain of room (share of a limit) at which a polish for room is done.
+const ROOM_WORTHLESS: f64 = 1e-4;
+/// Most room that a plan promises itself (share of a limit).
+const MOST_ROOM: f64 = 1.0;
 /// Price of a violation at first, and at most.
 const PRICE: f64 = 10.0;
 const HIGHEST_PRICE: f64 = 1e5;
@@ -54,7 +60,9 @@ pub(super) fn polish(bench: &Bench, x: &[f64], goal: Goal, steps: usize, desk: &
     let merit = |s: &Score, price: f64| match goal {
         Goal::Best => s.merit(price),
         Goal::Reach => s.violation.max(0.0),
+        Goal::Room => s.violation,
     };
+    let worthless = if goal == Goal::Room { ROOM_WORTHLESS } else { WORTHLESS };
     let mut taken = 0;
     let mut refused = 0;
     while taken + refused < steps && radius > LAST_RADIUS {
@@ -67,7 +75,7 @@ pub(super) fn polish(bench: &Bench, x: &[f64], goal: Goal, steps: usize, desk: &
             price *= 4.0;
             step = plan(bench, &x, &here, &hessian, radius, price, goal, None);
         }
-        if step.promised <= WORTHLESS {
+        if step.promised <= worthless {
             break;
         }
         let now = merit(&here.score, price);
@@ -169,7 +177,7 @@ fn plan(
     }
     row.fill(0.0);
     row[n + 1] = -1.0;
-    p.row(&row, 0.0);
+    p.row(&row, if goal == Goal::Room { MOST_ROOM } else { 0.0 });
     row.fill(0.0);
     for (j, (x, [from, to])) in x.iter().zip(bench.parameters().bounds()).enumerate() {
         row[j] = 1.0;
@@ -180,7 +188,8 @@ fn plan(
     }
     let (z, multiplier) = p.solve();
     let d = z[..n].to_vec();
-    let left = here.rows.iter().map(|r| r.value + dot(&r.gradient, &d)).fold(0.0, f64::max);
+    let least = if goal == Goal::Room { -MOST_ROOM } else { 0.0 };
+    let left = here.rows.iter().map(|r| r.value + dot(&r.gradient, &d)).fold(least, f64::max);
     let curved: f64 = 0.5 * (0..n).map(|j| d[j] * dot(&p.h[j * size..j * size + n], &d)).sum::<f64>();
     let promised = match goal {
         Goal::Best => {
@@ -188,6 +197,7 @@ fn plan(
             here.score.objective - objective + price * (here.score.violation.max(0.0) - left) - curved
         }
         Goal::Reach => here.score.violation.max(0.0) - left,
+        Goal::Room => here.score.violation - left,
     };
     let count = objectives.len();
     Step {

@@ -5,7 +5,7 @@
 
 use pulp::Arch;
 
-/// Runs `f` compiled for the processor at hand.
-pub(super) fn wide<T>(f: impl FnOnce() -> T) -> T {
+/// Runs `f` compiled for the processor at hand; what `f` calls gains only where it is inlined.
+pub fn wide<T>(f: impl FnOnce() -> T) -> T {
     Arch::new().dispatch(f)
 }
