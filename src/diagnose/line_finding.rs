@@ -4,7 +4,7 @@ use super::bench::Bench;
 use super::finding::{Estimate, Finding, Where};
 use super::linear::{Sampled, free_motions};
 use super::lines::Line;
-use super::name::{everywhere, plain, text_of};
+use super::name::{everywhere, text_of};
 use super::run::Run;
 use super::select::Selection;
 use crate::lti::FrequencyResponse;
@@ -91,6 +91,13 @@ fn resolved(bench: &Bench, hz: f64) -> [f64; 2] {
     [(hz - width).max(0.0), hz + width]
 }
 
+/// A line's frequency with its 95 % interval: the Cramér-Rao bound for a tone of the strength found, its phase each record's own
+/// (Rife & Boorstyn 1974).
+fn frequency(bench: &Bench, line: &Line) -> Estimate {
+    let off = 1.96 * (12.0 / (-2.0 * line.log_p).max(1.0)).sqrt() / (TAU * bench.scene.duration_s);
+    Estimate { value: line.hz, low: line.hz - off, high: line.hz + off, unit: "Hz".into() }
+}
+
 /// One finding for all orders of the spindle, one for each other line; and the frequencies (Hz) of those that are none, but narrow
 /// bands of noise or something that rings.
 pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Finding>, Vec<f64>) {
@@ -118,7 +125,7 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Findin
     let mut orders: Vec<&(&Line, Phasors)> = hums.iter().filter(|l| l.0.order.is_some()).collect();
     orders.sort_by_key(|l| l.0.order);
     if let Some((first, _)) = orders.first() {
-        let mut parameters = BTreeMap::from([("base_hz".to_owned(), plain(first.hz, "Hz"))]);
+        let mut parameters = BTreeMap::from([("base_hz".to_owned(), frequency(bench, first))]);
         for (l, phasors) in &orders {
             let harmonic = l.order.unwrap_or(1) as f64 / first.order.unwrap_or(1) as f64;
             let name = if l.order == first.order {
@@ -137,7 +144,7 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Findin
     for (l, phasors) in hums.iter().filter(|l| l.0.order.is_none()) {
         let values = phasors.amplitudes();
         let mut parameters = BTreeMap::from([
-            ("frequency_hz".to_owned(), plain(l.hz, "Hz")),
+            ("frequency_hz".to_owned(), frequency(bench, l)),
             ("amplitude".to_owned(), estimate(&values, 1.0, &given.position_unit)),
         ]);
         if let Ok(s) = &sampled {

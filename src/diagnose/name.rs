@@ -224,7 +224,10 @@ pub(super) fn noise_story(bench: &Bench) -> Option<Finding> {
     }
     let seconds = (slope * bench.levels.sensor_rms.powi(2)).sqrt() / bench.scene.speed;
     let z = slope / sigma;
-    let mut f = statistic("jitter", ("rms_s", plain(seconds, "s")), log_tail(z * z, 1).exp().max(1e-300), &whole);
+    // Half the slope's relative error, the value being its root.
+    let off = 0.5 * 1.96 * seconds / z;
+    let rms = Estimate { value: seconds, low: seconds - off, high: seconds + off, unit: "s".into() };
+    let mut f = statistic("jitter", ("rms_s", rms), log_tail(z * z, 1).exp().max(1e-300), &whole);
     f.family.push("encoder_noise".into());
     Some(f)
 }
@@ -330,9 +333,10 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
         d.verdict = Verdict::Refit;
     }
     let (b0, k0, c0) = body_numbers(&bench.form.given.body);
-    let (b1, k1, c1) = body_numbers(&selection.model.refitted.plant.body);
+    let refitted = &selection.last().refitted.plant;
+    let (b1, k1, c1) = body_numbers(&refitted.body);
     d.remarks.push(format!(
         "linear refit: acceleration gain {b0:.6e} -> {b1:.6e}, stiffness {k0:.6e} -> {k1:.6e} 1/s^2, viscous rate {c0:.4} -> {c1:.4} 1/s, delay {:.3e} -> {:.3e} s",
-        bench.form.given.delay_s, selection.model.refitted.plant.delay_s
+        bench.form.given.delay_s, refitted.delay_s
     ));
 }

@@ -53,9 +53,10 @@ impl Effect for Shock {
         let shortest = (8.0 * scene.sample_time_s).max(scene.duration_s / 200.0);
         let mut all = Vec::new();
         for width in logarithmic(shortest, scene.duration_s / 8.0, 4) {
-            // Half a width apart: the nearest pulse carries at least nine tenths of any other of this width.
+            // Half a width apart: the nearest pulse carries at least nine tenths of any other of this width. None begins at 0, so that
+            // all may be refined.
             let count = (2.0 * scene.duration_s / width).floor() as usize;
-            all.extend((0..count).map(|i| vec![0.5 * width * i as f64, width]));
+            all.extend((0..count).map(|i| vec![0.5 * width * (i as f64 + 0.5), width]));
         }
         all
     }

@@ -45,6 +45,10 @@ impl Law for Rolloff {
 /// Share of the whole fall by which the torque factor may seem to rise over an eighth of the way: noise, not shape.
 const RISE: f64 = 0.05;
 
+/// The position (position_unit) at which the paper's machines are compared, and how far beyond the travel the polynomial may be read.
+const KNOWN: f64 = 15.0;
+const CONTINUED: f64 = 2.0;
+
 /// Fall of the torque factor at a position, over its value at 0.
 fn drop(strengths: &[f64], z: f64) -> f64 {
     strengths[0] * z + strengths[1] * z * z + strengths[2] * z.powi(4) + strengths[3] * z.powi(6)
@@ -80,10 +84,13 @@ impl Effect for TorqueFactorRolloff {
         let at = |x: f64| 0.5 * (drop(s, x / l) + drop(s, -x / l));
         // What a reader can picture first; the polynomial after it, from which the law is made again.
         let mut all = vec![
-            Parameter::new("drop_at_15", at(15.0), Unit::Ratio),
             Parameter::new("drop_at_travel", at(l), Unit::Ratio),
             Parameter::new("curvature", s[1] / l.powi(2), Unit::PerPositionSquared),
         ];
+        // Far beyond the motion a polynomial says nothing of a magnet.
+        if KNOWN <= CONTINUED * l {
+            all.insert(0, Parameter::new("drop_at_15", at(KNOWN), Unit::Ratio));
+        }
         if setting.inner[0] > 1.5 {
             all.push(Parameter::new("slope", s[0] / l, Unit::PerPosition));
             all.push(Parameter::new("quartic", s[2] / l.powi(4), Unit::Named("1/position^4")));
@@ -96,7 +103,7 @@ impl Effect for TorqueFactorRolloff {
         let l = scene.travel;
         let curvature = match given.need("curvature") {
             Ok(a) => a,
-            Err(missing) => given.need("drop_at_15").map_err(|_| missing)? / 225.0,
+            Err(missing) => given.need("drop_at_15").map_err(|_| missing)? / KNOWN.powi(2),
         };
         let strengths = vec![
             given.or("slope", 0.0) * l,
