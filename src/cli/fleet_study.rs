@@ -260,9 +260,21 @@ pub(super) fn scale(out: &Path, sizes: &[usize], screen: &mut Screen) -> Result<
             (seconds + files) * times / 3600.0,
             store * times / 1024.0,
         );
+        let asked = 1e5 / n;
+        let missed = if asked > 1.0 {
+            format!(
+                "100 000 slots were not run for this page: in proportion to {size} they take {:.0} min at the rate that the other work left, {:.0} min on {threads} cores without other work, and\n\
+                 memory is not what stands in their way.\n\n",
+                (seconds + files) * asked / 60.0,
+                cpu * asked / threads / 60.0
+            )
+        } else {
+            String::new()
+        };
+        let done: Vec<String> = sizes.iter().take_while(|s| **s != size).chain([&size]).map(usize::to_string).collect();
         let text = format!(
             "# How a run grows with the floor\n\n\
-             Made by `servotune study fleet-scale --out results` (`--sizes` chooses the floors). Slots are made up when they are needed, which is part of the time. {}\n\n\
+             Made by `servotune study fleet-scale --sizes {} --out results`. Slots are made up when they are needed, which is part of the time. {}\n\n\
              ## The stage that grows: every slot\n\n\
              Each slot is drawn, goes through gate, identification, judgement, tuning, proof and the second prover, and is stored. Aim: 100 slots/s on 2 cores.\n\n\
              | slots | wall (s) | slots/s | processor (s) | slots/s on {threads} cores without other work | share of drawing slots |\n|---|---|---|---|---|---|\n{slots}\n\
@@ -270,7 +282,8 @@ pub(super) fn scale(out: &Path, sizes: &[usize], screen: &mut Screen) -> Result<
              ## The whole run\n\n\
              With pilots, library, explanations of untunable slots (40 at most) and shared tables. Aim: below 1024 MiB.\n\n\
              | slots | wall (s) | processor (s) | slots/s | files after it (s) | peak MiB | store MiB | verdicts |\n|---|---|---|---|---|---|---|---|\n{runs}\n\
-             {BEFORE}\n{AHEAD}\n{ahead}\n",
+             {missed}{BEFORE}\n{AHEAD}\n{ahead}\n",
+            done.join(","),
             machine()
         );
         write_text(&page, &text)?;
