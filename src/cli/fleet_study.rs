@@ -142,15 +142,18 @@ pub(super) fn floor(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Fai
     let lines = |name: &str, n: usize| -> Result<String, Failure> {
         Ok(read_text(&result.join(name))?.lines().take(n).collect::<Vec<_>>().join("\n"))
     };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from) as f64;
     let tuned: f64 = last["verdicts"]["tuned"].as_f64().unwrap_or(f64::NAN);
     let certified = number(last, "certified");
     let mut rows = String::new();
     for (v, age) in runs.iter().zip(["0", "6", "12"]) {
         rows += &format!(
-            "| {age} | {} | {:.1} | {:.1} | {:.0} | {} |\n",
+            "| {age} | {} | {:.0} | {:.0} | {:.1} | {:.1} | {:.0} | {} |\n",
             v["slots"],
             number(v, "seconds"),
+            number(v, "cpu_s"),
             number(v, "slots_per_s"),
+            number(v, "slots") * threads / number(v, "slots_stage_cpu_s"),
             number(v, "peak_memory_mib"),
             verdicts(v)
         );
@@ -160,8 +163,9 @@ pub(super) fn floor(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Fai
          Made by `servotune study fleet --out results`. A made-up floor (`specs/fleet.md`, \"The made-up floor\") is measured three times, ages 0, 6 and 12; each\n\
          time all 1024 slots go from their files through gate, identification, judgement and tuning into one store. Every table stands two\n\
          temperatures and two drawn plants. {}\n\n\
-         | age | slots | s | slots/s | peak MiB | verdicts |\n|---|---|---|---|---|---|\n{rows}\n\
-         Slots/s counts all of a run: pilots, the library, every slot, explanations of untunable slots, shared tables.\n\n\
+         | age | slots | wall (s) | processor (s) | slots/s of the run | slots/s of every slot alone | peak MiB | verdicts |\n|---|---|---|---|---|---|---|---|\n{rows}\n\
+         Slots/s of the run counts all: pilots, the library, every slot, explanations of untunable slots, shared tables. \"Every slot alone\" is the stage from a slot's files to its\n\
+         proven and certified table, per processor time: what {threads} cores without other work do.\n\n\
          The page of the last run, with the reports of its {REPORTS} worst slots: [fleet.html](fleet.html).\n\n\
          Second opinion, last run: of {tuned} tables of tuned slots the prover of `specs/certificate.md` certifies {certified} ({:.1} %): on the identified plant, the\n\
          drawn plants and at each temperature every limit of a margin is kept at every frequency. The others keep them on the measured curve, and miss one on a\n\
@@ -256,9 +260,21 @@ pub(super) fn scale(out: &Path, sizes: &[usize], screen: &mut Screen) -> Result<
             (seconds + files) * times / 3600.0,
             store * times / 1024.0,
         );
+        let asked = 1e5 / n;
+        let missed = if asked > 1.0 {
+            format!(
+                "100 000 slots were not run for this page: in proportion to {size} they take {:.0} min at the rate that the other work left, {:.0} min on {threads} cores without other work, and\n\
+                 memory is not what stands in their way.\n\n",
+                (seconds + files) * asked / 60.0,
+                cpu * asked / threads / 60.0
+            )
+        } else {
+            String::new()
+        };
+        let done: Vec<String> = sizes.iter().take_while(|s| **s != size).chain([&size]).map(usize::to_string).collect();
         let text = format!(
             "# How a run grows with the floor\n\n\
-             Made by `servotune study fleet-scale --out results` (`--sizes` chooses the floors). Slots are made up when they are needed, which is part of the time. {}\n\n\
+             Made by `servotune study fleet-scale --sizes {} --out results`. Slots are made up when they are needed, which is part of the time. {}\n\n\
              ## The stage that grows: every slot\n\n\
              Each slot is drawn, goes through gate, identification, judgement, tuning, proof and the second prover, and is stored. Aim: 100 slots/s on 2 cores.\n\n\
              | slots | wall (s) | slots/s | processor (s) | slots/s on {threads} cores without other work | share of drawing slots |\n|---|---|---|---|---|---|\n{slots}\n\
@@ -266,7 +282,8 @@ pub(super) fn scale(out: &Path, sizes: &[usize], screen: &mut Screen) -> Result<
              ## The whole run\n\n\
              With pilots, library, explanations of untunable slots (40 at most) and shared tables. Aim: below 1024 MiB.\n\n\
              | slots | wall (s) | processor (s) | slots/s | files after it (s) | peak MiB | store MiB | verdicts |\n|---|---|---|---|---|---|---|---|\n{runs}\n\
-             {BEFORE}\n{AHEAD}\n{ahead}\n",
+             {missed}{BEFORE}\n{AHEAD}\n{ahead}\n",
+            done.join(","),
             machine()
         );
         write_text(&page, &text)?;

@@ -14,6 +14,8 @@ pub struct Library {
     pub tables: Vec<Candidate>,
     /// Plants to start identification from.
     pub plants: Vec<PlantFile>,
+    /// How many were grown; they follow the fleet's own.
+    pub grown: usize,
     /// Index of the first table of a group. These are for comparison: each is looked at in the slots of its group only.
     pub grouped: usize,
     /// Index of the first table grown on the rest, after those of groups; 0 where there is none yet.

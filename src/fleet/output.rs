@@ -251,6 +251,13 @@ pub fn write_tables(
         let runs: Vec<String> = asked.before.iter().cloned().chain([run.to_owned()]).collect();
         text("drift.csv", &drift_csv(&super::drift(store, &runs)?))?;
     }
+    #[cfg(feature = "parquet")]
+    for name in ["coverage.csv", "work_list.csv", "drift.csv"] {
+        let csv = out.join(name);
+        if files.contains(&csv) {
+            files.push(super::parquet::of_csv(&csv)?);
+        }
+    }
     Ok(files)
 }
 

@@ -43,6 +43,24 @@ pub(super) fn read_words(file: &Path) -> Result<(Vec<String>, Vec<Vec<String>>),
     Ok((header, rows))
 }
 
+/// The same table as Parquet, beside it: a column of which every word that is there is a number holds numbers.
+pub(super) fn of_csv(file: &Path) -> Result<PathBuf, FleetError> {
+    let fail = |source| FleetError::Csv { file: file.into(), source };
+    let mut reader = csv::Reader::from_path(file).map_err(fail)?;
+    let header = reader.headers().map_err(fail)?.clone();
+    let rows = reader.records().collect::<Result<Vec<_>, _>>().map_err(fail)?;
+    let numeric = |at: usize| {
+        let mut words = rows.iter().map(|r| r.get(at).unwrap_or_default()).filter(|w| !w.is_empty()).peekable();
+        words.peek().is_some() && words.all(|w| w.parse::<f64>().is_ok())
+    };
+    let columns: Vec<(&str, bool)> = header.iter().enumerate().map(|(at, name)| (name, numeric(at))).collect();
+    let mut table = ParquetTable::begin(&file.with_extension("parquet"), &columns)?;
+    for row in &rows {
+        table.row(row.iter().map(str::to_owned).collect())?;
+    }
+    table.end()
+}
+
 /// Rows in one group.
 const GROUP: usize = 8192;
 
@@ -135,5 +153,19 @@ mod tests {
         assert_eq!(header, ["tester", "gain"]);
         assert_eq!(rows, [["T001", "1.5"], ["T002", ""]]);
         std::fs::remove_file(&file).unwrap();
+        // A table in words: the column of numbers holds numbers, a hole stays a hole.
+        let csv = file.with_extension("csv");
+        std::fs::write(&csv, "slot,rate\n\"T001/S01, left\",0.25\nT001/S02,\n").unwrap();
+        assert_eq!(of_csv(&csv).unwrap(), file);
+        let (header, rows) = read_words(&file).unwrap();
+        assert_eq!(
+            (header, rows),
+            (
+                vec!["slot".into(), "rate".into()],
+                vec![vec!["T001/S01, left".into(), "0.25".into()], vec!["T001/S02".to_owned(), String::new()]]
+            )
+        );
+        std::fs::remove_file(&file).unwrap();
+        std::fs::remove_file(&csv).unwrap();
     }
 }

@@ -94,6 +94,7 @@ pub fn library(context: &Context, source: &dyn SlotSource, found: &[(usize, Pilo
     let shared = grown(context, &mut scouts, &starts, t.most.min(t.candidates.saturating_sub(1)));
     tables.extend(shared.into_iter().enumerate().map(named));
     let fixed = tables.len();
+    library.grown = fixed - 1;
     tables.extend(own);
     let gains: Vec<Controller> = tables.iter().map(|c| c.gains.clone()).collect();
     let chosen = useful(context, &pilots, &gains, fixed, t.candidates);

@@ -256,8 +256,8 @@ struct Looked {
 
 /// What the candidates score that are looked at in this slot, and those that serve.
 ///
-/// A candidate that the grid sees inside the guarded limits counts as serving: the guard stands for the grid's error (`specs/fleet.md`, "Proof").
-/// Closer to a limit the exact judgement decides.
+/// Of today's table and of those grown to be shared the exact judgement decides. Another candidate that the grid sees inside the guarded limits counts
+/// as serving: the guard stands for the grid's error (`specs/fleet.md`, "Proof"); closer to a limit the exact judgement decides as well.
 fn covered(context: &Context, library: &Library, look: &[f64], ready: &mut Ready<'_>) -> Result<Looked, TuneError> {
     let guard = context.file.robust.guard;
     let mut serves: Vec<Serves> = Vec::new();
@@ -267,8 +267,8 @@ fn covered(context: &Context, library: &Library, look: &[f64], ready: &mut Ready
         let q = ready.screened(&t.gains);
         let dft = ready.dft();
         all.push((candidate, q));
-        // Today's table may lie outside the bounds, where the grid has not looked.
-        let clear = candidate > 0 && guard >= CLEAR_GUARD && q.violation <= 0.0;
+        // Today's table may lie outside the bounds, where the grid has not looked; grown ones are those that many slots will get.
+        let clear = candidate > library.grown && guard >= CLEAR_GUARD && q.violation <= 0.0;
         if clear {
             serves.push(Serves { candidate, room: guard - q.violation, dft });
         } else if candidate == 0 || q.violation <= 1.1 * guard + NEAR_MISS {
