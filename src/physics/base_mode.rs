@@ -24,6 +24,9 @@ static FACTS: Facts = Facts {
     band_hz: [3.0, 80.0],
 };
 
+/// Damping ratio of a machine on soft feet, and more than any has: beyond it the law is no mode but a curve.
+const HEAVIEST: f64 = 0.3;
+
 impl Effect for BaseMode {
     fn facts(&self) -> &'static Facts {
         &FACTS
@@ -32,6 +35,10 @@ impl Effect for BaseMode {
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let high = 80f64.min(0.2 / scene.sample_time_s);
         [0.01, 0.05, 0.15].iter().flat_map(|&z| scan(3.0, high, z, scene)).collect()
+    }
+
+    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
+        setting.inner[1] < HEAVIEST
     }
 
     fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
