@@ -134,7 +134,7 @@ fn page(classes: &[Case], nine: &[Case]) -> Result<String, StudyError> {
          breaks a demand of the class, 0 where the bound cannot rise further. Largest programme: {work} taps.\n\n\
          ```text\n{}```\n\n```text\n{}```\n\n\
          Furthest from the best found in its structure: {:.2} % (classes), {:.2} % (nine cases); the aim is 2 %.\n\n\
-         What falls short. The bound leaves phase and gain margin out, because they are not convex, and looks at a grid of frequencies: part of the gap \
+         What falls short. A bound of 0 says nothing: within {ROUNDS} rounds the programme did not come near the demands of the class (*demand missed*). The bound leaves phase and gain margin out, because they are not convex, and looks at a grid of frequencies: part of the gap \
          is the bound's. It speaks of loops whose gain crossings all lie inside the spec's range. Within the structure there is no bound of its own, only \
          the search from many starts; the bound of the class holds there too.\n",
         table("Four machine classes", classes)?.text(),
