@@ -51,9 +51,8 @@ pub(super) fn everywhere(runs: &[&Run]) -> Where {
 pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option<Finding> {
     let chosen = &selection.model.chosen[at];
     let step = &selection.steps[chosen.step];
-    let (candidate, model) = &step.tried[step.taken?];
-    let c = &step.candidates[*candidate];
-    let gain = step.before - model.evidence;
+    let c = &step.candidates[step.tried[step.taken?].0];
+    let gain = selection.gain(at);
     let spindle =
         |hz: f64| bench.scene.spindle_hz.is_some_and(|s| ((hz / s).round() - hz / s).abs() < 0.004 && hz > 0.9 * s);
     let own = chosen.effect.facts().name;
