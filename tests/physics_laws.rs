@@ -32,6 +32,7 @@ fn scene() -> Scene {
         command_step: 0.1,
         noise: 0.003,
         duration_s: 0.25,
+        session_s: 0.25,
         indexed: true,
         warm: true,
     }
@@ -268,7 +269,7 @@ fn waves_and_pulses_are_means_over_the_interval() {
         // Simpson's rule on the ripple: (w T)^4/2880 of the wave, 2e-7 here.
         assert!((sum(0) - sine(w).0).abs() < 1e-6 / w && (sum(1) - sine(w).1).abs() < 1e-6 / w, "{name}");
     }
-    let warm = run(law("gain_drift", &[3e-3]).as_mut(), &samples);
+    let warm = run(law("gain_drift", &[3e-3, 0.0]).as_mut(), &samples);
     let area = end - 3e-3 * (1.0 - (-end / 3e-3).exp());
     assert!((warm.iter().map(|o| o[0]).sum::<f64>() * T - area).abs() < 1e-14);
     let runout = run(law("repeatable_runout", &[240.0]).as_mut(), &samples);
@@ -300,7 +301,7 @@ fn springs_and_memory_follow_their_equations() {
     // A move of 1.5 with critical length 3, then rest: the bias settles at half its largest; a longer move saturates it.
     for (length, level) in [(1.5, 0.5), (9.0, 1.0)] {
         let moved = along(3000, |t| Sample { x: (v * t).min(length), ..Sample::default() });
-        let bias = run(law("bearing_bias", &[3.0, 2e-3]).as_mut(), &moved);
+        let bias = run(law("bearing_bias", &[3.0, 2e-3, 0.018]).as_mut(), &moved);
         // 0.08 s of rest at least: exp(-40).
         assert!((bias[2998][0] + level).abs() < 1e-9, "{}", bias[2998][0]);
     }
@@ -308,39 +309,43 @@ fn springs_and_memory_follow_their_equations() {
 
 #[test]
 fn a_mode_that_moves_rings_at_its_new_frequency() {
-    // At a fixed place a shifted mode is the linear plant's mode at another frequency: its response at the end of a long
-    // tone is (r/d)/(jw - p d) + conj. minus the same at d = 1, times the hold's factor, which the tone keeps below 1e-4 at 200
-    // steps a cycle after its half-step lag is taken out.
+    // At a fixed place a shifted mode is the linear plant's mode at another frequency. In the modal form its response at the end of a
+    // long tone is (r/d)/(jw - p d) + conj. minus the same at d = 1, as a stage the body's times the stage's change; times the hold's
+    // factor, which the tone keeps below 1e-4 at 200 steps a cycle after its half-step lag is taken out.
     let scene = scene();
     let m = scene.plant.modes[0];
     let (w0, z) = (m.pole_rad_s, m.pole_damping_ratio);
     let pole = Complex::new(-z * w0, w0 * (1.0 - z * z).sqrt());
+    let quadratic = |s: Complex<f64>, w: f64, z: f64| s * s + 2.0 * z * w * s + w * w;
+    let body = |s: Complex<f64>| 75.0 * 369.0 * 369.0 / quadratic(s, 369.0, 0.22);
     // The residue by the product form itself, every other factor at s = p.
-    let quadratic = |w: f64, z: f64| pole * pole + 2.0 * z * w * pole + w * w;
-    let body = 75.0 * 369.0 * 369.0 / quadratic(369.0, 0.22);
-    let residue = body * quadratic(m.zero_rad_s, m.zero_damping_ratio) / (pole - pole.conj());
-    let fine = T / 25.0;
-    let small = Scene { sample_time_s: fine, ..scene };
-    let effect = effect("mode_shift").unwrap();
+    let residue = body(pole) * quadratic(pole, m.zero_rad_s, m.zero_damping_ratio) / (pole - pole.conj());
     let (slope, x) = (0.004, 5.0);
     let d = 1.0 + slope * x;
-    let mut law = effect.law(&[0.0, slope, 0.0], &small);
-    let w = 7700.0;
+    let s = Complex::new(0.0, 7700.0);
+    let share = |d: f64| residue / d / (s - pole * d) + residue.conj() / d / (s - pole.conj() * d);
+    let stage = |d: f64| quadratic(s, m.zero_rad_s * d, m.zero_damping_ratio) / quadratic(s, w0 * d, z);
+    shifted(&scene, &[0.0, slope, 0.0, 0.0], x, s, share(d) - share(1.0));
+    shifted(&scene, &[0.0, slope, 0.0, 1.0], x, s, body(s) * (stage(d) - stage(1.0)));
+}
+
+/// What a mode that is shifted at a place adds to the answer to a tone, once it has settled.
+fn shifted(scene: &Scene, inner: &[f64], x: f64, s: Complex<f64>, response: Complex<f64>) {
+    let fine = T / 25.0;
+    let small = Scene { sample_time_s: fine, ..scene.clone() };
+    let mut law = effect("mode_shift").unwrap().law(inner, &small);
     let count = 60_000;
     let at = |k: usize| {
         let t = k as f64 * fine;
-        Sample { t, x, i: (w * (t + 0.5 * fine)).sin(), ..Sample::default() }
+        Sample { t, x, i: (s.im * (t + 0.5 * fine)).sin(), ..Sample::default() }
     };
     let (mut worst, mut largest) = (0.0f64, 0.0f64);
-    let s = Complex::new(0.0, w);
-    let share = |d: f64| residue / d / (s - pole * d) + residue.conj() / d / (s - pole.conj() * d);
-    let response = share(d) - share(1.0);
     for k in 0..count {
         let mut out = [0.0];
         law.columns(&at(k), &at(k + 1), &mut out);
         law.commit(&at(k), &at(k + 1));
         if k > count - 1000 {
-            let expected = (response * Complex::from_polar(1.0, w * (k + 1) as f64 * fine)).im;
+            let expected = (response * Complex::from_polar(1.0, s.im * (k + 1) as f64 * fine)).im;
             (worst, largest) = (worst.max((out[0] - expected).abs()), largest.max(expected.abs()));
         }
     }
@@ -355,7 +360,7 @@ fn damping_that_grows_shortens_the_ring_down() {
     let a = m.pole_rad_s * m.pole_damping_ratio;
     let effect = effect("modal_damping").unwrap();
     let envelope = |growth: f64| {
-        let mut law = effect.law(&[0.0, growth], &scene);
+        let mut law = effect.law(&[0.0, growth, 0.0], &scene);
         let mut rows = Vec::new();
         for k in 0..200usize {
             let sample = |k: usize| Sample { i: if k == 0 { 100.0 } else { 0.0 }, ..Sample::default() };
@@ -387,6 +392,37 @@ fn damping_that_grows_shortens_the_ring_down() {
         // The growth already acts during the push: a T/2 = 0.6 % of the amplitude.
         assert!((-damped[k] / linear[k] - expected).abs() < 0.01, "{k}: {} {expected}", -damped[k] / linear[k]);
     }
+}
+
+#[test]
+fn a_damper_of_a_stage_is_one_of_a_fixed_ratio_where_it_is_at_its_bound() {
+    // With an immense growth the factor on the damping stands at its bound of 50 whenever the stage moves: the stage is a linear one,
+    // and its answer to a tone is the product form's.
+    let scene = scene();
+    let m = scene.plant.modes[0];
+    let (w0, z) = (m.pole_rad_s, m.pole_damping_ratio);
+    let s = Complex::new(0.0, 6000.0);
+    let quadratic = |w: f64, z: f64| s * s + 2.0 * z * w * s + w * w;
+    let zero = quadratic(m.zero_rad_s, m.zero_damping_ratio);
+    let more = 49.0 * 2.0 * z * w0 * s;
+    let stage = (zero + more) / (quadratic(w0, z) + more) - zero / quadratic(w0, z);
+    let response = 75.0 * 369.0 * 369.0 / quadratic(369.0, 0.22) * stage;
+    let fine = T / 25.0;
+    let small = Scene { sample_time_s: fine, ..scene };
+    let mut law = effect("modal_damping").unwrap().law(&[0.0, 1e15, 1.0], &small);
+    let count = 120_000;
+    let at = |k: usize| Sample { i: (s.im * (k as f64 + 0.5) * fine).sin(), ..Sample::default() };
+    let (mut worst, mut largest) = (0.0f64, 0.0f64);
+    for k in 0..count {
+        let mut out = [0.0];
+        law.columns(&at(k), &at(k + 1), &mut out);
+        law.commit(&at(k), &at(k + 1));
+        if k > count - 2000 {
+            let expected = (response * Complex::from_polar(1.0, s.im * (k + 1) as f64 * fine)).im;
+            (worst, largest) = (worst.max((out[0] - expected).abs()), largest.max(expected.abs()));
+        }
+    }
+    assert!(worst < 2e-3 * largest, "{worst} of {largest}");
 }
 
 #[test]

@@ -1,5 +1,11 @@
 //! Effects that many records cannot tell apart; the score counts them as the right family.
 
+/// Whether no record of this generator can tell the name from another: its law is that of the other, to the letter (noise in
+/// proportion to speed from the encoder or from the clock), so that a family is the whole answer.
+pub fn inseparable(name: &str) -> bool {
+    matches!(name, "encoder_noise" | "jitter")
+}
+
 /// Names that count as the right family where these records cannot tell them apart.
 pub fn family(name: &str) -> &'static [&'static str] {
     match name {

@@ -1,6 +1,7 @@
 //! Scores diagnoses against the sealed answers: one report in Markdown and one in JSON, all counts stated.
 
 use crate::commit;
+use crate::family::inseparable;
 use crate::statistics::{interval, median, overlap, power};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -171,6 +172,9 @@ pub fn score(dir: &Path, ddir: &Path, out: &Path) -> Result<(), String> {
                 };
                 add(key, found);
                 let right = c.found.first() == c.truth.first() && matches!(c.verdict.as_str(), "named" | "data_fault");
+                if c.lambda >= NAMEABLE && !c.truth.iter().any(|t| inseparable(t)) {
+                    add("07 of these, where the name can be told: first name right", right);
+                }
                 if c.lambda >= NAMEABLE {
                     add("07 singles from lambda 100: first name right", right);
                     add("08 singles from lambda 100: family right", c.first_family());

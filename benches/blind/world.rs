@@ -236,13 +236,14 @@ pub fn run(
             torque += p.offset_rate * t + walk;
         }
         if p.bias_level != 0.0 {
-            if (x - tip).abs() > 0.05 && (x - tip) * v < 0.0 {
-                turn = tip;
+            // A way back of more than a twentieth of a track begins a new move.
+            if (x - tip).abs() > 0.05 && (x - tip) * (tip - turn) < 0.0 {
+                (turn, tip) = (tip, x);
             }
-            if v * (tip - turn) >= 0.0 {
+            if (x - tip) * (tip - turn) >= 0.0 {
                 tip = x;
             }
-            let run = x - turn;
+            let run = tip - turn;
             let target = p.bias_level * (run / p.bias_length).clamp(-1.0, 1.0);
             bias += (target - bias) * (dt / p.bias_tau).min(1.0);
             torque -= bias;

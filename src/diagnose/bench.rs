@@ -153,6 +153,7 @@ pub fn scene(given: &Plant, runs: &[Run], sample_time_s: f64, spindle_hz: Option
         command_step: step.max(1e-15),
         noise: 0.0,
         duration_s: fit.iter().map(|r| r.len()).max().unwrap_or(0) as f64 * sample_time_s,
+        session_s: fit.iter().map(|r| r.began_s + r.len() as f64 * sample_time_s).fold(0.0, f64::max),
         indexed: fit.iter().any(|r| r.spindle_rad.is_some()),
         warm: fit.iter().any(|r| r.temperature.is_some()),
     }

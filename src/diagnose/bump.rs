@@ -6,6 +6,7 @@
 use super::bench::Bench;
 use super::columns::raw_columns;
 use super::finding::{Estimate, Finding, Where};
+use super::judge::{Judged, error};
 use super::linear::Sampled;
 use super::name::text_of;
 use super::run::Run;
@@ -51,26 +52,30 @@ struct Answer {
     samples: usize,
 }
 
-fn answers(bench: &Bench, sampled: &Sampled, n: usize) -> Vec<Answer> {
-    let Some(shock) = effect("shock") else { return Vec::new() };
+fn answer(bench: &Bench, sampled: &Sampled, n: usize, width_s: f64) -> Option<Answer> {
     let t = bench.scene.sample_time_s;
     let samples = (0..n).map(|k| Sample { t: k as f64 * t, ..Sample::default() }).collect();
     let motion = Trajectory { samples, unexplained: Vec::new() };
+    let raw = raw_columns(effect("shock")?, &[0.0, width_s], &bench.scene, &motion);
+    let mut y = vec![0.0; n];
+    sampled.direct.add_response(&raw[0], &mut y);
+    bench.whitener.apply(&mut y);
+    let mut sum = 0.0;
+    let energy = y.iter().map(|v| {
+        sum += v * v;
+        sum
+    });
+    Some(Answer { energy: energy.collect(), samples: (width_s / t).round() as usize, whitened: y })
+}
+
+/// Answers to pushes of several lengths.
+fn answers(bench: &Bench, sampled: &Sampled, n: usize) -> Vec<Answer> {
     let (low, high) = ((SHORTEST * n as f64).max(FEWEST), LONGEST * n as f64);
     let width = |i: usize| low * (high / low).powf(i as f64 / (WIDTHS - 1) as f64);
-    let answer = |i: usize| {
-        let raw = raw_columns(shock, &[0.0, width(i) * t], &bench.scene, &motion);
-        let mut y = vec![0.0; n];
-        sampled.direct.add_response(&raw[0], &mut y);
-        bench.whitener.apply(&mut y);
-        let mut sum = 0.0;
-        let energy = y.iter().map(|v| {
-            sum += v * v;
-            sum
-        });
-        Answer { energy: energy.collect(), samples: width(i).round() as usize, whitened: y }
-    };
-    if high > low { (0..WIDTHS).map(answer).collect() } else { Vec::new() }
+    if high <= low {
+        return Vec::new();
+    }
+    (0..WIDTHS).filter_map(|i| answer(bench, sampled, n, width(i) * bench.scene.sample_time_s)).collect()
 }
 
 /// The best push in a whitened series of noise level `sigma`: gain, start (samples), which answer, strength.
@@ -155,7 +160,35 @@ fn of_two(bench: &Bench, answers: &[Answer], bump: Bump) -> Bump {
     Bump { run, peak: [sign * bump.peak[0], bump.peak[1]], ..bump }
 }
 
+/// Share of what a push takes under the linear refit that it must still take under the final model.
+const STAYS: f64 = 0.3;
+
+/// The pushes that the final model does not do without: at a limit or at the end of a slip repeats differ too, and look like pushes.
+pub(super) fn beyond(bench: &Bench, bumps: Vec<Bump>, linear: &Judged, found: &Judged) -> Vec<Bump> {
+    let stays = |b: &Bump| {
+        let run = &bench.runs[b.run];
+        let left = |model: &Judged| {
+            let mut e = error(model, run, None).ok()?;
+            bench.whitener.apply(&mut e);
+            b.gain(bench, &e)
+        };
+        left(linear).zip(left(found)).is_none_or(|(before, after)| after > STAYS * before)
+    };
+    bumps.into_iter().filter(stays).collect()
+}
+
 impl Bump {
+    /// What the push takes of a whitened error of its record: fall of the sum of squares.
+    fn gain(&self, bench: &Bench, error: &[f64]) -> Option<f64> {
+        let sampled = Sampled::of(&bench.form.given, bench.scene.sample_time_s).ok()?;
+        let from = (self.time_s / bench.scene.sample_time_s).round() as usize;
+        let answer = answer(bench, &sampled, error.len(), self.width_s)?;
+        let n = error.len().checked_sub(from)?;
+        let along = dot(&answer.whitened[..n], &error[from..]);
+        let gain = along * along / answer.energy[n.checked_sub(1)?];
+        gain.is_finite().then_some(gain)
+    }
+
     /// The finding, in a machine with these units.
     pub(super) fn finding(&self, runs: &[Run], command_unit: &str) -> Finding {
         let (says, port) = text_of("shock");

@@ -1,12 +1,12 @@
 //! The diagnosis of a case, step by step: logs, noise, linear refit, search, judgement on hold-out records, verdict.
 
 use super::bench::Bench;
-use super::bump::bump;
+use super::bump::{Bump, beyond, bump};
 use super::corrected::{Corrected, corrected};
 use super::finding::*;
 use super::fit_report::fit_report;
 use super::held_out::{contradicts, held_out, mean};
-use super::judge::rms;
+use super::judge::{Judged, rms};
 use super::line_finding::line_findings;
 use super::logs::check;
 use super::name::{finding, linear_story, same_drag};
@@ -70,8 +70,14 @@ const MEASURED: f64 = 0.9;
 const HELD_OUT: f64 = 1.2;
 /// Share of the error in excess of noise that findings must explain to be named.
 pub(super) const NAMED_SHARE: f64 = 0.955;
-/// Whitened error per sample that counts as clean, whatever the share.
-pub(super) const CLEAN: f64 = 1.06;
+/// Standard deviations of excess below which a model counts as clean, whatever the share.
+const CLEAN: f64 = 3.0;
+/// Standard deviations of excess, and whitened error per sample, from which something is there though no law was found.
+const RESTLESS: [f64; 2] = [6.0, 1.06];
+/// Share of an error clearly beyond noise that a model which counts as clean must have explained.
+const MOSTLY: f64 = 0.7;
+/// Share of what the findings took that another law may still see beside them: no law is a machine's own to the last part.
+const BESIDE: f64 = 0.03;
 
 /// Diagnoses a case.
 pub fn diagnose(
@@ -147,10 +153,14 @@ pub fn diagnose(
         whitened,
         holdout_whitened: mean(&held_out),
         held_out,
+        leftover: selection.leftover.clone(),
         remarks,
         search: search(&selection),
         bootstrap: selection.bootstrap.clone(),
     };
+    let linear = Judged { plant: &refitted.plant, effects: Vec::new(), ..fixed.judged(&bench, &selection) };
+    let bumps = beyond(&bench, bumps, &linear, &fixed.judged(&bench, &selection));
+    let bumps = bumps.iter().map(|b| b.finding(&bench.runs, &given.command_unit)).collect();
     judge(&mut diagnosis, &bench, &selection, hygiene.finding, bumps);
     super::experiment::propose(&mut diagnosis, &bench, &selection);
     Ok(Diagnosed { diagnosis, bench, selection, corrected: fixed, refitted: refitted.plant, errors })
@@ -168,7 +178,7 @@ fn set_aside(
     given: &Plant,
     spindle_hz: Option<f64>,
     iterations: usize,
-) -> Result<Vec<Finding>, LtiError> {
+) -> Result<Vec<Bump>, LtiError> {
     if bench.repeats.is_empty() || bump(bench).is_none() {
         return Ok(Vec::new());
     }
@@ -181,9 +191,9 @@ fn set_aside(
         if found.len() == most {
             return Ok(Vec::new());
         }
-        found.push(b.finding(&cleaner.runs, &given.command_unit));
         let mut runs = cleaner.runs.clone();
         runs[b.run].bumped = true;
+        found.push(b);
         cleaner = Bench::new(&plant, runs, sample_time_s, spindle_hz)?;
     }
     if !found.is_empty() {
@@ -214,14 +224,17 @@ fn search(selection: &Selection) -> Vec<Tried> {
 fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<Finding>, bumps: Vec<Finding>) {
     let (base, model) = (&selection.baseline, selection.best());
     let explained = if base.excess() > 0.0 { 1.0 - model.excess().max(0.0) / base.excess() } else { 1.0 };
-    let clean = model.cost / model.freedom < CLEAN || model.excess_sigma() < 6.0;
+    // Down to the noise, and not only because there was little above it.
+    let clean = model.excess_sigma() < CLEAN && (explained >= MOSTLY || base.excess_sigma() < CLEAN);
+    // Where no law was found, much more is asked of the excess: noise may differ a little from what its repeats say.
+    let restless = model.excess_sigma() > RESTLESS[0] && model.cost / model.freedom > RESTLESS[1];
     // Along the recorded motion, and simulated: in closed loop limits and noise play into each other, in open loop a free body
     // drifts away; a model must hold in one of them.
     let simulated = |h: FitFigures| h.rms_after <= 1.05 * h.rms_refit_linear || h.rms_after <= HELD_OUT * h.noise_floor;
     let simulations: Vec<FitFigures> = d.fit.holdout.into_iter().chain(d.fit.open_loop).collect();
     let holds = d.holdout_whitened.is_none_or(|[refit, after]| after <= 1.05 * refit || after <= HELD_OUT)
         && (simulations.is_empty() || simulations.into_iter().any(simulated));
-    let against = contradicts(&d.held_out, &selection.model).cloned();
+    let against = contradicts(bench, &d.held_out, &selection.model).cloned();
     if let Some(f) = logs {
         d.verdict = if f.port == crate::physics::Port::Controller { Verdict::Named } else { Verdict::DataFault };
         d.findings.push(f);
@@ -242,8 +255,11 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
         let decisive = explained >= MOST && rival_share(selection) < RIVAL;
         if let Some(h) = &against {
             d.remarks.push(format!(
-                "the nearest law holds on the records that it was fitted to, but not on {}, which stays within their range: whitened error {:.3} after {:.3} under the linear refit, 1 being noise",
-                h.record, h.whitened[1], h.whitened[0]
+                "the nearest law holds on the records that it was fitted to, but not on {}, which {}: whitened error {:.3} after {:.3} under the linear refit, 1 being noise",
+                h.record,
+                if h.inside { "stays within their range" } else { "goes beyond their range" },
+                h.whitened[1],
+                h.whitened[0]
             ));
         }
         if selection.mixture() {
@@ -253,7 +269,20 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
                 laws.join(", ")
             ));
         }
-        if (explained >= NAMED_SHARE || clean || decisive) && holds && against.is_none() && !selection.mixture() {
+        let beside = selection.leftover.as_ref().filter(|l| l.share > BESIDE);
+        if let Some(l) = beside {
+            d.remarks.push(format!(
+                "beside the nearest laws {} can still be seen, with {:.1} % of what they explain: they are near to what acts here, and not it",
+                l.effect,
+                100.0 * l.share
+            ));
+        }
+        if (explained >= NAMED_SHARE || clean || decisive)
+            && holds
+            && against.is_none()
+            && beside.is_none()
+            && !selection.mixture()
+        {
             if !clean && explained < NAMED_SHARE {
                 d.remarks.push(format!(
                     "no other law of the library comes near, but {:.1} % of the error in excess of noise stays unexplained",
@@ -278,7 +307,7 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
             d.verdict = Verdict::LocatedUnexplained;
             d.findings.push(super::name::unexplained(bench, selection, explained));
         }
-    } else if (!clean || unaccounted(selection)) && d.findings.is_empty() {
+    } else if (restless || unaccounted(selection)) && d.findings.is_empty() {
         d.verdict = Verdict::LocatedUnexplained;
         d.findings.push(super::name::unexplained(bench, selection, 0.0));
     }

@@ -4,6 +4,7 @@ use super::bootstrap::Bootstrap;
 use super::held_out::HeldOut;
 use super::hygiene::{Replay, SampleFault};
 use super::judge::Simulation;
+use super::leftover::Leftover;
 use super::whiten::NoiseLevels;
 use crate::physics::Port;
 use serde::Serialize;
@@ -179,6 +180,9 @@ pub struct Diagnosis {
     pub holdout_whitened: Option<[f64; 2]>,
     /// Record by record.
     pub held_out: Vec<HeldOut>,
+    /// What the library still sees in the error of the final model, beyond chance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leftover: Option<Leftover>,
     /// Natural frequency, damping and gain before and after, and other remarks in plain words.
     pub remarks: Vec<String>,
     /// The search.

@@ -5,6 +5,7 @@ use super::corrected::Corrected;
 use super::judge::Judged;
 use super::run::Run;
 use super::select::{Model, Selection};
+use super::stack::Segment;
 use crate::lti::LtiError;
 use crate::numeric::least_squares::dot;
 use crate::recording::Role;
@@ -67,25 +68,32 @@ pub(super) fn mean(all: &[HeldOut]) -> Option<[f64; 2]> {
     (n > 0).then(|| [sum(0), sum(1)])
 }
 
-/// Excess over noise, in its standard deviations and as a share of it, from which a record says more than noise.
-const FAR: f64 = 6.0;
-const CLEAR: f64 = 0.1;
-/// Share of that excess which a law of the machine takes at least, wherever it was fitted.
-const CARRIED: f64 = 0.3;
+/// Excess over noise, in its standard deviations and as a share of it, from which a record within the fit's range says more than
+/// noise; and the share of what the linear refit leaves there that a law of the machine may leave at most.
+const FAR: f64 = 5.0;
+const CLEAR: f64 = 0.05;
+const INSIDE: f64 = 0.5;
+/// The same beyond that range, where a law is continued and its numbers err more.
+const FAR_BEYOND: f64 = 10.0;
+const BEYOND: f64 = 0.5;
 
-/// The record inside the fit's range that contradicts the final model most: the linear refit misses it by far more than noise, and the
-/// laws that were found elsewhere take almost nothing of it.
+/// The record that contradicts the final model most: it still misses it by far more than noise, and the laws that were found elsewhere
+/// take too little of what the linear refit leaves there.
 ///
 /// None where a law goes by a clock of its own, which each record starts anew.
-pub(super) fn contradicts<'a>(all: &'a [HeldOut], model: &Model) -> Option<&'a HeldOut> {
+pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) -> Option<&'a HeldOut> {
     let clocked = |name: &str| ["gain_drift", "parametric_gain"].contains(&name);
     if model.chosen.iter().any(|c| c.effect.facts().per_record || clocked(c.effect.facts().name)) {
         return None;
     }
-    let [excess, left] = [0, 1].map(|i| move |h: &HeldOut| h.whitened[i] - 1.0);
+    // Where some of the fit's records are noisier than the filter says, so may this one be.
+    let noise = |s: &Segment| s.runs.len() as f64 / (s.weight * s.weight);
+    let loudest = bench.stack.segments.iter().map(noise).fold(1.0, f64::max);
+    let [excess, left] = [0, 1].map(|i| move |h: &HeldOut| h.whitened[i] - loudest);
     let far = |h: &&HeldOut| {
-        let noise = (2.0 / h.samples as f64).sqrt();
-        h.inside && excess(h) > f64::max(FAR * noise, CLEAR) && left(h) > (1.0 - CARRIED) * excess(h)
+        let (far, share) = if h.inside { (FAR, INSIDE) } else { (FAR_BEYOND, BEYOND) };
+        let noise = loudest * (2.0 / h.samples as f64).sqrt();
+        left(h) > f64::max(far * noise, CLEAR) && left(h) > share * excess(h)
     };
     all.iter().filter(far).max_by(|a, b| left(a).total_cmp(&left(b)))
 }

@@ -71,6 +71,7 @@ impl Judged<'_> {
         let samples = (0..run.len())
             .map(|k| Sample {
                 t: k as f64 * t,
+                session: run.began_s + k as f64 * t,
                 u: run.input[k],
                 spindle_rad: run.spindle_rad.as_ref().map_or(spindle * k as f64 * t, |s| s[k]),
                 ..Sample::default()
@@ -183,7 +184,9 @@ fn simulate(
     constant_torque: Option<f64>,
     free: Vec<f64>,
 ) -> Result<Vec<f64>, LtiError> {
-    let mut machine = Machine::new(model.plant, &model.effects, model.scene)?.started_at(run.origin, run.before);
+    let mut machine = Machine::new(model.plant, &model.effects, model.scene)?
+        .begun_at(run.began_s)
+        .started_at(run.origin, run.before);
     if let Some(torque) = constant_torque {
         machine = machine.held_by(torque, model.gain_at_rest());
     }

@@ -56,6 +56,22 @@ pub(super) fn scale(r: &Replay, runs: &[&Run]) -> Finding {
     }
 }
 
+/// The position follows the model only with a factor that no machine of this model can have.
+pub(super) fn unit(factor: f64, runs: &[&Run]) -> Finding {
+    let sign = if factor < 0.0 { "with the sign turned round" } else { "in other units than the model" };
+    Finding {
+        effect: "linear_parameters".into(),
+        family: vec!["linear_parameters".into()],
+        port: crate::physics::Port::Time,
+        p_value: 1e-300,
+        says: format!(
+            "The position is logged {sign}: it follows the command as the model says, but times {factor:.6}."
+        ),
+        parameters: BTreeMap::from([("position_factor".to_owned(), plain(factor, "1"))]),
+        place: everywhere(runs),
+    }
+}
+
 /// The command does not follow from the documented law.
 pub(super) fn controller_mismatch(r: &Replay, runs: &[&Run]) -> Finding {
     let (says, port) = text_of("controller_mismatch");

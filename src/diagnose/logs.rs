@@ -4,9 +4,12 @@ use super::bench::scene;
 use super::finding::Finding;
 use super::hygiene::{Replay, SampleFault, replay_records, sample_faults, slips};
 use super::judge::{Judged, error};
+use super::linear::{Sampled, free_motions};
 use super::run::Run;
+use super::stack::Basis;
 use crate::controller::Law;
 use crate::lti::{LtiError, Plant};
+use crate::numeric::least_squares::dot;
 use crate::recording::Case;
 
 /// What the logs are worth.
@@ -68,12 +71,44 @@ pub(super) fn check(
             }
         }
     }
+    if hygiene.replay.is_none()
+        && let Some(factor) = scale_of(given, runs, sample_time_s)?
+    {
+        let all: Vec<&Run> = runs.iter().collect();
+        hygiene.finding = Some(super::log_finding::unit(factor, &all));
+    }
     if !faults.is_empty() {
         hygiene.finding = Some(super::log_finding::samples(&faults));
         hygiene.closed = hygiene.closed && hygiene.replay.as_ref().is_some_and(|r| r.failing.is_empty());
     }
     hygiene.faults = faults;
     Ok(hygiene)
+}
+
+/// Factor of the gain beyond which no machine differs from its model, but its log does.
+const OTHER_UNIT: f64 = 3.0;
+/// Share of the position's energy that the scaled model must explain.
+const ALIKE: f64 = 0.8;
+
+/// Where no controller tells the units: the factor by which the position follows the given plant's answer to the recorded command, if
+/// it follows it and the factor is none that a machine of this model can have.
+fn scale_of(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Option<f64>, LtiError> {
+    let sampled = Sampled::of(given, sample_time_s)?;
+    let (mut ss, mut sy, mut yy) = (0.0, 0.0, 0.0);
+    for run in runs {
+        let mut basis = Basis::default();
+        free_motions(&given.body, sample_time_s, run.len()).into_iter().for_each(|c| basis.add_local(0, c));
+        let input: Vec<f64> = run.input.iter().map(|u| u - run.before).collect();
+        let mut s = vec![0.0; run.len()];
+        sampled.delayed.add_response(&input, &mut s);
+        let mut y = run.position.clone();
+        [&mut s, &mut y].into_iter().for_each(|x| basis.project(x));
+        (ss, sy, yy) = (ss + dot(&s, &s), sy + dot(&s, &y), yy + dot(&y, &y));
+    }
+    let factor = sy / ss;
+    let alike = sy * sy > ALIKE * ss * yy;
+    let possible = factor > OTHER_UNIT.recip() && factor < OTHER_UNIT;
+    Ok((alike && !possible).then_some(factor))
 }
 
 /// The given plant's answer to each record's command, its free motions fitted to the position: the motion without the noise.

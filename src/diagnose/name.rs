@@ -6,6 +6,7 @@ use super::finding::{Diagnosis, Estimate, Finding, Verdict, Where};
 use super::linear::{Knob, LinearForm, Sampled, body_numbers};
 use super::place::place;
 use super::refit::Chosen;
+use super::rival::Rival;
 use super::run::Run;
 use super::scan::log_tail;
 use super::select::Selection;
@@ -17,11 +18,16 @@ const FAMILY: f64 = 20.0;
 /// The same as a share of what the effect explains: laws differ from any machine by more than noise.
 const FAMILY_SHARE: f64 = 1e-3;
 
+/// Difference of the fit below which two laws are one family, for an effect that explains so much.
+pub(super) fn family_width(gain: f64) -> f64 {
+    FAMILY.max(FAMILY_SHARE * gain)
+}
+
 /// Sliding length over the sensor's noise below which friction counts as dry.
 const DRY: f64 = 12.0;
 
 /// Share of the noise's power from which a sensor's grid is worth a word.
-const GRID: f64 = 0.1;
+const GRID: f64 = 0.01;
 /// Growth of the noise's power from rest to the highest speed that is worth a word.
 const FASTER: f64 = 0.2;
 
@@ -65,8 +71,8 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
         _ => own,
     };
     let mut family = vec![name.to_owned()];
-    for (rival, cost) in &selection.rivals[at] {
-        if cost - selection.model.cost < FAMILY.max(FAMILY_SHARE * gain)
+    for Rival { name: rival, cost, .. } in &selection.rivals[at] {
+        if cost - selection.model.cost < family_width(gain)
             && !family.iter().any(|f| f == rival)
             && *rival != own
             && !same_drag(rival, name)

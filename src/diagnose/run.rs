@@ -9,6 +9,8 @@ pub struct Run {
     pub name: String,
     /// Fitting or judging.
     pub role: Role,
+    /// When it began in its session, the records taken one after another in the order of the case (s).
+    pub began_s: f64,
     /// Index of its repeat group; each record without one is a group of its own.
     pub group: usize,
     /// Reference (position_unit), where recorded.
@@ -62,16 +64,14 @@ impl Run {
             Some(r) => vec![r, &self.excitation],
             None => vec![&self.input],
         };
-        let still = |x: &[f64]| x.iter().all(|v| *v == x[0]);
-        if drives.iter().all(|x| still(x)) {
-            return None;
-        }
-        let size = |x: &[f64]| x.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let repeats = |x: &&[f64], n: usize| {
-            let close = PRINTED * size(x);
-            x.iter().zip(&x[n..]).all(|(a, b)| (a - b).abs() <= close)
-        };
-        (SHORTEST_LAP..=self.len() / 2).find(|&n| drives.iter().all(|x| repeats(x, n)))
+        let moving: Vec<(&[f64], f64)> = drives
+            .into_iter()
+            .filter(|x| x.iter().any(|v| *v != x[0]))
+            .map(|x| (x, PRINTED * x.iter().fold(0.0f64, |m, v| m.max(v.abs()))))
+            .collect();
+        let repeats =
+            |n: usize| moving.iter().all(|(x, close)| x.iter().zip(&x[n..]).all(|(a, b)| (a - b).abs() <= *close));
+        (SHORTEST_LAP..=self.len() / 2).find(|&n| !moving.is_empty() && repeats(n))
     }
 
     /// Whether there are no samples.
@@ -105,6 +105,7 @@ fn first(signal: &[f64], reference: Option<&[f64]>) -> f64 {
 /// The records of a case as runs, groups numbered in the order of their first record.
 pub fn runs(case: &Case) -> Vec<Run> {
     let mut groups: Vec<String> = Vec::new();
+    let mut session_s = 0.0;
     case.records
         .iter()
         .enumerate()
@@ -114,10 +115,13 @@ pub fn runs(case: &Case) -> Vec<Run> {
                 groups.push(key);
                 groups.len() - 1
             });
+            let began_s = session_s;
+            session_s += record.len() as f64 * record.sample_time_s;
             let input: Vec<f64> = record.command.iter().zip(&record.excitation).map(|(c, e)| c + e).collect();
             Run {
                 name: entry.name(),
                 role: entry.role,
+                began_s,
                 group,
                 rested: still(record.reference.as_deref()) >= AT_REST.min(record.position.len()),
                 bumped: false,
@@ -147,6 +151,7 @@ pub fn mean_run(runs: &[Run], repeats: &[usize]) -> Run {
     let (command, excitation, input, position) =
         (average(|r| &r.command), average(|r| &r.excitation), average(|r| &r.input), average(|r| &r.position));
     (mean.command, mean.excitation, mean.input, mean.position) = (command, excitation, input, position);
+    mean.began_s = scale * repeats.iter().map(|&r| runs[r].began_s).sum::<f64>();
     mean.before = scale * repeats.iter().map(|&r| runs[r].before).sum::<f64>();
     mean.origin = scale * repeats.iter().map(|&r| runs[r].origin).sum::<f64>();
     mean

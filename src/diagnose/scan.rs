@@ -259,6 +259,14 @@ impl<'a, 'f> Ground<'a, 'f> {
         best
     }
 
+    /// Puts a candidate at other inner numbers.
+    pub fn put(&self, candidate: &mut Candidate, inner: Vec<f64>) {
+        let s = self.explain(candidate.effect, &inner);
+        candidate.gain = s.gain;
+        candidate.concealed = s.concealed;
+        candidate.setting = Setting { inner, strengths: s.strengths };
+    }
+
     /// Moves the continuous inner parameters of a candidate to where it explains most: one at a time, by steps that shrink.
     pub fn refine(&self, candidate: &mut Candidate) {
         let mut step: Vec<f64> = candidate.continuous.iter().map(|&c| if c { 0.1 } else { 0.0 }).collect();

@@ -2,8 +2,11 @@
 
 use super::bench::Bench;
 use super::bootstrap::{Bootstrap, bootstrap};
+use super::leftover::{Leftover, leftover};
+use super::locked::follows_motion;
 use super::name::{is_drag, same_drag};
 use super::refit::{Chosen, Refitted};
+use super::rival::{Rival, by_simulation};
 use super::scan::{Candidate, Ground, log_tail};
 use super::settle::{exchange, prune, spare};
 use super::simulated::simulated;
@@ -101,8 +104,10 @@ pub struct Selection {
     pub model: Model,
     /// The same fitted once more by simulation, where that holds: what numbers and corrected plant are taken from.
     pub simulated: Option<Model>,
-    /// For each effect of the model, others in its place and the sum of squares that they leave.
-    pub rivals: Vec<Vec<(&'static str, f64)>>,
+    /// For each effect of the model, others in its place.
+    pub rivals: Vec<Vec<Rival>>,
+    /// What is still seen in the error of the final model, beyond chance.
+    pub leftover: Option<Leftover>,
     /// The search on records without physics, where it was asked for.
     pub bootstrap: Option<Bootstrap>,
 }
@@ -115,8 +120,7 @@ impl Selection {
 
     /// What effect `at` of the model explained when it was taken: fall of minus twice the logarithm of the likelihood.
     pub fn gain(&self, at: usize) -> f64 {
-        let step = &self.steps[self.model.chosen[at].step];
-        step.taken.map_or(0.0, |t| step.before - step.tried[t].1.evidence)
+        gain_of(&self.steps, &self.model.chosen[at])
     }
 
     /// Whether several laws share the work and none leads: one thing that the library lacks is likelier than so many that it has.
@@ -142,6 +146,12 @@ const REST: f64 = 0.75;
 /// Gain of a scan from which a law is tried where no repeat tells what noise is: noise made from the error itself hides most of what
 /// is left.
 const LOOK: f64 = 8.0;
+
+/// What an effect explained when it was taken.
+pub(super) fn gain_of(steps: &[Step], chosen: &Chosen) -> f64 {
+    let step = &steps[chosen.step];
+    step.taken.map_or(0.0, |t| step.before - step.tried[t].1.evidence)
+}
 
 /// Laws that together are many, and the share of what they explain by which one of them leads.
 const MANY: usize = 3;
@@ -264,7 +274,7 @@ pub fn select(
             if !bench.levels.from_repeats {
                 tried = settled(bench, tried, settings.iterations);
             }
-            if tried.possible() {
+            if tried.possible() && !follows_motion(bench, &tried, tried.chosen.len() - 1) {
                 step.tried.push((i, tried));
             }
         }
@@ -321,8 +331,10 @@ pub fn select(
     let mut simulated = simulated(bench, &model);
     if let Some(s) = &mut simulated {
         spare(bench, &mut model, s, &mut rivals, &steps, baseline.cost, settings.iterations);
+        by_simulation(bench, &mut model, s, &mut rivals, |c| gain_of(&steps, c));
     }
-    Selection { given, baseline, steps, model, simulated, rivals, bootstrap: calibration }
+    let leftover = leftover(bench, library, &model, simulated.as_ref(), &steps, (baseline.cost, limit));
+    Selection { given, baseline, steps, model, simulated, rivals, leftover, bootstrap: calibration }
 }
 
 /// Free numbers of a candidate.
@@ -333,7 +345,7 @@ fn numbers(c: &Candidate) -> f64 {
 
 /// Logarithm of the chance of a hum's gain where the noise itself is stronger near its frequency, a narrow band of it being no hum;
 /// -infinity for all other effects.
-fn hums(bench: &Bench, c: &Candidate, gain: f64, effects: usize) -> f64 {
+pub(super) fn hums(bench: &Bench, c: &Candidate, gain: f64, effects: usize) -> f64 {
     if c.effect.facts().name != "line_disturbance" {
         return f64::NEG_INFINITY;
     }
@@ -354,7 +366,7 @@ pub(super) fn strongest(bench: &Bench, library: &[&'static dyn Effect], model: &
     possible.map(|c| c.log_p_value(library.len())).fold(0.0, f64::min)
 }
 
-fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
+pub(super) fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
     let mut candidates = scan_at(bench, library, model, &model.refitted.p);
     // A law without a strength of its own (a lag, a limit), or a vibration that a known mode has moved to stand in for, is not straight
     // in the linear parameters: it is looked for around the given plant too.
@@ -378,7 +390,13 @@ fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Model, p: &[f
     let ahead = model.cost - error.iter().map(|e| e * e).sum::<f64>();
     let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
     let mut candidates = ground.scan(library);
-    candidates.par_iter_mut().take(10).for_each(|c| ground.refine(c));
+    candidates.par_iter_mut().take(10).for_each(|c| {
+        ground.refine(c);
+        if let Some(inner) = c.effect.instead(&c.setting).filter(|_| !c.effect.possible(&c.setting, &[])) {
+            ground.put(c, inner);
+            ground.refine(c);
+        }
+    });
     candidates.iter_mut().for_each(|c| c.gain += ahead.min(0.0));
     candidates
 }

@@ -3,7 +3,8 @@
 use super::bench::Bench;
 use super::name::is_drag;
 use super::refit::Chosen;
-use super::select::{MINOR, Model, OWN, Step, fitted, fitted_from_both};
+use super::rival::{BETTER, Rival};
+use super::select::{MINOR, Model, OWN, Step, fitted, fitted_from_both, gain_of};
 use super::simulated::simulated;
 
 /// Takes effects out again that later ones made needless.
@@ -35,18 +36,14 @@ pub(super) fn spare(
     bench: &Bench,
     model: &mut Model,
     by_simulation: &mut Model,
-    rivals: &mut Vec<Vec<(&'static str, f64)>>,
+    rivals: &mut Vec<Vec<Rival>>,
     steps: &[Step],
     before: f64,
     iterations: usize,
 ) {
     let drag = |c: &Chosen| is_drag(c.effect.facts().name);
-    let gain = |c: &Chosen| {
-        let step = &steps[c.step];
-        step.taken.map_or(0.0, |t| step.before - step.tried[t].1.evidence)
-    };
-    let most = model.chosen.iter().map(gain).fold(0.0, f64::max);
-    let small = |c: &Chosen| gain(c) < SMALL * most;
+    let most = model.chosen.iter().map(|c| gain_of(steps, c)).fold(0.0, f64::max);
+    let small = |c: &Chosen| gain_of(steps, c) < SMALL * most;
     let price = (bench.stack.total as f64).ln();
     while model.chosen.len() > 1 && model.chosen.iter().any(drag) {
         let mut without = Vec::new();
@@ -71,16 +68,9 @@ pub(super) fn spare(
 
 /// Share of the gain of an effect from which a rival of its step is tried in its place.
 const NEAR: f64 = 0.8;
-/// Fall of the sum of squares for which an effect is exchanged.
-const BETTER: f64 = 10.0;
 
 /// Tries the rivals of each effect in its place, everything else refitted, and takes them where they fit better now.
-pub(super) fn exchange(
-    bench: &Bench,
-    model: &mut Model,
-    steps: &[Step],
-    iterations: usize,
-) -> Vec<Vec<(&'static str, f64)>> {
+pub(super) fn exchange(bench: &Bench, model: &mut Model, steps: &[Step], iterations: usize) -> Vec<Vec<Rival>> {
     let mut all = Vec::new();
     for at in 0..model.chosen.len() {
         let step = &steps[model.chosen[at].step];
@@ -89,7 +79,7 @@ pub(super) fn exchange(
             continue;
         };
         let gain = step.before - taken.1.evidence;
-        let mut found: Vec<(&'static str, f64)> = Vec::new();
+        let mut found: Vec<Rival> = Vec::new();
         for (i, tried) in &step.tried {
             let c = &step.candidates[*i];
             let (name, own) = (c.effect.facts().name, model.chosen[at].effect.facts().name);
@@ -103,10 +93,10 @@ pub(super) fn exchange(
             let other = fitted_from_both(bench, &chosen, &model.refitted.p, iterations);
             let dearer = if c.effect.facts().per_record { OWN * gain } else { 0.0 };
             if other.cost + BETTER + dearer < model.cost && other.possible() {
-                found.push((own, model.cost));
-                *model = other;
+                let cost = model.cost;
+                found.push(Rival { name: own, cost, model: std::mem::replace(model, other) });
             } else {
-                found.push((name, other.cost));
+                found.push(Rival { name, cost: other.cost, model: other });
             }
         }
         all.push(found);

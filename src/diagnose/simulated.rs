@@ -195,36 +195,54 @@ impl Residuals for Problem<'_> {
     }
 }
 
+/// The whitened simulation error of a model, stacked, each segment's own directions taken out.
+pub(super) fn simulation_error(bench: &Bench, model: &Model) -> Vec<f64> {
+    let mut problem = Problem::new(bench, model);
+    let x = problem.start();
+    problem.settle(&x)
+}
+
+impl<'a> Problem<'a> {
+    fn new(bench: &'a Bench, model: &'a Model) -> Problem<'a> {
+        let record = |(segment, &r): (usize, &usize)| {
+            let run = &bench.runs[r];
+            let constant = (!run.rested).then(|| bench.constant_torque(run, model).ok()).flatten();
+            let share = 1.0 / bench.stack.segments[segment].runs.len() as f64;
+            Record { run, segment, share, start: vec![0.0; run.len()], constant }
+        };
+        let all = bench.stack.segments.iter().enumerate().flat_map(|(i, s)| s.runs.iter().map(move |r| (i, r)));
+        let records = all.map(record).collect();
+        Problem { bench, model, free: Free::of(bench, model), local: bench.fit(vec![]).local_basis(), records }
+    }
+}
+
+impl Free {
+    fn of(bench: &Bench, model: &Model) -> Free {
+        let body = |k: &Knob| matches!(k, Knob::Gain | Knob::Stiffness | Knob::Viscous | Knob::Delay);
+        let knobs: Vec<usize> = (0..bench.form.knobs.len()).filter(|&i| body(&bench.form.knobs[i])).collect();
+        let (mut strengths, mut inner) = (Vec::new(), Vec::new());
+        for (e, c) in model.chosen.iter().enumerate() {
+            let facts = c.effect.facts();
+            if !facts.fixed && !facts.per_record {
+                // A strength of exactly 0 belongs to a term that this form of the law has not.
+                let there = (0..c.setting.strengths.len()).filter(|&i| c.setting.strengths[i] != 0.0);
+                strengths.extend(there.map(|i| [e, i]));
+            }
+            if !facts.per_record {
+                inner.extend((0..c.setting.inner.len()).filter(|&i| c.continuous[i]).map(|i| [e, i]));
+            }
+        }
+        Free { knobs, strengths, inner }
+    }
+}
+
 /// The model with body, delay and effects fitted by simulation; none where it has no effect, where its simulation runs away or where
 /// nothing is won.
 pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
     if model.chosen.is_empty() {
         return None;
     }
-    let body = |k: &Knob| matches!(k, Knob::Gain | Knob::Stiffness | Knob::Viscous | Knob::Delay);
-    let knobs: Vec<usize> = (0..bench.form.knobs.len()).filter(|&i| body(&bench.form.knobs[i])).collect();
-    let (mut strengths, mut inner) = (Vec::new(), Vec::new());
-    for (e, c) in model.chosen.iter().enumerate() {
-        let facts = c.effect.facts();
-        if !facts.fixed && !facts.per_record {
-            // A strength of exactly 0 belongs to a term that this form of the law has not.
-            let there = (0..c.setting.strengths.len()).filter(|&i| c.setting.strengths[i] != 0.0);
-            strengths.extend(there.map(|i| [e, i]));
-        }
-        if !facts.per_record {
-            inner.extend((0..c.setting.inner.len()).filter(|&i| c.continuous[i]).map(|i| [e, i]));
-        }
-    }
-    let free = Free { knobs, strengths, inner };
-    let record = |(segment, &r): (usize, &usize)| {
-        let run = &bench.runs[r];
-        let constant = (!run.rested).then(|| bench.constant_torque(run, model).ok()).flatten();
-        let share = 1.0 / bench.stack.segments[segment].runs.len() as f64;
-        Record { run, segment, share, start: vec![0.0; run.len()], constant }
-    };
-    let all = bench.stack.segments.iter().enumerate().flat_map(|(i, s)| s.runs.iter().map(move |r| (i, r)));
-    let records = all.map(record).collect();
-    let mut problem = Problem { bench, model, free, local: bench.fit(vec![]).local_basis(), records };
+    let mut problem = Problem::new(bench, model);
     let mut x = problem.start();
     let before = problem.settle(&x);
     let before = dot(&before, &before);

@@ -126,6 +126,7 @@ impl Smoother {
         let samples = (0..n)
             .map(|k| Sample {
                 t: k as f64 * t,
+                session: run.began_s + k as f64 * t,
                 x: after[k][0],
                 v: after[k][1],
                 u: run.input[k],

@@ -1,12 +1,13 @@
 //! The bearing remembers the last moves: its lubricant is pushed aside and pulls back, more after longer moves.
 //!
 //! b' = -(b - B sat(L/L_c) sgn)/tau_b, L the length of the last move and sgn its direction (after Helmick, Messner, Higgs 2008,
-//! who saw the torque after a seek grow with the seek's length up to a critical one); tau = -b.
+//! who saw the torque after a seek grow with the seek's length up to a critical one); tau = -b. A way back shorter than a
+//! smallest one is no new move.
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
-/// Inner: critical length, relaxation time. Strength: the largest bias B.
+/// Inner: critical length, relaxation time, shortest way back that begins a new move. Strength: the largest bias B.
 pub struct BearingBias;
 
 static FACTS: Facts = Facts {
@@ -86,14 +87,17 @@ impl Effect for BearingBias {
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let times = logarithmic(0.01 * scene.duration_s, 3.0 * scene.duration_s, 6);
-        times.iter().flat_map(|&tau| [0.15, 0.5, 1.5].map(|share| vec![share * scene.travel, tau])).collect()
+        let shortest = (6.0 * scene.noise).max(1e-4 * scene.travel);
+        let ways = [shortest, 5.0 * shortest, 25.0 * shortest].map(|w| w.min(0.1 * scene.travel));
+        let lengths = [0.15, 0.5, 1.5].map(|share| share * scene.travel);
+        let at = |tau: f64| lengths.iter().flat_map(move |&l| ways.map(|w| vec![l, tau, w]));
+        times.iter().flat_map(|&tau| at(tau)).collect()
     }
 
     fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
         let ratio = scene.sample_time_s / inner[1];
-        let smallest = (6.0 * scene.noise).max(1e-4 * scene.travel);
         let mean = -(-ratio).exp_m1() / ratio;
-        Box::new(Memory { critical: inner[0], smallest, keep: (-ratio).exp(), mean, now: None })
+        Box::new(Memory { critical: inner[0], smallest: inner[2], keep: (-ratio).exp(), mean, now: None })
     }
 
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
@@ -101,11 +105,13 @@ impl Effect for BearingBias {
             Parameter::new("bias_command", setting.strengths[0], Unit::Command),
             Parameter::new("critical_length", setting.inner[0], Unit::Position),
             Parameter::new("relaxation_time_s", setting.inner[1], Unit::Second),
+            Parameter::new("shortest_move", setting.inner[2], Unit::Position),
         ]
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        let inner = vec![given.positive("critical_length")?, given.positive("relaxation_time_s")?];
+    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+        let shortest = given.or("shortest_move", (6.0 * scene.noise).max(1e-4 * scene.travel));
+        let inner = vec![given.positive("critical_length")?, given.positive("relaxation_time_s")?, shortest];
         Ok(Setting { inner, strengths: vec![given.need("bias_command")?] })
     }
 }

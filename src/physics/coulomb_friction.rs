@@ -66,7 +66,8 @@ impl Effect for CoulombFriction {
         let floor = 1e-5 * scene.travel;
         let (short, long) = ((1.5 * scene.noise).max(0.3 * floor), (12.0 * scene.noise).max(2.0 * floor));
         let mut all: Vec<Vec<f64>> = logarithmic(short, long, 5).into_iter().map(|l| vec![l, 0.0, 0.0]).collect();
-        all.extend([0.02, 0.06, 0.2].map(|share| vec![0.5 * long, share * scene.speed, 0.5]));
+        // A rise that reaches up to the highest speed is no rise but the level.
+        all.extend(logarithmic(0.015, 0.2, 4).into_iter().map(|share| vec![0.5 * long, share * scene.speed, 0.5]));
         all
     }
 

@@ -273,6 +273,12 @@ pub trait Effect: Sync {
         true
     }
 
+    /// Inner numbers under which the same thing is possible, where `setting` is not: a wave of twice its period carried by its second
+    /// harmonic.
+    fn instead(&self, _setting: &Setting) -> Option<Vec<f64>> {
+        None
+    }
+
     /// Its part in the loop's response at `w_rad_s`, sampled as the law samples it.
     fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Cycle

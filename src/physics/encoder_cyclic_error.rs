@@ -68,6 +68,10 @@ impl Effect for EncoderCyclicError {
         setting.inner[1] < 1.5 || size(2) < CARRIES * size(0)
     }
 
+    fn instead(&self, setting: &Setting) -> Option<Vec<f64>> {
+        Some(vec![0.5 * setting.inner[0], setting.inner[1]])
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         let at = |i: usize| setting.strengths.get(i).copied().unwrap_or(0.0);
         let pair = |i: usize| (at(i).hypot(at(i + 1)), (-at(i + 1)).atan2(at(i)).to_degrees());

@@ -47,6 +47,8 @@ pub struct Machine {
     x: [f64; 3],
     w: f64,
     k: usize,
+    /// When it began in its session (s).
+    began_s: f64,
     origin: f64,
     /// Command behind the amplifier and torque under which it stood at `origin`: only what differs from them moves it.
     standing: [f64; 2],
@@ -75,6 +77,11 @@ impl Machine {
         self.w = self.standing[1];
         self.history.fill(self.standing[0]);
         self
+    }
+
+    /// The same machine, started that long after its session began (s).
+    pub fn begun_at(self, session_s: f64) -> Machine {
+        Machine { began_s: session_s, ..self }
     }
 
     /// The same machine, started at rest but not in balance: beside command and laws a constant torque acts (command_unit).
@@ -142,6 +149,7 @@ impl Machine {
             x: [0.0; 3],
             w: 0.0,
             k: 0,
+            began_s: 0.0,
             origin: 0.0,
             standing: [0.0; 2],
             free: Vec::new(),
@@ -156,7 +164,9 @@ impl Machine {
         self.x = [x, self.x[0], self.x[1]];
         // Second-order backward difference.
         let v = (3.0 * self.x[0] - 4.0 * self.x[1] + self.x[2]) / (2.0 * t);
-        self.now = Sample { t: self.k as f64 * t, x, v, u: self.last.u, i: self.last.i, spindle_rad, temperature };
+        let time = self.k as f64 * t;
+        let (u, i) = (self.last.u, self.last.i);
+        self.now = Sample { t: time, session: self.began_s + time, x, v, u, i, spindle_rad, temperature };
         let mut y = x;
         self.offset = 0.0;
         for part in &mut self.position {
@@ -221,7 +231,8 @@ impl Machine {
     /// The next sample, if the arm goes to `x`.
     fn ahead(&self, x: f64) -> Sample {
         let t = self.delayed.sample_time_s();
-        Sample { t: self.now.t + t, x, v: (3.0 * x - 4.0 * self.x[0] + self.x[1]) / (2.0 * t), ..self.now }
+        let (after, session) = (self.now.t + t, self.now.session + t);
+        Sample { t: after, session, x, v: (3.0 * x - 4.0 * self.x[0] + self.x[1]) / (2.0 * t), ..self.now }
     }
 
     fn solve(&mut self) -> f64 {

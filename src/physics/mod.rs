@@ -13,6 +13,7 @@ mod pair;
 mod restored;
 mod sample;
 mod share;
+mod stage;
 
 pub mod aerodynamic_drag;
 pub mod aliased_mode;

@@ -3,14 +3,18 @@
 //! zeta_j(A) = zeta_j (1 + g A), A the amplitude of the mode's share of the position: q' = (Re p (1 + g |2 q|) + j Im p) q + r i (a
 //! complex modal coordinate carries its amplitude; micro-slip of joints, Segalman 2005). The column is the share with the
 //! growing damping minus that without.
+//!
+//! Or, where the resonance is a stage of a chain and its damper feels the stage's rate: zeta_j (1 + g |q1|), q1 the rate of the
+//! stage's deflection over w_j ([`Stage`]).
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::mode_shift::mode;
 use super::pair::Pair;
 use super::sample::{Sample, Scene, logarithmic};
+use super::stage::{Next, Stage};
 use nalgebra::Complex;
 
-/// Inner: number of the mode, growth of its damping per amplitude.
+/// Inner: number of the mode, growth of its damping per amplitude, form (0: modal, 1: stage of a chain).
 pub struct ModalDamping;
 
 static FACTS: Facts = Facts {
@@ -20,7 +24,7 @@ static FACTS: Facts = Facts {
     columns: 1,
     fixed: true,
     per_record: false,
-    equation: "zeta_j(A) = zeta_j (1 + g A), A = |2 q_j|, in the modal form q' = (Re p (1 + g A) + j Im p) q + r i",
+    equation: "zeta_j(A) = zeta_j (1 + g A), A = |2 q_j|, in the modal form q' = (Re p (1 + g A) + j Im p) q + r i; or A = |q1|, the rate of a stage",
     says: "a vibration of the arm is damped differently when it is large, as where a joint slips",
     confused_with: &["unmodelled_resonance", "mode_shift", "current_saturation"],
     experiment: "the same multisine around the vibration at three amplitudes over a decade",
@@ -66,6 +70,34 @@ impl Law for Joint {
     }
 }
 
+/// The damper of one stage of a chain.
+struct Damper {
+    stage: Stage,
+    growth: f64,
+}
+
+impl Damper {
+    fn next(&self, from: &Sample) -> Next {
+        self.stage.next(from.i, |s, x| {
+            let damping = |rate: f64| s.damping * (1.0 + self.growth * rate).clamp(FACTOR[0], FACTOR[1]);
+            let rate = s.moved[1].abs();
+            let guess = s.moved_by(s.w_rad_s, damping(rate), x);
+            s.moved_by(s.w_rad_s, damping(0.5 * (rate + guess[1].abs())), x)
+        })
+    }
+}
+
+impl Law for Damper {
+    fn columns(&self, from: &Sample, _to: &Sample, out: &mut [f64]) {
+        out[0] = self.stage.change(&self.next(from));
+    }
+
+    fn commit(&mut self, from: &Sample, _to: &Sample) {
+        let next = self.next(from);
+        self.stage.take(from.i, next);
+    }
+}
+
 impl Effect for ModalDamping {
     fn facts(&self) -> &'static Facts {
         &FACTS
@@ -77,14 +109,26 @@ impl Effect for ModalDamping {
             // The amplitude that the largest command as a tone at the mode would reach; real excitation stays below it.
             let reach = scene.command * pair.residue.norm() / pair.pole.re.abs();
             if reach > 0.0 && reach.is_finite() {
-                all.extend(logarithmic(0.3, 1000.0, 10).into_iter().map(|g| vec![j, g / reach]));
-                all.extend(logarithmic(0.3, 100.0, 6).into_iter().map(|g| vec![j, -g / reach]));
+                all.extend(logarithmic(0.3, 1000.0, 10).into_iter().map(|g| vec![j, g / reach, 0.0]));
+                all.extend(logarithmic(0.3, 100.0, 6).into_iter().map(|g| vec![j, -g / reach, 0.0]));
+            }
+            // The same of a stage: the body's answer at the mode, raised by it.
+            let Some(m) = scene.plant.modes.get(j as usize) else { continue };
+            let reach = scene.command * scene.acceleration_gain().abs()
+                / (2.0 * m.pole_damping_ratio * m.pole_rad_s * m.pole_rad_s);
+            if reach > 0.0 && reach.is_finite() {
+                all.extend(logarithmic(0.3, 300.0, 7).into_iter().map(|g| vec![j, g / reach, 1.0]));
             }
         }
         all
     }
 
     fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        if inner[2] != 0.0
+            && let Some(stage) = Stage::of(scene, inner[0])
+        {
+            return Box::new(Damper { stage, growth: inner[1] });
+        }
         let q = [Complex::new(0.0, 0.0); 2];
         Box::new(Joint { pair: Pair::of(scene, inner[0]), growth: inner[1], step: scene.sample_time_s, q })
     }
@@ -93,6 +137,7 @@ impl Effect for ModalDamping {
         let mut all = vec![
             Parameter::new("mode", setting.inner[0], Unit::Ratio),
             Parameter::new("growth", setting.inner[1], Unit::PerPosition),
+            Parameter::new("stage", setting.inner[2], Unit::Ratio),
         ];
         if let Some(pair) = Pair::of(scene, setting.inner[0]) {
             all.push(Parameter::new("mode_hz", pair.pole.norm() / std::f64::consts::TAU, Unit::Hertz));
@@ -101,6 +146,7 @@ impl Effect for ModalDamping {
     }
 
     fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
-        Ok(Setting { inner: vec![mode(FACTS.name, given, scene)?, given.need("growth")?], strengths: vec![1.0] })
+        let stage = f64::from(given.or("stage", 0.0) != 0.0);
+        Ok(Setting { inner: vec![mode(FACTS.name, given, scene)?, given.need("growth")?, stage], strengths: vec![1.0] })
     }
 }

@@ -3,13 +3,16 @@
 //! w_j(x) = w_j (1 + c (x - x0)), damping ratio and modal mass constant: q' = p (1 + d) q + r/(1 + d) i with d = c (x - x0); the
 //! column is the mode's share of the position with the shift minus that without. To first order this is (x - x0) c times
 //! the plant's derivative by ln w_j.
+//!
+//! Or, where the resonance is a stage of a chain, its pole and zero move together ([`Stage`]).
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::pair::Pair;
 use super::sample::{Sample, Scene, logarithmic};
+use super::stage::{Next, Stage};
 use nalgebra::Complex;
 
-/// Inner: number of the mode, shift per position, centre.
+/// Inner: number of the mode, shift per position, centre, form (0: modal, 1: stage of a chain).
 pub struct ModeShift;
 
 static FACTS: Facts = Facts {
@@ -60,6 +63,31 @@ impl Law for Shifted {
     }
 }
 
+/// One stage of a chain that moves.
+struct Sliding {
+    stage: Stage,
+    slope: f64,
+    centre: f64,
+}
+
+impl Sliding {
+    fn next(&self, from: &Sample, to: &Sample) -> Next {
+        let by = 1.0 + (self.slope * (0.5 * (from.x + to.x) - self.centre)).clamp(-LARGEST, LARGEST);
+        self.stage.next(from.i, |s, x| s.moved_by(s.w_rad_s * by, s.damping, x))
+    }
+}
+
+impl Law for Sliding {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        out[0] = self.stage.change(&self.next(from, to));
+    }
+
+    fn commit(&mut self, from: &Sample, to: &Sample) {
+        let next = self.next(from, to);
+        self.stage.take(from.i, next);
+    }
+}
+
 impl Effect for ModeShift {
     fn facts(&self) -> &'static Facts {
         &FACTS
@@ -70,12 +98,20 @@ impl Effect for ModeShift {
             return Vec::new();
         }
         let shifts = logarithmic(1e-3, 0.1, 6);
-        let each =
-            |j: f64| shifts.iter().flat_map(move |&s| [s, -s]).map(move |s| vec![j, s / scene.travel, scene.centre]);
+        let both = |s: f64| [[s, 0.0], [-s, 0.0], [s, 1.0], [-s, 1.0]];
+        let each = |j: f64| {
+            let all = shifts.iter().flat_map(move |&s| both(s));
+            all.map(move |[s, form]| vec![j, s / scene.travel, scene.centre, form])
+        };
         Pair::all(scene).into_iter().flat_map(|(j, _)| each(j)).collect()
     }
 
     fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        if inner[3] != 0.0
+            && let Some(stage) = Stage::of(scene, inner[0])
+        {
+            return Box::new(Sliding { stage, slope: inner[1], centre: inner[2] });
+        }
         let zero = Complex::new(0.0, 0.0);
         let pair = Pair::of(scene, inner[0]);
         Box::new(Shifted { pair, slope: inner[1], centre: inner[2], step: scene.sample_time_s, q: [zero; 2] })
@@ -87,6 +123,7 @@ impl Effect for ModeShift {
             Parameter::new("shift_per_position", setting.inner[1], Unit::PerPosition),
             Parameter::new("centre", setting.inner[2], Unit::Position),
             Parameter::new("shift_at_travel", setting.inner[1] * scene.travel, Unit::Ratio),
+            Parameter::new("stage", setting.inner[3], Unit::Ratio),
         ];
         if let Some(pair) = Pair::of(scene, setting.inner[0]) {
             all.push(Parameter::new("mode_hz", pair.pole.norm() / std::f64::consts::TAU, Unit::Hertz));
@@ -96,7 +133,8 @@ impl Effect for ModeShift {
 
     fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let mode = mode(FACTS.name, given, scene)?;
-        let inner = vec![mode, given.need("shift_per_position")?, given.or("centre", scene.centre)];
+        let stage = f64::from(given.or("stage", 0.0) != 0.0);
+        let inner = vec![mode, given.need("shift_per_position")?, given.or("centre", scene.centre), stage];
         Ok(Setting { inner, strengths: vec![1.0] })
     }
 }

@@ -62,6 +62,7 @@ impl Restored {
             command_step: context.command,
             noise: context.noise,
             duration_s: context.duration_s,
+            session_s: context.duration_s,
             indexed: false,
             warm: false,
         };

@@ -7,6 +7,8 @@ use crate::lti::Plant;
 pub struct Sample {
     /// Time since the start of the record (s).
     pub t: f64,
+    /// Time since the start of the session, its records taken one after another (s); `t` where there is one record only.
+    pub session: f64,
     /// Position of the arm, without the sensor's errors (position_unit).
     pub x: f64,
     /// Velocity (position_unit/s).
@@ -44,6 +46,8 @@ pub struct Scene {
     pub noise: f64,
     /// Longest record (s).
     pub duration_s: f64,
+    /// All records one after another (s).
+    pub session_s: f64,
     /// Whether any record carries a spindle index.
     pub indexed: bool,
     /// Whether any record carries a temperature.

@@ -47,6 +47,7 @@ pub fn scene(plant: &Plant, sample_time_s: f64, travel: f64, samples: usize, noi
         command_step: 1.0,
         noise,
         duration_s: samples as f64 * sample_time_s,
+        session_s: samples as f64 * sample_time_s,
         indexed: false,
         warm: false,
     }

@@ -1,0 +1,76 @@
+//! What the library still sees in the error of the final model: a law that is the machine's own leaves nothing that another law
+//! could take.
+
+use super::bench::Bench;
+use super::scan::{Candidate, Ground};
+use super::select::{Model, Step, hums, scan};
+use super::simulated::simulation_error;
+use crate::physics::Effect;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// The strongest thing that is still seen.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Leftover {
+    /// The law that takes most of it: its nearest likeness, no finding.
+    pub effect: String,
+    /// What that law takes: fall of the sum of squares of the whitened error.
+    pub gain: f64,
+    /// That over what the final model took from the linear refit.
+    pub share: f64,
+    /// Bound of the chance that noise alone shows as much anywhere in the library.
+    pub p_value: f64,
+}
+
+/// What is left beyond chance; none where nothing is, or where no repeat tells what noise is.
+///
+/// Along the recorded motion laws see the sensor's noise and fall a little short of themselves, in open-loop simulation a free body
+/// may drift away: what counts is seen in both.
+pub(super) fn leftover(
+    bench: &Bench,
+    library: &[&'static dyn Effect],
+    model: &Model,
+    simulated: Option<&Model>,
+    steps: &[Step],
+    (before, limit): (f64, f64),
+) -> Option<Leftover> {
+    if model.chosen.is_empty() || !bench.levels.from_repeats {
+        return None;
+    }
+    let chance = |c: &Candidate| c.log_p_value(library.len()).max(hums(bench, c, c.gain, library.len()));
+    let strongest = |candidates: &[Candidate]| {
+        let possible = candidates.iter().filter(|c| c.effect.possible(&c.setting, &[]));
+        possible.min_by(|a, b| chance(a).total_cmp(&chance(b))).filter(|c| chance(c) < limit).cloned()
+    };
+    let along = match steps.last().filter(|s| s.taken.is_none()) {
+        Some(step) => strongest(&step.candidates),
+        None => strongest(&scan(bench, library, model).candidates),
+    }?;
+    let left = match simulated {
+        Some(s) => {
+            let other = strongest(&in_simulation(bench, library, s))?;
+            if other.gain < along.gain { other } else { along }
+        }
+        None => along,
+    };
+    let taken = (before - simulated.map_or(model.cost, |s| s.cost.min(model.cost))).max(f64::MIN_POSITIVE);
+    Some(Leftover {
+        effect: left.effect.facts().name.into(),
+        gain: left.gain,
+        share: left.gain / taken,
+        p_value: chance(&left).exp().max(1e-300),
+    })
+}
+
+/// The scan of the simulation's error.
+fn in_simulation(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Vec<Candidate> {
+    let fit = bench.fit(model.chosen.clone());
+    let (_, basis) = fit.screen_basis(&model.refitted.p);
+    let mut error = simulation_error(bench, model);
+    basis.project(&mut error);
+    let plant = bench.form.carrier(&model.refitted.p).plant;
+    let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
+    let mut candidates = ground.scan(library);
+    candidates.par_iter_mut().take(10).for_each(|c| ground.refine(c));
+    candidates
+}

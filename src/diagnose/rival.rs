@@ -1,0 +1,68 @@
+//! Laws that would do in the place of a found one, and which of them simulation leaves.
+//!
+//! Along the recorded motion laws see the sensor's noise, and two of them may change places by it: a lag of the sensor and one of the
+//! amplifier, a spring and a torque factor. Simulated from the recorded commands each feels the motion that it makes.
+
+use super::bench::Bench;
+use super::name::family_width;
+use super::refit::Chosen;
+use super::select::{Model, OWN};
+use super::simulated::simulated;
+
+/// Another law in the place of one effect of the model, everything else refitted.
+#[derive(Clone)]
+pub struct Rival {
+    /// Its name.
+    pub name: &'static str,
+    /// Sum of squares of the whitened error that it leaves, on the scale of the model's.
+    pub cost: f64,
+    /// The model with it.
+    pub model: Model,
+}
+
+/// Fall of the sum of squares for which an effect is exchanged.
+pub(super) const BETTER: f64 = 10.0;
+/// Share of what an effect explains by which the recorded motion may err between two laws: so near, simulation decides.
+const DOUBT: f64 = 0.05;
+/// Simulation error over that along the recorded motion above which a simulation is no judge (a body that drifts).
+const NO_JUDGE: f64 = 1.2;
+
+/// Costs of the rivals of one family by simulation; one that is better there takes the place.
+pub(super) fn by_simulation(
+    bench: &Bench,
+    model: &mut Model,
+    by_simulation: &mut Model,
+    rivals: &mut [Vec<Rival>],
+    gain: impl Fn(&Chosen) -> f64,
+) {
+    for at in 0..rivals.len().min(model.chosen.len()) {
+        if by_simulation.cost > NO_JUDGE * model.cost {
+            return;
+        }
+        let won = gain(&model.chosen[at]);
+        let width = family_width(won).max(DOUBT * won);
+        let mut best: Option<(f64, usize, Model)> = None;
+        for (i, r) in rivals[at].iter_mut().enumerate() {
+            if r.cost - model.cost >= width {
+                continue;
+            }
+            let Some(s) = simulated(bench, &r.model) else { continue };
+            r.cost = model.cost + (s.cost - by_simulation.cost);
+            let facts = r.model.chosen[at].effect.facts();
+            let dearer = if facts.per_record { OWN * won } else { 0.0 };
+            let ahead = by_simulation.cost - s.cost - dearer;
+            if ahead > BETTER && r.model.possible() && best.as_ref().is_none_or(|b| ahead > b.0) {
+                best = Some((ahead, i, s));
+            }
+        }
+        if let Some((_, i, s)) = best {
+            let other = rivals[at][i].model.clone();
+            let name = model.chosen[at].effect.facts().name;
+            let old = std::mem::replace(model, other);
+            // Along the recorded motion the old one may stay ahead; its family is told by simulation alone from here on.
+            let cost = model.cost + (by_simulation.cost - s.cost);
+            rivals[at][i] = Rival { name, cost, model: old };
+            *by_simulation = s;
+        }
+    }
+}
