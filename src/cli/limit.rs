@@ -7,8 +7,8 @@ use crate::document::write_text;
 use crate::lti::Plant;
 use crate::report::limit::{limit_sentences, limit_table};
 use crate::tune::{
-    Limit, LimitError, LimitPlant, LimitSettings, Machine, Spec, Standing, TuneError, TuneSettings, Verdict, limit,
-    standing, tune,
+    GainsBound, GainsSettings, Limit, LimitError, LimitPlant, LimitSettings, Machine, Spec, Standing, TuneError,
+    TuneSettings, Verdict, gains_bound, limit, standing, tune,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -22,11 +22,19 @@ struct Document<'a> {
     /// The best gains that a wide search found in the spec's structure: evidence, no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     best_in_structure: Option<&'a Standing>,
+    /// What the PID gains alone could still do, the filters as they stand: a global search with a bound.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pid_gains_alone: Option<&'a GainsBound>,
 }
 
 impl<'a> Document<'a> {
-    fn of(limit: &'a Limit, gains: Option<&'a Standing>, best_in_structure: Option<&'a Standing>) -> Document<'a> {
-        Document { schema: "servotune.limit/1", limit, gains, best_in_structure }
+    fn of(
+        limit: &'a Limit,
+        gains: Option<&'a Standing>,
+        best_in_structure: Option<&'a Standing>,
+        pid_gains_alone: Option<&'a GainsBound>,
+    ) -> Document<'a> {
+        Document { schema: "servotune.limit/1", limit, gains, best_in_structure, pid_gains_alone }
     }
 
     fn write(&self, file: &Path, screen: &mut Screen) -> Result<(), Failure> {
@@ -79,9 +87,10 @@ pub(super) fn beside(
     let bound = limit(&seen, t, controller.feedforward.as_ref(), spec, &settings)?;
     let own = standing(&seen, controller, spec)?;
     let best = searched(plant, &seen, spec, Some(controller), t, STARTS)?;
+    let alone = gains_bound(&Machine::Model(plant), controller, spec, &GainsSettings::default())?;
     let file = gains.with_extension("limit.json");
-    Document::of(&bound, Some(&own), Some(&best)).write(&file, screen)?;
-    Ok(Gap { file, says: limit_sentences(&bound, Some(&own), Some((&best, STARTS))) })
+    Document::of(&bound, Some(&own), Some(&best), Some(&alone)).write(&file, screen)?;
+    Ok(Gap { file, says: limit_sentences(&bound, Some(&own), Some((&best, STARTS)), Some(&alone)) })
 }
 
 pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Failure> {
@@ -101,12 +110,14 @@ pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Fai
         0 => None,
         starts => Some(searched(&plant, &seen, &spec, gains.as_ref(), t, starts)?),
     };
-    let document = Document::of(&found, figures.as_ref(), searched.as_ref());
+    let global = |g: &Controller| gains_bound(&Machine::Model(&plant), g, &spec, &GainsSettings::default());
+    let alone = gains.as_ref().map(global).transpose()?;
+    let document = Document::of(&found, figures.as_ref(), searched.as_ref(), alone.as_ref());
     if let Some(file) = &a.out {
         document.write(file, screen)?;
     }
     let mut text = limit_table(&found, figures.as_ref(), &plant.position_unit)?.text();
-    text += &limit_sentences(&found, figures.as_ref(), searched.as_ref().map(|s| (s, a.search)));
+    text += &limit_sentences(&found, figures.as_ref(), searched.as_ref().map(|s| (s, a.search)), alone.as_ref());
     screen.result(&document, &text)?;
     Ok(if found.verdict == Verdict::Impossible { Ending::Rejected } else { Ending::Accepted })
 }

@@ -14,6 +14,7 @@ mod quick;
 mod reference;
 mod simulation;
 mod spectral;
+mod spectral_parts;
 mod spectral_slopes;
 mod window_frame;
 
@@ -28,3 +29,4 @@ pub use quick::{QuickScene, QuickWork};
 pub use reference::Reference;
 pub use simulation::{ClosedLoop, PesError, Scene, Workspace, simulate};
 pub use spectral::{SpectralPes, SpectralWork};
+pub use spectral_parts::{BinParts, SpectralParts};

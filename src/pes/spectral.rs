@@ -21,14 +21,14 @@ pub struct SpectralPes {
     lines: SampledPlant,
     dft: WindowDft,
     /// (1 - P F) R on every line, real and imaginary part; filled up with zeros to the frame's width, as are the arrays of `SpectralWork`.
-    error: [Vec<f64>; 2],
+    pub(super) error: [Vec<f64>; 2],
     /// Run-out of every bin, added at the head.
-    runout: Vec<Complex<f64>>,
+    pub(super) runout: Vec<Complex<f64>>,
     /// What the window sees of every line.
     pub(super) frame: Arc<WindowFrame>,
     /// Densities (per hertz, both signs) of the encoder noise, and of the windage times |P|² on every line.
     pub(super) encoder: f64,
-    windage: Vec<f64>,
+    pub(super) windage: Vec<f64>,
     command: Option<Box<CommandLines>>,
     /// Which lines lie outside the sweep.
     outside: Vec<bool>,
@@ -85,12 +85,24 @@ impl SpectralPes {
         bins: Vec<usize>,
         command: bool,
     ) -> Result<SpectralPes, PesError> {
+        SpectralPes::lasting(profile, plant, controller, bins, command, 1.0)
+    }
+
+    /// The same with the way back so many times later: what a slow loop still remembers of one move fades before the next.
+    pub fn lasting(
+        profile: &Profile,
+        plant: &ResponseCurve,
+        controller: &Controller,
+        bins: Vec<usize>,
+        command: bool,
+        times: f64,
+    ) -> Result<SpectralPes, PesError> {
         profile.check()?;
         controller.check()?;
         let t = plant.sample_time_s();
         let spiral = &profile.spiral;
         let end_s = Reference::of(spiral).end_s();
-        let period = 2.0 * spiral.duration_s.max(end_s + REST_S);
+        let period = 2.0 * times * spiral.duration_s.max(end_s + REST_S);
         // Half-wave symmetry leaves the odd lines.
         let count = ((period * 0.5 / t) as usize).div_ceil(2);
         let w: Vec<f64> = (0..count).map(|i| TAU * (2 * i + 1) as f64 / period).filter(|w| w * t < PI).collect();

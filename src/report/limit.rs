@@ -3,7 +3,7 @@
 use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Column, Table};
-use crate::tune::{Limit, Standing, Verdict};
+use crate::tune::{GainsBound, Limit, Standing, Verdict};
 
 /// Limit, given gains and the gap, by band and weighted sum.
 pub fn limit_table(limit: &Limit, gains: Option<&Standing>, unit: &str) -> Result<Table, ReportError> {
@@ -34,8 +34,13 @@ pub fn limit_table(limit: &Limit, gains: Option<&Standing>, unit: &str) -> Resul
     Ok(table)
 }
 
-/// What limit, gains and search (with its number of starts) say together.
-pub fn limit_sentences(limit: &Limit, gains: Option<&Standing>, searched: Option<(&Standing, usize)>) -> String {
+/// What limit, gains, search (with its number of starts) and the bound of the PID gains alone say together.
+pub fn limit_sentences(
+    limit: &Limit,
+    gains: Option<&Standing>,
+    searched: Option<(&Standing, usize)>,
+    alone: Option<&GainsBound>,
+) -> String {
     let mut text = String::new();
     let percent = |a: f64, b: f64| 100.0 * (a / b - 1.0);
     if limit.verdict == Verdict::Impossible {
@@ -55,6 +60,7 @@ pub fn limit_sentences(limit: &Limit, gains: Option<&Standing>, searched: Option
                 percent(g.figures.objective, s.figures.objective).max(0.0)
             );
         }
+        text += &alone.map_or_else(String::new, gains_sentence);
         if limit.sum.objective > 0.0 {
             text += &format!(
                 "These gains are within {:.1} % of the best of all loops of the class (proven bound).\n",
@@ -66,4 +72,30 @@ pub fn limit_sentences(limit: &Limit, gains: Option<&Standing>, searched: Option
         text += "The rounds ended before the bound stopped rising: more --rounds may raise it.\n";
     }
     text
+}
+
+/// What the global search over the PID gains says.
+fn gains_sentence(g: &GainsBound) -> String {
+    if !g.member {
+        return "These gains miss a demand as the global search over the PID gains reads it (margins, a gain crossing inside the range): \
+                its bound does not speak of them.\n"
+            .to_owned();
+    }
+    let end = if g.left == 0 {
+        "the search came to its end".to_owned()
+    } else {
+        format!("it ended early with {} boxes open, so that the truth may be nearer", g.left)
+    };
+    if g.objective > 0.0 {
+        format!(
+            "With the filters as they stand, these PID gains are within {:.2} % of the best from 1/{} to {} times them (global search with a bound over \
+             {} boxes; {end}).\n",
+            100.0 * (g.own / g.objective - 1.0),
+            g.reach,
+            g.reach,
+            g.boxes
+        )
+    } else {
+        format!("With the filters as they stand, {} boxes of PID gains gave no bound.\n", g.boxes)
+    }
 }

@@ -56,3 +56,24 @@ pub fn judge(machine: &Machine<'_>, controller: &Controller, spec: &Spec) -> Res
     found.gain_crossover_hz = margins.gain_crossover_hz;
     Ok(Proof { margins, judged: Judged::of(&wanted, found) })
 }
+
+/// How many times later the way back comes where a loop may be slow.
+const LASTING: f64 = 16.0;
+
+/// The weighted sum of both DFT norms on a measured response with the way back much later; none for a model, whose write is simulated.
+///
+/// A loop that forgets slowly still sees the move before, which the ordinary period takes for part of the write.
+pub(super) fn lasting_objective(
+    m: &Machine<'_>,
+    controller: &Controller,
+    spec: &Spec,
+) -> Result<Option<f64>, TuneError> {
+    let Machine::Response { frf, hold, continuation } = m else { return Ok(None) };
+    let plant = curve(frf, *hold, *continuation, controller.sample_time_s)?;
+    let bins = super::machine::bins(&spec.profile, &[]);
+    let s = SpectralPes::lasting(&spec.profile, &plant, controller, bins, false, LASTING)?;
+    let mut amplitude = Vec::new();
+    s.write(&controller.sections()?.chain, &mut SpectralWork::default(), &mut amplitude);
+    let [low, high] = super::bench::weights(&spec.limits);
+    Ok(Some(low * s.dft().band(&amplitude, LOW_BAND_HZ) + high * s.dft().band(&amplitude, HIGH_BAND_HZ)))
+}

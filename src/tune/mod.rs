@@ -12,6 +12,7 @@ mod judge;
 mod limit;
 mod linear;
 mod machine;
+mod neighbours;
 mod outcome;
 mod parameters;
 mod pareto;
@@ -30,7 +31,8 @@ pub use from_table::{polish_table, roomiest_table};
 pub use gain_table::{CrossingRow, GainTable, GainTableError, InputDigest, Provenance, Summary};
 pub use judge::{Proof, judge};
 pub use limit::{
-    Bound, Figures, Limit, LimitError, LimitPlant, LimitSettings, LimitWork, Standing, Verdict, limit, standing,
+    Bound, Figures, GainsBound, GainsSettings, Limit, LimitError, LimitPlant, LimitSettings, LimitWork, Standing,
+    Verdict, gains_bound, limit, standing,
 };
 pub use machine::{Hold, Machine, Route};
 pub use outcome::{AtBound, Infeasible, Outcome, RelaxedLimit, Tuned, Work};

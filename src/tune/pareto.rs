@@ -76,16 +76,20 @@ pub fn pareto(
     }
     all.reverse();
     for i in 0..all.len() {
-        let beaten = all.iter().any(|o| {
-            o.feasible
-                && o.max_sensitivity <= all[i].max_sensitivity
-                && o.objective <= all[i].objective
-                && (o.max_sensitivity < all[i].max_sensitivity || o.objective < all[i].objective)
+        let (ms, objective) = (all[i].max_sensitivity, all[i].objective);
+        let beaten = all.iter().enumerate().any(|(j, o)| {
+            let no_worse = o.max_sensitivity <= ms * (1.0 + SAME) && o.objective <= objective * (1.0 + SAME);
+            let better = o.max_sensitivity < ms * (1.0 - SAME) || o.objective < objective * (1.0 - SAME);
+            // Of points that are one and the same, where Ms no longer binds, the first stands.
+            o.feasible && no_worse && (better || j < i)
         });
         all[i].on_front = all[i].feasible && !beaten;
     }
     Ok(all)
 }
+
+/// Two figures this near (as a share) are the same.
+const SAME: f64 = 1e-4;
 
 fn point(allowed: f64, feasible: bool, outcome: &Outcome, spec: &Spec) -> ParetoPoint {
     let found: Vec<_> = outcome.after().iter().map(|p| &p.judged.found).collect();

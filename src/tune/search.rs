@@ -1,9 +1,10 @@
-//! The search itself: a simplex from every start (argmin), a polish from each, the best of all.
+//! The search itself: a simplex from every start (argmin), a polish from each, neighbours of the best, the best of all.
 //!
 //! Starts are split over threads by rayon; each has its own buffers and its own random numbers, and the best is taken by
 //! merit and then by index, so the result has the same bytes for any number of threads.
 
 use super::bench::UNSTABLE;
+use super::neighbours::{Exact, improve};
 use super::polish::{Goal, Polished, polish};
 use super::starts::starts;
 use super::{Bench, Desk, Score};
@@ -38,6 +39,8 @@ impl Found {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effort {
     pub starts: usize,
+    /// Notches that the search sets: each brings optima, whose neighbours are searched.
+    pub notches: usize,
     /// Reflections of the simplex from each start.
     pub simplex_steps: u64,
     /// Linearisations of a polish.
@@ -52,7 +55,14 @@ const SPREAD: f64 = 1e-3;
 const PRICE: f64 = 10.0;
 
 /// Searches from every start.
-pub(super) fn search(bench: &Bench, crossover_hz: Option<[f64; 2]>, given: bool, seed: u64, effort: &Effort) -> Found {
+pub(super) fn search(
+    bench: &Bench,
+    crossover_hz: Option<[f64; 2]>,
+    given: bool,
+    seed: u64,
+    effort: &Effort,
+    exact: &Exact<'_>,
+) -> Found {
     let from = starts(bench, crossover_hz, given, seed, effort.starts);
     let count = from.len();
     let ends: Vec<(Option<Polished>, usize)> = from
@@ -64,16 +74,18 @@ pub(super) fn search(bench: &Bench, crossover_hz: Option<[f64; 2]>, given: bool,
             (end, desk.evaluations)
         })
         .collect();
-    let evaluations = ends.iter().map(|(_, e)| e).sum();
+    let evaluations: usize = ends.iter().map(|(_, e)| e).sum();
     let feasible_starts = ends.iter().filter(|(p, _)| p.as_ref().is_some_and(|p| p.score.violation <= 0.0)).count();
     let mut ends: Vec<Polished> = ends.into_iter().filter_map(|(p, _)| p).collect();
     // The sort is stable: of equals the earlier start stays ahead.
     ends.sort_by(|a, b| order(&a.score, &b.score));
+    let around = improve(bench, &mut ends, effort.notches, effort.polish_steps, seed, exact);
+    let evaluations = evaluations + around;
     Found { ends, evaluations, starts: count, feasible_starts }
 }
 
 /// Feasible before infeasible, then by objective or by violation.
-fn order(a: &Score, b: &Score) -> Ordering {
+pub(super) fn order(a: &Score, b: &Score) -> Ordering {
     match (a.violation <= 0.0, b.violation <= 0.0) {
         (true, true) => a.objective.total_cmp(&b.objective),
         (false, false) => a.violation.total_cmp(&b.violation),
@@ -149,7 +161,7 @@ fn simplex(bench: &Bench, x: Vec<f64>, steps: u64, desk: &mut Desk) -> Vec<f64> 
 }
 
 /// Lowers the loop's gain until it is stable: an unstable start tells a simplex nothing.
-fn walk_back(bench: &Bench, mut x: Vec<f64>, desk: &mut Desk) -> Vec<f64> {
+pub(super) fn walk_back(bench: &Bench, mut x: Vec<f64>, desk: &mut Desk) -> Vec<f64> {
     let gains = |p: &super::Parameter| matches!(p, super::Parameter::Kp | super::Parameter::Ki | super::Parameter::Kd);
     for _ in 0..12 {
         if bench.score(&x, desk).violation < UNSTABLE {

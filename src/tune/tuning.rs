@@ -1,11 +1,12 @@
 //! `tune`: search, exact judgement, back-off, verdict.
 
 use super::bench::UNSTABLE;
-use super::judge::Proof;
+use super::judge::{Proof, lasting_objective};
+use super::neighbours::spread;
 use super::outcome::{AtBound, Infeasible, Outcome, RelaxedLimit, Tuned, Work};
 use super::requirements::Requirement;
 use super::search::{Effort, refine, search};
-use super::{Bench, Machine, Parameters, Side, Spec, SpecError, judge};
+use super::{Bench, Machine, Parameters, Side, Spec, SpecError, What, judge};
 use crate::controller::{Controller, ControllerError};
 use crate::feedback::FeedbackError;
 use crate::frf::FrfShapeError;
@@ -90,7 +91,7 @@ const BACK_OFFS: usize = 5;
 const SECOND_SEARCH: usize = 5;
 const SECOND_SEED: u64 = 0x5eed_0002;
 /// Ends of the search that are judged at most.
-const ENDS: usize = 4;
+const ENDS: usize = 6;
 /// Violations within this share of the largest belong to the same conflict.
 const SAME_MISS: f64 = 0.02;
 /// Room given to a relaxed limit, as a share of it: more than the polish leaves, far less than anybody can measure.
@@ -116,21 +117,24 @@ pub fn tune_jointly(
     settings: &TuneSettings,
 ) -> Result<Outcome, TuneError> {
     let parameters = check(machines, spec, start, settings)?;
-    let mut bench = Bench::new(machines, spec, parameters)?;
+    let mut bench = Bench::new(machines, spec, parameters.clone())?;
     let mut effort = Effort {
         starts: settings.starts * spec.search.notches.max(1),
+        notches: spec.search.notches,
         simplex_steps: settings.simplex_steps,
         polish_steps: settings.polish_steps,
     };
     let crossover = spec.margins.gain_crossover_hz;
-    let mut found = search(&bench, crossover, start.is_some(), spec.search.seed, &effort);
+    let exact = |x: &[f64], objective: f64| error_of_grid(machines, &parameters.controller(x), spec, objective);
+    let mut found = search(&bench, crossover, start.is_some(), spec.search.seed, &effort, &exact);
     if found.feasible_starts == 0 {
         // "Infeasible" is a grave word: it is said only after a second, wider search under a seed of its own.
         effort.starts *= SECOND_SEARCH;
-        let wider = search(&bench, crossover, start.is_some(), spec.search.seed ^ SECOND_SEED, &effort);
+        let wider = search(&bench, crossover, start.is_some(), spec.search.seed ^ SECOND_SEED, &effort, &exact);
         found.join(wider);
     }
     found.ends.retain(|e| e.score.violation < UNSTABLE);
+    found.ends = spread(&bench, found.ends);
     let before = start.map(|c| proofs(machines, c, spec)).transpose()?;
     let mut ending = Ending { machines, spec, evaluations: found.evaluations, back_offs: 0 };
     // Where the exact judgement refuses the best end for good, the next one may still pass.
@@ -228,6 +232,21 @@ fn check(
         return Err(TuneError::NothingFree);
     }
     Ok(parameters)
+}
+
+/// The error of the search's figures for one candidate, as a share: the largest exact miss of a limit on a margin, or by how much the write
+/// is larger than it was taken for; infinite where the loop cannot be judged.
+fn error_of_grid(machines: &[Machine<'_>], c: &Controller, spec: &Spec, objective: f64) -> f64 {
+    let margin =
+        |w: What| matches!(w, What::PhaseMargin | What::GainMargin | What::MaxSensitivity | What::GainCrossover);
+    let of = |m: &Machine<'_>| -> Result<f64, TuneError> {
+        let p = judge(m, c, spec)?;
+        let limits = p.judged.limits.iter().filter(|l| margin(l.wanted.what));
+        let worst = limits.map(|l| l.violation).fold(0.0, f64::max);
+        let lasting = lasting_objective(m, c, spec)?.map_or(0.0, |j| j / objective.exp() - 1.0);
+        Ok(if p.judged.found.unstable_poles == 0 { worst.max(lasting) } else { f64::INFINITY })
+    };
+    machines.iter().map(|m| of(m).unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
 }
 
 fn proofs(machines: &[Machine<'_>], c: &Controller, spec: &Spec) -> Result<Vec<Proof>, TuneError> {

@@ -38,65 +38,60 @@ pub(super) fn sensitivity(h: &Horizon, q: &[f64]) -> Vec<f64> {
 
 /// Frequencies looked at for every tap.
 const POINTS_PER_TAP: usize = 2;
-/// Frequencies of the first round.
-const SEEDS: usize = 48;
+/// Up to so many times the upper crossover |S| enters the first round, where S has its hill.
+const DENSE: f64 = 3.0;
+/// Upper crossover where the spec names none (Hz).
+const HILL_HZ: f64 = 1500.0;
 /// How far a demand may be missed at a frequency without a new cut.
 const NEARLY: f64 = 1e-4;
 
 impl Pointwise {
-    /// The worst miss over frequency, and a cut at each of its local peaks.
+    /// The worst miss over frequency, and for each demand cuts at its local peaks and beside them: between two cuts S rises again.
     pub fn cuts(&self, h: &Horizon, s: &[f64]) -> (f64, Vec<Cut>) {
-        let n = s.len();
-        let points = POINTS_PER_TAP * n;
-        let miss: Vec<(f64, f64, Kind)> = (1..=points).map(|i| self.miss(s, PI * i as f64 / points as f64)).collect();
-        let mut found = Vec::new();
+        let points = POINTS_PER_TAP * s.len();
+        let angle = |i: usize| PI * (i + 1) as f64 / points as f64;
+        let at: Vec<Complex<f64>> = (0..points).map(|i| response_of(s, angle(i))).collect();
         let mut worst = f64::NEG_INFINITY;
-        for i in 0..points {
-            let (angle, value, kind) = miss[i];
-            worst = worst.max(value);
-            let near = |j: usize| if miss[j].2 == kind { miss[j].1 } else { f64::NEG_INFINITY };
-            let peak = (i == 0 || near(i - 1) <= value) && (i + 1 == points || near(i + 1) <= value);
-            if value > NEARLY && peak {
-                found.push(self.cut(h, angle, kind));
+        let mut found = Vec::new();
+        for kind in [Kind::Sharp, Kind::Inside, Kind::Outside] {
+            let miss = |i: usize| self.miss(at[i], angle(i), kind);
+            for i in 0..points {
+                let value = miss(i);
+                worst = worst.max(value);
+                let peak = |i: usize| (i == 0 || miss(i - 1) <= miss(i)) && (i + 1 == points || miss(i + 1) <= miss(i));
+                if value > NEARLY && (peak(i) || (i > 0 && peak(i - 1)) || (i + 1 < points && peak(i + 1))) {
+                    found.push(self.cut(h, angle(i), kind));
+                }
             }
         }
         (worst, found)
     }
 
-    /// Cuts at frequencies spread by ratio, for the first round.
+    /// Cuts of the first round, one frequency a tap: the demands on Re S everywhere, that on |S| where S has its hill.
+    ///
+    /// The mean of Re S over all frequencies is 1, so that Re S >= 1/2 above the crossovers already holds S together there, by one row each.
     pub fn first(&self, h: &Horizon) -> Vec<Cut> {
-        let n = h.taps;
-        let still: Vec<f64> = (0..n).map(|k| if k == 0 { 1.0 } else { 0.0 }).collect();
-        let lowest = PI / n as f64;
-        let angles = (0..=SEEDS).map(|i| lowest * (n as f64).powf(i as f64 / SEEDS as f64));
+        let top = TAU * self.sample_time_s * DENSE * self.crossover_hz.map_or(HILL_HZ, |[_, high]| high);
         let mut all = Vec::new();
-        for angle in angles {
-            let (_, _, side) = self.side(&still, angle);
-            all.extend(side.map(|kind| self.cut(h, angle, kind)));
-            all.extend(self.max_sensitivity.map(|_| self.cut(h, angle, Kind::Sharp)));
+        for angle in (0..h.taps).map(|i| PI * (i + 1) as f64 / h.taps as f64) {
+            for kind in [Kind::Sharp, Kind::Inside, Kind::Outside] {
+                let asked = self.miss(Complex::new(1.0, 0.0), angle, kind) > f64::NEG_INFINITY;
+                if asked && (kind != Kind::Sharp || angle <= top || self.crossover_hz.is_none()) {
+                    all.push(self.cut(h, angle, kind));
+                }
+            }
         }
         all
     }
 
-    /// The demand most missed at one frequency (rad a sample).
-    fn miss(&self, s: &[f64], angle: f64) -> (f64, f64, Kind) {
-        let (at, missed, side) = self.side(s, angle);
-        let sharp = self.max_sensitivity.map_or(f64::NEG_INFINITY, |ms| at.norm() - ms - self.tail);
-        match side {
-            Some(side) if missed > sharp => (angle, missed, side),
-            _ => (angle, sharp, Kind::Sharp),
-        }
-    }
-
-    /// S at one frequency, and the demand on its real part.
-    fn side(&self, s: &[f64], angle: f64) -> (Complex<f64>, f64, Option<Kind>) {
-        let step = Complex::from_polar(1.0, -angle);
-        let at = s.iter().rev().fold(Complex::new(0.0, 0.0), |sum, s| sum * step + *s);
+    /// By how much S misses a demand at one frequency (rad a sample); minus infinity where there is none.
+    fn miss(&self, at: Complex<f64>, angle: f64, kind: Kind) -> f64 {
         let hz = angle / (TAU * self.sample_time_s);
-        match self.crossover_hz {
-            Some([low, _]) if hz <= low => (at, at.re - 0.5 - self.tail, Some(Kind::Inside)),
-            Some([_, high]) if hz >= high => (at, 0.5 - self.tail - at.re, Some(Kind::Outside)),
-            _ => (at, f64::NEG_INFINITY, None),
+        match (kind, self.max_sensitivity, self.crossover_hz) {
+            (Kind::Sharp, Some(ms), _) => at.norm() - ms - self.tail,
+            (Kind::Inside, _, Some([low, _])) if hz <= low => at.re - 0.5 - self.tail,
+            (Kind::Outside, _, Some([_, high])) if hz >= high => 0.5 - self.tail - at.re,
+            _ => f64::NEG_INFINITY,
         }
     }
 
@@ -118,6 +113,12 @@ enum Kind {
     Sharp,
     Inside,
     Outside,
+}
+
+/// S at one frequency (rad a sample).
+fn response_of(s: &[f64], angle: f64) -> Complex<f64> {
+    let step = Complex::from_polar(1.0, -angle);
+    s.iter().rev().fold(Complex::new(0.0, 0.0), |sum, s| sum * step + *s)
 }
 
 /// Real and imaginary part of the horizon's S at one frequency (rad a sample).

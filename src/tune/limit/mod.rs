@@ -7,11 +7,14 @@
 mod basis;
 mod cone;
 mod cuts;
+mod enclosure;
 mod energy;
+mod gains;
 mod horizon;
 mod programme;
 mod taps;
 
+pub use gains::{GainsBound, GainsSettings, gains_bound};
 pub use horizon::LimitPlant;
 pub use programme::{Bound, Figures, Limit, LimitSettings, LimitWork, Standing, Verdict, limit, standing};
 

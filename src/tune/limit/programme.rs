@@ -3,7 +3,7 @@
 use super::basis::Basis;
 use super::cone::{Answer, Programme};
 use super::cuts::{Cut, Pointwise, sensitivity};
-use super::energy::{Affine, convolved, correlated, rows};
+use super::energy::{Affine, convolved, correlated, moved, noise};
 use super::horizon::{Bin, Horizon};
 use super::taps::{energies, taps};
 use super::{LimitError, LimitPlant};
@@ -171,17 +171,36 @@ pub fn limit(
 
 /// Samples of the plant's pulse response that set the unit of the taps: a quarter of a period at 400 Hz and 25 kHz.
 const UNIT_SAMPLES: usize = 16;
-/// Radius of the ball of coordinates that is searched: energies up to its square times the limits', far beyond any use.
-const BALL: f64 = 1e4;
+/// Radius of the ball of coordinates that is searched: norms up to so many times the level, far beyond any use. The length of S adds less than
+/// 1 to it, taps only beyond 1e7 of their unit.
+const BALL: f64 = 100.0;
+
+/// What stands for 1 in the programme: the limits, or without any a tenth of what the window shows under no control.
+fn level(h: &Horizon, spec: &Spec) -> f64 {
+    if spec.limits.dft_low.is_some() || spec.limits.dft_high.is_some() {
+        return 1.0;
+    }
+    let norm =
+        |band: [f64; 2]| h.bins.iter().filter(|b| in_band(b, band)).map(|b| b.still.norm_sqr()).sum::<f64>().sqrt();
+    let still = 0.1 * weighted(norm(LOW_BAND_HZ), norm(HIGH_BAND_HZ), spec).objective;
+    if still > 0.0 { still } else { 1.0 }
+}
+
+/// A row at a point.
+fn value(row: &[f64], x: &[f64]) -> f64 {
+    row.iter().zip(x).map(|(r, x)| r * x).sum::<f64>() + row[x.len()]
+}
 
 /// A programme that keeps its cuts between objectives.
 struct Model<'a> {
     h: &'a Horizon,
     spec: &'a Spec,
     settings: &'a LimitSettings,
-    /// Rows of both bands over the taps, and times their scale over the coordinates.
-    bands: [Vec<Affine>; 2],
-    turned: [Vec<Vec<f64>>; 2],
+    /// What stands for 1 in the programme, and what each band's norm is multiplied by for it.
+    level: f64,
+    scale: [f64; 2],
+    /// Rows of both bands over the coordinates, times their scale; two gaps before the constant for the bounds of the norms.
+    bands: [Vec<Vec<f64>>; 2],
     basis: Basis,
     pointwise: Pointwise,
     /// Cuts over the coordinates: one row for a half space, three for a disk.
@@ -196,18 +215,26 @@ impl<'a> Model<'a> {
     fn new(h: &'a Horizon, spec: &'a Spec, sample_time_s: f64, settings: &'a LimitSettings) -> Model<'a> {
         let size = h.shaped_plant[..h.taps.min(UNIT_SAMPLES)].iter().map(|x| x * x).sum::<f64>().sqrt();
         let unit = 1.0 / size.max(f64::MIN_POSITIVE);
-        let bands = [LOW_BAND_HZ, HIGH_BAND_HZ].map(|band| rows(h, unit, |b| in_band(b, band)));
-        let scale = bench::weights(&spec.limits);
-        let all: Vec<(&Affine, f64)> = (0..2).flat_map(|b| bands[b].iter().map(move |a| (a, scale[b]))).collect();
-        let basis = Basis::of(&all, h.taps, unit);
-        let turned = [0, 1].map(|b: usize| bands[b].iter().map(|a| basis.row(a, scale[b], 2)).collect());
+        let level = level(h, spec);
+        let scale = bench::weights(&spec.limits).map(|w| w / level);
+        let moves = [LOW_BAND_HZ, HIGH_BAND_HZ].map(|band| moved(h, |b| in_band(b, band)));
+        let all: Vec<(&Affine, f64)> = (0..2).flat_map(|b| moves[b].iter().map(move |a| (a, scale[b]))).collect();
+        let basis = Basis::of(&all, &h.shaped_plant[..h.taps], unit);
+        let bands = [(0, LOW_BAND_HZ), (1, HIGH_BAND_HZ)].map(|(b, band)| {
+            let mut rows: Vec<Vec<f64>> = moves[b].iter().map(|a| basis.row(a, scale[b], 2)).collect();
+            for mut row in noise(h, &basis, scale[b], |b| in_band(b, band)) {
+                row.splice(h.taps..h.taps, [0.0; 2]);
+                rows.push(row);
+            }
+            rows
+        });
         let pointwise = Pointwise {
             sample_time_s,
             tail: settings.tail,
             max_sensitivity: spec.margins.max_sensitivity,
             crossover_hz: spec.margins.gain_crossover_hz,
         };
-        let mut model = Model { h, spec, settings, bands, turned, basis, pointwise, cuts: vec![], rounds: 0 };
+        let mut model = Model { h, spec, settings, level, scale, bands, basis, pointwise, cuts: vec![], rounds: 0 };
         model.pointwise.first(h).into_iter().for_each(|c| model.add(c));
         model
     }
@@ -215,13 +242,13 @@ impl<'a> Model<'a> {
     /// The programme: coordinates of the taps, then the two norms over their weights.
     fn programme(&self, weights: [f64; 2], limited: bool) -> Programme {
         let n = self.h.taps;
-        let scale = bench::weights(&self.spec.limits);
+        let scale = self.scale;
         let mut p = Programme { cost: vec![0.0; n + 2], ball: (n, BALL), top: BALL, ..Programme::default() };
         for b in 0..2 {
-            p.cost[n + b] = weights[b] / scale[b];
+            p.cost[n + b] = weights[b] / bench::weights(&self.spec.limits)[b];
             let mut cone = vec![vec![0.0; n + 3]];
             cone[0][n + b] = 1.0;
-            cone.extend(self.turned[b].iter().cloned());
+            cone.extend(self.bands[b].iter().cloned());
             p.cones.push(cone);
         }
         for cut in &self.cuts {
@@ -290,18 +317,17 @@ impl<'a> Model<'a> {
 
     /// Leaves out the cuts far from a point.
     fn thin(&mut self, x: &[f64]) {
-        let value = |r: &Vec<f64>| r.iter().zip(x).map(|(r, x)| r * x).sum::<f64>() + r[x.len()];
         self.cuts.retain(|cut| match cut.as_slice() {
-            [half] => value(half) < FAR,
-            [bound, re, im] => value(bound) - value(re).hypot(value(im)) < FAR,
+            [half] => value(half, x) < FAR,
+            [bound, re, im] => value(bound, x) - value(re, x).hypot(value(im, x)) < FAR,
             _ => true,
         });
     }
 
-    /// Both norms at these taps.
-    fn figures(&self, q: &[f64]) -> Figures {
-        let norm = |rows: &[Affine]| rows.iter().map(|a| a.at(q).powi(2)).sum::<f64>().sqrt();
-        weighted(norm(&self.bands[0]), norm(&self.bands[1]), self.spec)
+    /// Both norms at a point.
+    fn figures(&self, x: &[f64]) -> Figures {
+        let norm = |b: usize| self.bands[b].iter().map(|r| value(r, x).powi(2)).sum::<f64>().sqrt() / self.scale[b];
+        weighted(norm(0), norm(1), self.spec)
     }
 
     /// Rounds of solving and cutting; the highest bound met. None where nothing was solved.
@@ -311,14 +337,19 @@ impl<'a> Model<'a> {
         for _ in 0..rounds.max(1) {
             self.rounds += 1;
             let Answer::Found { x, bound, .. } = self.programme(weights, false).solve() else { break };
+            let bound = bound * self.level;
             let q = self.basis.taps(&x[..n]);
             let (missed, found) = self.pointwise.cuts(self.h, &sensitivity(self.h, &q));
-            let at = self.figures(&q);
+            let at = self.figures(&x);
             // Every round's bound is one; the highest stands, with what its point missed.
             if best.as_ref().is_none_or(|b| bound > b.objective) {
                 best = Some(Bound { objective: bound, at, missed: missed.max(0.0) });
             }
             if missed <= self.settings.tolerance {
+                // The last point meets everything: an earlier bound can be higher by the solver's tolerance only.
+                if let Some(b) = &mut best {
+                    (b.at, b.missed) = (at, missed.max(0.0));
+                }
                 break;
             }
             self.thin(&x);

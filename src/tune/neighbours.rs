@@ -1,0 +1,211 @@
+//! The second stage of a search: neighbours of the best ends, polished again, round by round until none gets better.
+//!
+//! Notches bring many local optima, each of them an end that no local method leaves. A neighbour moves one filter anew, takes one from another
+//! end, or shakes every number; its polish ends in the next optimum. Each neighbour has random numbers of its own, and the best are taken by merit
+//! and then by index, so the result has the same bytes for any number of threads.
+
+use super::polish::Polished;
+use super::search::{order, refine, walk_back};
+use super::{Bench, Parameter};
+use crate::numeric::random::Random;
+use rayon::prelude::*;
+
+/// The error of the search's figures for a candidate and its objective, as a share.
+pub(super) type Exact<'a> = dyn Fn(&[f64], f64) -> f64 + 'a;
+
+/// Neighbours a round for each notch, rounds for each notch at most, and rounds without a better end after which it is over.
+const TRIES: usize = 16;
+const ROUNDS: usize = 10;
+const PATIENCE: usize = 8;
+/// Ends whose neighbours are tried.
+const PARENTS: usize = 8;
+/// Ends whose marks are closer than this (ln of a parameter) count as one.
+const SAME: f64 = 0.2;
+/// Gain of the objective (ln) or of the violation that counts as better.
+const BETTER: f64 = 1e-3;
+/// Error beyond which an end is one of the search's figures, not of the machine; what is smaller the back-off repairs.
+const FALSE: f64 = 0.05;
+/// Spread of a neighbour (ln of a parameter): of all numbers, and of the one notch that is moved.
+const SHAKE: f64 = 0.15;
+const NOTCH_SHAKE: f64 = 0.5;
+
+/// Improves ends, best first, for a search of so many notches; out: what it cost in candidates.
+///
+/// Ends that the grid takes for good and the exact judgement refuses come last: their neighbours would all be refused with them.
+pub(super) fn improve(
+    bench: &Bench,
+    ends: &mut Vec<Polished>,
+    notches: usize,
+    polish_steps: usize,
+    seed: u64,
+    exact: &Exact<'_>,
+) -> usize {
+    // One notch has few optima, which the starts find.
+    let patience = if notches > 1 { PATIENCE } else { 1 };
+    let mut evaluations = 0;
+    let mut waited = 0;
+    let mut judged = Judged::default();
+    judged.parents(bench, ends, exact);
+    for round in 0..ROUNDS * notches {
+        let parents = judged.parents(bench, ends, exact);
+        let Some(best) = parents.first().map(|p| p.score) else { break };
+        let tries = TRIES * notches;
+        let found: Vec<(Option<Polished>, usize)> = (0..tries)
+            .into_par_iter()
+            .map(|i| {
+                let mut desk = bench.desk();
+                let mut random = Random::stream(seed, FIRST_STREAM + (round * tries + i) as u64);
+                let x = walk_back(bench, neighbour(bench, &parents, i, &mut random), &mut desk);
+                (refine(bench, &x, polish_steps, &mut desk), desk.evaluations)
+            })
+            .collect();
+        for (end, cost) in found {
+            evaluations += cost;
+            ends.extend(end);
+        }
+        ends.sort_by(|a, b| order(&a.score, &b.score));
+        let now = judged.parents(bench, ends, exact).first().map(|p| p.score);
+        let better = now.is_some_and(|now| match (best.violation > 0.0, now.violation > 0.0) {
+            (true, true) => best.violation - now.violation > BETTER,
+            (true, false) => true,
+            _ => best.objective - now.objective > BETTER,
+        });
+        waited = if better { 0 } else { waited + 1 };
+        if waited >= patience {
+            break;
+        }
+    }
+    ends.extend(judged.refused);
+    evaluations
+}
+
+/// Streams of random numbers from here on belong to neighbours.
+const FIRST_STREAM: u64 = 1000;
+
+/// What the exact judgement has said so far.
+#[derive(Default)]
+struct Judged {
+    sound: Vec<Vec<f64>>,
+    refused: Vec<Polished>,
+}
+
+impl Judged {
+    /// The best ends that differ, whatever the order of their notches, and that are sound; the others are taken out of `ends`.
+    fn parents(&mut self, bench: &Bench, ends: &mut Vec<Polished>, exact: &Exact<'_>) -> Vec<Polished> {
+        let mut chosen: Vec<(Vec<f64>, Polished)> = Vec::with_capacity(PARENTS);
+        let mut i = 0;
+        while i < ends.len() && chosen.len() < PARENTS {
+            let end = &ends[i];
+            let mark = mark(bench, &end.x);
+            if chosen.iter().any(|(c, _)| c.iter().zip(&mark).all(|(a, b)| (a - b).abs() < SAME)) {
+                i += 1;
+                continue;
+            }
+            if !self.sound.contains(&end.x) {
+                // An end that misses limits on the grid as well is no error of the grid.
+                if end.score.violation <= 0.0 && exact(&end.x, end.score.objective) > FALSE {
+                    self.refused.push(ends.remove(i));
+                    continue;
+                }
+                self.sound.push(end.x.clone());
+            }
+            chosen.push((mark, end.clone()));
+            i += 1;
+        }
+        chosen.into_iter().map(|(_, e)| e).collect()
+    }
+}
+
+/// The best ends first, of those that are alike only one, the others behind: who judges them in order meets ends that differ.
+pub(super) fn spread(bench: &Bench, ends: Vec<Polished>) -> Vec<Polished> {
+    let (mut first, mut others): (Vec<(Vec<f64>, Polished)>, Vec<Polished>) = (Vec::new(), Vec::new());
+    for e in ends {
+        let mark = mark(bench, &e.x);
+        if first.iter().any(|(c, _)| c.iter().zip(&mark).all(|(a, b)| (a - b).abs() < SAME)) {
+            others.push(e);
+        } else {
+            first.push((mark, e));
+        }
+    }
+    first.into_iter().map(|(_, e)| e).chain(others).collect()
+}
+
+/// What tells one optimum from another: gains, corners, and the centres of notches in ascending order.
+fn mark(bench: &Bench, x: &[f64]) -> Vec<f64> {
+    let free = bench.parameters().free();
+    let mut centres: Vec<f64> =
+        x.iter().zip(free).filter(|(_, p)| matches!(p, Parameter::NotchFrequency { .. })).map(|(x, _)| *x).collect();
+    centres.sort_by(f64::total_cmp);
+    let plain = x.iter().zip(free).filter(|(_, p)| notch(p).is_none()).map(|(x, _)| *x);
+    plain.chain(centres).collect()
+}
+
+/// A neighbour of one of the parents; the better ones have more of them.
+fn neighbour(bench: &Bench, parents: &[Polished], i: usize, random: &mut Random) -> Vec<f64> {
+    let p = bench.parameters();
+    let share = random.uniform();
+    let parent = ((share * share) * parents.len() as f64) as usize;
+    let mut x = parents[parent.min(parents.len() - 1)].x.clone();
+    let other = &parents[((random.uniform() * parents.len() as f64) as usize).min(parents.len() - 1)].x;
+    let filters: Vec<usize> = p.free().iter().filter_map(notch).fold(Vec::new(), |mut all, f| {
+        if !all.contains(&f) {
+            all.push(f);
+        }
+        all
+    });
+    let pick = |random: &mut Random| filters.get((random.uniform() * filters.len() as f64) as usize).copied();
+    match i % 4 {
+        // One notch anywhere.
+        0 => {
+            let chosen = pick(random);
+            for (j, [from, to]) in p.bounds().iter().enumerate() {
+                if chosen.is_some() && notch(&p.free()[j]) == chosen {
+                    x[j] = from + (to - from) * random.uniform();
+                }
+            }
+        }
+        // One notch from another end.
+        1 => {
+            let (to, from) = (pick(random), pick(random));
+            for j in 0..x.len() {
+                let like = |k: &usize| notch(&p.free()[*k]) == from && kind(&p.free()[*k]) == kind(&p.free()[j]);
+                if to.is_some()
+                    && notch(&p.free()[j]) == to
+                    && let Some(k) = (0..x.len()).find(like)
+                {
+                    x[j] = other[k];
+                }
+            }
+        }
+        // One notch moved along, its width and depth shaken.
+        2 => {
+            let chosen = pick(random);
+            for (x, parameter) in x.iter_mut().zip(p.free()) {
+                if chosen.is_some() && notch(parameter) == chosen {
+                    *x += NOTCH_SHAKE * random.normal();
+                }
+            }
+        }
+        _ => {}
+    }
+    // Every number a little, or in a plain neighbour more.
+    let plain = i % 4 == 3 || filters.is_empty();
+    let shake = if plain { SHAKE * 4f64.powf(random.uniform()) } else { 0.1 * SHAKE };
+    for (x, [from, to]) in x.iter_mut().zip(p.bounds()) {
+        *x = (*x + shake * random.normal()).clamp(*from, *to);
+    }
+    x
+}
+
+fn notch(p: &Parameter) -> Option<usize> {
+    match *p {
+        Parameter::NotchFrequency { filter }
+        | Parameter::NotchDepth { filter }
+        | Parameter::NotchPoleDamping { filter } => Some(filter),
+        _ => None,
+    }
+}
+
+fn kind(p: &Parameter) -> std::mem::Discriminant<Parameter> {
+    std::mem::discriminant(p)
+}
