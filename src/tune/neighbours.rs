@@ -40,8 +40,10 @@ pub(super) fn improve(
     seed: u64,
     exact: &Exact<'_>,
 ) -> usize {
-    // One notch has few optima, which the starts find.
-    let patience = if notches > 1 { PATIENCE } else { 1 };
+    // One notch has few optima, which the starts find (`results/limit.md`).
+    if notches < 2 {
+        return 0;
+    }
     let mut evaluations = 0;
     let mut waited = 0;
     let mut judged = Judged::default();
@@ -71,7 +73,7 @@ pub(super) fn improve(
             _ => best.objective - now.objective > BETTER,
         });
         waited = if better { 0 } else { waited + 1 };
-        if waited >= patience {
+        if waited >= PATIENCE {
             break;
         }
     }
