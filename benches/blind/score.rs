@@ -173,7 +173,7 @@ pub fn score(dir: &Path, ddir: &Path, out: &Path) -> Result<(), String> {
                 add(key, found);
                 let right = c.found.first() == c.truth.first() && matches!(c.verdict.as_str(), "named" | "data_fault");
                 if c.lambda >= NAMEABLE && !c.truth.iter().any(|t| inseparable(t)) {
-                    add("07 of these, where the name can be told: first name right", right);
+                    add("07 singles from lambda 100, no twin law: first name right", right);
                 }
                 if c.lambda >= NAMEABLE {
                     add("07 singles from lambda 100: first name right", right);

@@ -6,7 +6,8 @@
 //! Hinkley 1997, ch. 4). Spec: `specs/mismatch.md`.
 
 use super::bench::Bench;
-use super::select::{Model, refit, strongest};
+use super::fitted::refit;
+use super::select::{Model, strongest};
 use crate::numeric::random::Random;
 use crate::physics::Effect;
 use rayon::prelude::*;

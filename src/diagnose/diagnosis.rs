@@ -5,6 +5,7 @@ use super::bump::{Bump, beyond, bump};
 use super::corrected::{Corrected, corrected};
 use super::finding::*;
 use super::fit_report::fit_report;
+use super::fitted::refit;
 use super::held_out::{contradicts, held_out, mean};
 use super::judge::{Judged, rms};
 use super::line_finding::line_findings;
@@ -75,9 +76,9 @@ const CLEAN: f64 = 3.0;
 /// Standard deviations of excess, and whitened error per sample, from which something is there though no law was found.
 const RESTLESS: [f64; 2] = [6.0, 1.06];
 /// Share of an error clearly beyond noise that a model which counts as clean must have explained.
-const MOSTLY: f64 = 0.7;
+const MOSTLY: f64 = 0.6;
 /// Share of what the findings took that another law may still see beside them: no law is a machine's own to the last part.
-const BESIDE: f64 = 0.03;
+const BESIDE: f64 = 0.05;
 
 /// Diagnoses a case.
 pub fn diagnose(
@@ -115,7 +116,7 @@ pub fn diagnose(
         let other = Bench::new(given, measured, sample_time_s, case.spindle_hz)?;
         let left = |b: &Bench| {
             let mut b = b.clone();
-            let p = select::refit(&mut b, settings.select.iterations).refitted.p;
+            let p = refit(&mut b, settings.select.iterations).refitted.p;
             rms(&b.without_starts(b.fit(vec![]).errors(&p)))
         };
         let (held, moving) = (left(&bench), left(&other));
@@ -184,7 +185,7 @@ fn set_aside(
     }
     let sample_time_s = bench.scene.sample_time_s;
     let most = (BUMPED * bench.fit_runs.len() as f64).floor().max(1.0) as usize;
-    let plant = select::refit(&mut bench.clone(), iterations).refitted.plant;
+    let plant = refit(&mut bench.clone(), iterations).refitted.plant;
     let mut cleaner = Bench::new(&plant, bench.runs.clone(), sample_time_s, spindle_hz)?;
     let mut found = Vec::new();
     while let Some(b) = bump(&cleaner) {
@@ -224,8 +225,10 @@ fn search(selection: &Selection) -> Vec<Tried> {
 fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<Finding>, bumps: Vec<Finding>) {
     let (base, model) = (&selection.baseline, selection.best());
     let explained = if base.excess() > 0.0 { 1.0 - model.excess().max(0.0) / base.excess() } else { 1.0 };
-    // Down to the noise, and not only because there was little above it.
-    let clean = model.excess_sigma() < CLEAN && (explained >= MOSTLY || base.excess_sigma() < CLEAN);
+    // Down to the noise, and not only because there was little above it; or as near as its level may err, no law seeing anything more.
+    let spent = selection.leftover.is_none() && model.cost / model.freedom < RESTLESS[1];
+    let clean = (model.excess_sigma() < CLEAN && base.excess_sigma() < CLEAN)
+        || (explained >= MOSTLY && (model.excess_sigma() < CLEAN || spent));
     // Where no law was found, much more is asked of the excess: noise may differ a little from what its repeats say.
     let restless = model.excess_sigma() > RESTLESS[0] && model.cost / model.freedom > RESTLESS[1];
     // Along the recorded motion, and simulated: in closed loop limits and noise play into each other, in open loop a free body

@@ -56,6 +56,28 @@ pub(super) fn scale(r: &Replay, runs: &[&Run]) -> Finding {
     }
 }
 
+/// The position comes before the command that made it.
+pub(super) fn early(shift_samples: f64, sample_time_s: f64, runs: &[&Run]) -> Finding {
+    let (says, port) = text_of("misalignment");
+    let whole =
+        Estimate { value: shift_samples, low: shift_samples - 0.5, high: shift_samples + 0.5, unit: "samples".into() };
+    Finding {
+        effect: "misalignment".into(),
+        family: vec!["misalignment".into()],
+        port,
+        p_value: 1e-300,
+        says: format!(
+            "In the log {says}: the position comes {:.0} samples before the model's answer to the command, more than all of its delay.",
+            -shift_samples
+        ),
+        parameters: BTreeMap::from([
+            ("samples".to_owned(), whole),
+            ("shift_s".to_owned(), plain(shift_samples * sample_time_s, "s")),
+        ]),
+        place: everywhere(runs),
+    }
+}
+
 /// The position follows the model only with a factor that no machine of this model can have.
 pub(super) fn unit(factor: f64, runs: &[&Run]) -> Finding {
     let sign = if factor < 0.0 { "with the sign turned round" } else { "in other units than the model" };

@@ -71,11 +71,16 @@ pub(super) fn check(
             }
         }
     }
-    if hygiene.replay.is_none()
-        && let Some(factor) = scale_of(given, runs, sample_time_s)?
-    {
-        let all: Vec<&Run> = runs.iter().collect();
-        hygiene.finding = Some(super::log_finding::unit(factor, &all));
+    if hygiene.replay.is_none() {
+        let follows = follows(given, runs, sample_time_s)?;
+        if !follows.possible() {
+            let all: Vec<&Run> = runs.iter().collect();
+            hygiene.finding = Some(super::log_finding::unit(follows.factor, &all));
+        } else if let Some(early) = early(given, runs, sample_time_s, &follows)? {
+            let all: Vec<&Run> = runs.iter().collect();
+            hygiene.finding = Some(super::log_finding::early(-early, sample_time_s, &all));
+            runs.iter_mut().for_each(|r| shift(r, -early));
+        }
     }
     if !faults.is_empty() {
         hygiene.finding = Some(super::log_finding::samples(&faults));
@@ -86,13 +91,28 @@ pub(super) fn check(
 }
 
 /// Factor of the gain beyond which no machine differs from its model, but its log does.
-const OTHER_UNIT: f64 = 3.0;
+const OTHER_UNIT: f64 = 8.0;
 /// Share of the position's energy that the scaled model must explain.
 const ALIKE: f64 = 0.8;
 
-/// Where no controller tells the units: the factor by which the position follows the given plant's answer to the recorded command, if
-/// it follows it and the factor is none that a machine of this model can have.
-fn scale_of(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Option<f64>, LtiError> {
+/// How the position follows the given plant's answer to the recorded command.
+struct Follows {
+    /// Times what.
+    factor: f64,
+    /// Energy of the position that it leaves, and all of it.
+    left: f64,
+    whole: f64,
+}
+
+impl Follows {
+    /// Whether a machine of this model can do so: where the position follows the command at all, not in other units or signs.
+    fn possible(&self) -> bool {
+        let alike = self.left < (1.0 - ALIKE) * self.whole;
+        !alike || (self.factor > OTHER_UNIT.recip() && self.factor < OTHER_UNIT)
+    }
+}
+
+fn follows(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Follows, LtiError> {
     let sampled = Sampled::of(given, sample_time_s)?;
     let (mut ss, mut sy, mut yy) = (0.0, 0.0, 0.0);
     for run in runs {
@@ -105,10 +125,32 @@ fn scale_of(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Option<f6
         [&mut s, &mut y].into_iter().for_each(|x| basis.project(x));
         (ss, sy, yy) = (ss + dot(&s, &s), sy + dot(&s, &y), yy + dot(&y, &y));
     }
-    let factor = sy / ss;
-    let alike = sy * sy > ALIKE * ss * yy;
-    let possible = factor > OTHER_UNIT.recip() && factor < OTHER_UNIT;
-    Ok((alike && !possible).then_some(factor))
+    Ok(Follows { factor: sy / ss, left: (yy - sy * sy / ss).max(0.0), whole: yy })
+}
+
+/// Most samples by which a position is taken to be early, and the share of the error that moving it back must take.
+const EARLIEST: usize = 20;
+const MOVED_BACK: f64 = 0.3;
+
+/// By how many samples the position comes before the command that made it can have acted: no machine does that, a log that slipped does.
+/// None where moving it back does not help far more than all of the model's own delay.
+fn early(given: &Plant, runs: &[Run], sample_time_s: f64, unmoved: &Follows) -> Result<Option<f64>, LtiError> {
+    let left = |by: f64| -> Result<f64, LtiError> {
+        let mut moved = runs.to_vec();
+        moved.iter_mut().for_each(|r| shift(r, -by));
+        Ok(follows(given, &moved, sample_time_s)?.left)
+    };
+    let mut best = (unmoved.left, 0.0);
+    for by in 1..=EARLIEST {
+        let now = left(by as f64)?;
+        if now > best.0 {
+            break;
+        }
+        best = (now, by as f64);
+    }
+    let own = given.delay_s / sample_time_s;
+    // Up to the model's own delay it may be a machine that is faster than its model.
+    Ok((best.0 < MOVED_BACK * unmoved.left && best.1 > own + 0.5).then_some(best.1))
 }
 
 /// The given plant's answer to each record's command, its free motions fitted to the position: the motion without the noise.

@@ -13,6 +13,7 @@ mod diagnosis;
 mod experiment;
 mod finding;
 mod fit_report;
+mod fitted;
 mod held_out;
 mod hygiene;
 mod judge;

@@ -316,6 +316,10 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
         if value > 0.0 {
             family.extend(lags_like(bench, selection, value, delay));
         }
+        // Only a controller's replay tells a late log from a late machine.
+        if d.replay.is_none() {
+            family.push("misalignment".into());
+        }
         let f = Finding {
             effect: "extra_delay".into(),
             family,

@@ -2,6 +2,7 @@
 
 use super::bench::Bench;
 use super::bootstrap::{Bootstrap, bootstrap};
+use super::fitted::{fitted, fitted_from_both, refit, settled};
 use super::leftover::{Leftover, leftover};
 use super::locked::follows_motion;
 use super::name::{is_drag, same_drag};
@@ -106,6 +107,8 @@ pub struct Selection {
     pub simulated: Option<Model>,
     /// For each effect of the model, others in its place.
     pub rivals: Vec<Vec<Rival>>,
+    /// Whether repeats tell what noise is.
+    pub noise_known: bool,
     /// What is still seen in the error of the final model, beyond chance.
     pub leftover: Option<Leftover>,
     /// The search on records without physics, where it was asked for.
@@ -123,8 +126,12 @@ impl Selection {
         gain_of(&self.steps, &self.model.chosen[at])
     }
 
-    /// Whether several laws share the work and none leads: one thing that the library lacks is likelier than so many that it has.
+    /// Whether several laws share the work and none leads: one thing that the library lacks is likelier than so many that it has. Where
+    /// no repeat tells what noise is, what they explain is told in logarithms, and nothing is said of shares.
     pub fn mixture(&self) -> bool {
+        if !self.noise_known {
+            return false;
+        }
         let gains: Vec<f64> = (0..self.model.chosen.len()).map(|at| self.gain(at)).collect();
         gains.len() >= MANY && gains.iter().copied().fold(0.0, f64::max) < LEADS * gains.iter().sum::<f64>()
     }
@@ -159,61 +166,8 @@ const LEADS: f64 = 0.8;
 
 /// Share of a law that the linear parameters can imitate above which these records say nothing of it.
 const CONCEALED: f64 = 0.9995;
-/// Most rounds of refit and noise where no repeat tells what noise is.
-const SETTLING: usize = 8;
-/// Change of the linear parameters, relative or in samples, below which they have settled.
-const SETTLED: f64 = 1e-3;
 /// Share of its gain by which an effect of each record's own must beat one of the machine.
 pub(super) const OWN: f64 = 0.05;
-
-pub(super) fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64], iterations: usize) -> Model {
-    let mut fit = bench.fit(chosen);
-    let refitted = fit.refit(p, iterations);
-    let chosen = fit.chosen;
-    let used = refitted.count() + 3 * bench.stack.segments.len();
-    let freedom = bench.stack.total as f64 - used as f64;
-    let known = bench.repeats.iter().map(|r| r.1.len()).sum::<usize>() as f64 - bench.stack.total as f64;
-    let level = if bench.repeats.is_empty() { 0.0 } else { freedom * freedom / known.max(1.0) };
-    let noise = if bench.levels.from_repeats { 0.0 } else { bench.whitener.evidence(bench.stack.total) };
-    let evidence = refitted.cost + noise;
-    Model { cost: refitted.cost, evidence, freedom, sigma: (2.0 * (freedom + level)).sqrt(), chosen, refitted }
-}
-
-/// A model with the noise that it leaves, where no repeat tells what noise is.
-fn settled(bench: &Bench, model: Model, iterations: usize) -> Model {
-    let mut own = bench.clone();
-    own.renew(&model.refitted.p, &model.chosen);
-    fitted(&own, model.chosen, &model.refitted.p, iterations)
-}
-
-/// The better of a fit from where the search stands and one from the given plant.
-pub(super) fn fitted_from_both(bench: &Bench, chosen: &[Chosen], p: &[f64], iterations: usize) -> Model {
-    let here = fitted(bench, chosen.to_vec(), p, iterations);
-    if here.excess_sigma() < 5.0 || p.iter().all(|v| *v == 0.0) {
-        return here;
-    }
-    let there = fitted(bench, chosen.to_vec(), &vec![0.0; p.len()], iterations);
-    if there.cost < here.cost { there } else { here }
-}
-
-/// The linear refit. A refit moves the motion that it was made along: once more, from there. Without repeats it moves the noise
-/// too.
-pub fn refit(bench: &mut Bench, iterations: usize) -> Model {
-    let mut baseline = fitted(bench, vec![], &vec![0.0; bench.form.knobs.len()], iterations);
-    for _ in 0..if bench.levels.from_repeats { 1 } else { SETTLING } {
-        bench.correct(&baseline.refitted.p, &[]);
-        if !bench.levels.from_repeats {
-            bench.renew(&baseline.refitted.p, &[]);
-        }
-        let before = baseline.refitted.p.clone();
-        baseline = fitted(bench, vec![], &before, iterations);
-        let moved = before.iter().zip(&baseline.refitted.p).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        if moved < SETTLED {
-            break;
-        }
-    }
-    baseline
-}
 
 /// Searches the library for what the linear model lacks.
 pub fn select(
@@ -334,7 +288,8 @@ pub fn select(
         by_simulation(bench, &mut model, s, &mut rivals, |c| gain_of(&steps, c));
     }
     let leftover = leftover(bench, library, &model, simulated.as_ref(), &steps, (baseline.cost, limit));
-    Selection { given, baseline, steps, model, simulated, rivals, leftover, bootstrap: calibration }
+    let noise_known = bench.levels.from_repeats;
+    Selection { given, baseline, steps, model, simulated, rivals, noise_known, leftover, bootstrap: calibration }
 }
 
 /// Free numbers of a candidate.

@@ -1,10 +1,11 @@
 //! The final model of a search, looked at again: effects that others made needless go, and rivals are tried in the place of each.
 
 use super::bench::Bench;
+use super::fitted::{fitted, fitted_from_both};
 use super::name::is_drag;
 use super::refit::Chosen;
 use super::rival::{BETTER, Rival};
-use super::select::{MINOR, Model, OWN, Step, fitted, fitted_from_both, gain_of};
+use super::select::{MINOR, Model, OWN, Step, gain_of};
 use super::simulated::simulated;
 
 /// Takes effects out again that later ones made needless.

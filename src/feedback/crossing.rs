@@ -1,5 +1,6 @@
 //! Where a curve crosses a level: brackets on the trace, refined on the function itself.
 
+use super::trace::{STRETCH, TURN};
 use super::{OpenLoop, Trace};
 use crate::numeric::golden::golden_section;
 use crate::numeric::root::bracketed_root;
@@ -19,8 +20,14 @@ pub struct Crossing {
 /// Relative width in frequency to which a crossing is refined; the value then errs by less than 1e-10 of the slope.
 const TOLERANCE: f64 = 1e-13;
 
-/// All frequencies (rad/s) at which `level(L)` changes its sign, near-touching pairs between two points included.
-pub(super) fn sign_changes(l: &impl OpenLoop, trace: &Trace, level: impl Fn(Complex<f64>) -> f64) -> Vec<f64> {
+/// All frequencies (rad/s) at which `level(L)` changes its sign, pairs between two points included: a dip of the level is looked into where
+/// it is no higher than `reach(L)`, what the level can change by between two points of a trace.
+pub(super) fn sign_changes(
+    l: &impl OpenLoop,
+    trace: &Trace,
+    level: impl Fn(Complex<f64>) -> f64,
+    reach: impl Fn(Complex<f64>) -> f64,
+) -> Vec<f64> {
     let g: Vec<f64> = trace.value.iter().map(|&v| level(v)).collect();
     let w = &trace.w_rad_s;
     let f = |w: f64| level(l.at(w));
@@ -36,7 +43,7 @@ pub(super) fn sign_changes(l: &impl OpenLoop, trace: &Trace, level: impl Fn(Comp
         if i + 1 < g.len() && g[i - 1] * g[i] > 0.0 && g[i] * g[i + 1] > 0.0 {
             let s = g[i].signum();
             let (a, m, b) = (s * g[i - 1], s * g[i], s * g[i + 1]);
-            if m <= a && m <= b && m < 0.25 * (a - m).max(b - m) {
+            if m <= a && m <= b && m < reach(trace.value[i]) {
                 let dip = golden_section(|x| s * f(x), w[i - 1], w[i + 1], 1e-12 * w[i]);
                 let (x, y) = (dip.x, dip.value);
                 if y < 0.0 {
@@ -52,7 +59,7 @@ pub(super) fn sign_changes(l: &impl OpenLoop, trace: &Trace, level: impl Fn(Comp
 
 /// Gain crossings with their phase margins: the angle from -180 deg to L, within (-180, 180].
 pub(super) fn gain_crossings(l: &impl OpenLoop, trace: &Trace) -> Vec<Crossing> {
-    sign_changes(l, trace, |v| v.norm_sqr().ln())
+    sign_changes(l, trace, |v| v.norm_sqr().ln(), |_| 2.0 * STRETCH)
         .into_iter()
         .map(|w| Crossing { hz: w / TAU, value: (-l.at(w)).arg().to_degrees() })
         .collect()
@@ -61,7 +68,8 @@ pub(super) fn gain_crossings(l: &impl OpenLoop, trace: &Trace) -> Vec<Crossing> 
 /// Phase crossings with their gain margins, -20 lg |L|; the end of the loop counts where L is real and negative there.
 pub(super) fn phase_crossings(l: &impl OpenLoop, trace: &Trace) -> Vec<Crossing> {
     let end = l.end_rad_s();
-    let mut at: Vec<f64> = sign_changes(l, trace, |v| v.im).into_iter().filter(|&w| w < end * (1.0 - 1e-9)).collect();
+    let mut at: Vec<f64> =
+        sign_changes(l, trace, |v| v.im, |v| TURN * v.norm()).into_iter().filter(|&w| w < end * (1.0 - 1e-9)).collect();
     if l.ends_at_half_rate() {
         at.push(end);
     }

@@ -13,9 +13,9 @@ pub struct Trace {
 }
 
 /// Largest turn of L, and of 1 + L, between neighbours (rad). Well below π, so that unwrapping cannot slip.
-const TURN: f64 = 0.5;
+pub(super) const TURN: f64 = 0.5;
 /// Largest change of ln|L| between neighbours.
-const STRETCH: f64 = 0.7;
+pub(super) const STRETCH: f64 = 0.7;
 /// Halvings of one interval at most: a jump that survives them is a discontinuity of a measured response.
 const DEPTH: usize = 16;
 

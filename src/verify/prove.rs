@@ -306,7 +306,8 @@ impl Tally {
             },
             disk_margin: Bounded {
                 low: Some(if stable { 2.0 * self.balance.low } else { 0.0 }),
-                high: Some(if stable { 2.0 * self.balance.high.min(1.0) } else { 0.0 }),
+                // Of a loop whose stability is open only this much is known.
+                high: Some(if stability == Stability::Unstable { 0.0 } else { 2.0 * self.balance.high.min(1.0) }),
                 hz: Some(hz(self.balance.at)),
             },
             gain_crossings,

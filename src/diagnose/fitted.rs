@@ -1,0 +1,94 @@
+//! A model fitted to the records, and the linear refit from which the search sets out.
+//!
+//! In: a bench, effects, where to begin. Out: the model with its cost, likelihood and freedom.
+
+use super::bench::Bench;
+use super::linear::Knob;
+use super::refit::Chosen;
+use super::select::Model;
+use rayon::prelude::*;
+
+/// Most rounds of refit and noise where no repeat tells what noise is.
+const SETTLING: usize = 8;
+/// Change of the linear parameters, relative or in samples, below which they have settled.
+const SETTLED: f64 = 1e-3;
+
+pub(super) fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64], iterations: usize) -> Model {
+    let mut fit = bench.fit(chosen);
+    let refitted = fit.refit(p, iterations);
+    let chosen = fit.chosen;
+    let used = refitted.count() + 3 * bench.stack.segments.len();
+    let freedom = bench.stack.total as f64 - used as f64;
+    let known = bench.repeats.iter().map(|r| r.1.len()).sum::<usize>() as f64 - bench.stack.total as f64;
+    let level = if bench.repeats.is_empty() { 0.0 } else { freedom * freedom / known.max(1.0) };
+    let noise = if bench.levels.from_repeats { 0.0 } else { bench.whitener.evidence(bench.stack.total) };
+    let evidence = refitted.cost + noise;
+    Model { cost: refitted.cost, evidence, freedom, sigma: (2.0 * (freedom + level)).sqrt(), chosen, refitted }
+}
+
+/// A model with the noise that it leaves, where no repeat tells what noise is.
+pub(super) fn settled(bench: &Bench, model: Model, iterations: usize) -> Model {
+    let mut own = bench.clone();
+    own.renew(&model.refitted.p, &model.chosen);
+    fitted(&own, model.chosen, &model.refitted.p, iterations)
+}
+
+/// The better of a fit from where the search stands and one from the given plant.
+pub(super) fn fitted_from_both(bench: &Bench, chosen: &[Chosen], p: &[f64], iterations: usize) -> Model {
+    let here = fitted(bench, chosen.to_vec(), p, iterations);
+    if here.excess_sigma() < 5.0 || p.iter().all(|v| *v == 0.0) {
+        return here;
+    }
+    let there = fitted(bench, chosen.to_vec(), &vec![0.0; p.len()], iterations);
+    if there.cost < here.cost { there } else { here }
+}
+
+/// Standard deviations of excess above which the delay is looked for far from the given one.
+const FAR_OFF: f64 = 5.0;
+/// Farthest that it is looked for (samples), and how finely.
+const FARTHEST: usize = 60;
+const STRIDE: usize = 3;
+
+/// The given plant with the delay at which it fits best, where that is not its own: a log that slipped by many samples is too far for
+/// a method that goes downhill.
+fn late(bench: &Bench) -> Option<Vec<f64>> {
+    let knobs = &bench.form.knobs;
+    let at = knobs.iter().position(|k| *k == Knob::Delay)?;
+    let start = |samples: f64| {
+        let mut p = vec![0.0; knobs.len()];
+        p[at] = samples;
+        p
+    };
+    let shifts: Vec<f64> = (1..=FARTHEST / STRIDE).map(|i| (i * STRIDE) as f64).collect();
+    let costs: Vec<f64> = shifts.par_iter().map(|&s| bench.fit(vec![]).cost(&start(s))).collect();
+    let (best, s) = costs.into_iter().zip(shifts).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let nearest = bench.fit(vec![]).cost(&start(0.0));
+    (best < nearest).then(|| start(s))
+}
+
+/// The linear refit. A refit moves the motion that it was made along: once more, from there. Without repeats it moves the noise
+/// too.
+pub fn refit(bench: &mut Bench, iterations: usize) -> Model {
+    let mut baseline = fitted(bench, vec![], &vec![0.0; bench.form.knobs.len()], iterations);
+    if baseline.excess_sigma() > FAR_OFF
+        && let Some(start) = late(bench)
+    {
+        let other = fitted(bench, vec![], &start, iterations);
+        if other.cost < baseline.cost {
+            baseline = other;
+        }
+    }
+    for _ in 0..if bench.levels.from_repeats { 1 } else { SETTLING } {
+        bench.correct(&baseline.refitted.p, &[]);
+        if !bench.levels.from_repeats {
+            bench.renew(&baseline.refitted.p, &[]);
+        }
+        let before = baseline.refitted.p.clone();
+        baseline = fitted(bench, vec![], &before, iterations);
+        let moved = before.iter().zip(&baseline.refitted.p).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        if moved < SETTLED {
+            break;
+        }
+    }
+    baseline
+}
