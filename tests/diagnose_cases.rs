@@ -109,7 +109,10 @@ fn record(name: &str, role: Role, group: &str, command: &[f64], position: Vec<f6
 }
 
 fn diagnosed(truth: &Truth) -> Diagnosis {
-    let records = records(truth);
+    diagnosed_from(records(truth))
+}
+
+fn diagnosed_from(records: Vec<(RecordEntry, Record)>) -> Diagnosis {
     let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
     diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
 }
@@ -156,6 +159,36 @@ fn more_delay_is_named_and_measured() {
     assert_eq!(d.findings[0].effect, "extra_delay", "{:?}", d.verdict);
     let e = &d.findings[0].parameters["delay_s"];
     assert!((e.value / MORE - 1.0).abs() < 0.05 && e.low < MORE && MORE < e.high, "{e:?}");
+}
+
+#[test]
+fn a_position_before_its_command_is_a_log_that_slipped() {
+    // Four samples early under a delay of 1.3: no machine answers before it is asked.
+    let mut slipped = records(&GIVEN);
+    for (_, r) in &mut slipped {
+        r.position.rotate_left(4);
+        let last = r.position[N - 5];
+        r.position[N - 4..].fill(last);
+    }
+    let d = diagnosed_from(slipped);
+    assert_eq!((d.verdict, d.findings[0].effect.as_str()), (Verdict::DataFault, "misalignment"));
+    let samples = &d.findings[0].parameters["samples"];
+    assert!(samples.low < -4.0 && -4.0 < samples.high, "{samples:?}");
+}
+
+#[test]
+fn a_position_in_other_units_or_signs_is_a_fault_without_a_controller_too() {
+    for factor in [25.4, 1e-3, -1.0] {
+        let mut scaled = records(&GIVEN);
+        scaled.iter_mut().flat_map(|(_, r)| &mut r.position).for_each(|y| *y *= factor);
+        let d = diagnosed_from(scaled);
+        assert_eq!(d.verdict, Verdict::DataFault, "{factor}");
+        let found = d.findings[0].parameters["position_factor"].value;
+        // The sensor's noise is a thousandth of the motion.
+        assert!((found / factor - 1.0).abs() < 0.01, "{found} for {factor}");
+    }
+    // A machine with four times the gain of its model is a refit, not a fault of the log.
+    assert_eq!(diagnosed(&Truth { b: 4.0 * GIVEN.b, ..GIVEN }).verdict, Verdict::Refit);
 }
 
 #[test]

@@ -78,11 +78,13 @@ pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagno
     settings.select.bootstrap = a.bootstrap as usize;
     let mut made =
         diagnose(&case, &plant, controller.as_ref(), &settings, |m| screen.say(&format!("{}: {m}", case.id)))?;
-    if !matches!(made.diagnosis.verdict, Verdict::NoMismatch | Verdict::DataFault) {
+    if made.diagnosis.corrects() {
         let text =
             toml::to_string(&PlantFile::from(&made.corrected.plant)).map_err(|source| Failure::Toml { source })?;
         write_text(&a.out.join(CORRECTED), &text)?;
         made.diagnosis.corrected_model = Some(CORRECTED.into());
+    } else if made.diagnosis.verdict == Verdict::LocatedUnexplained {
+        made.diagnosis.remarks.push("no corrected plant is written: it would simulate worse than the given one".into());
     }
     screen.say(&format!("{}: drawing the report", case.id));
     let page = diagnosis_page(&made, provenance(&case))?;

@@ -191,3 +191,16 @@ pub struct Diagnosis {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bootstrap: Option<Bootstrap>,
 }
+
+impl Diagnosis {
+    /// Whether the corrected plant is fit for use: a stand-in for what has no name is none where it simulates worse than the given
+    /// plant does on the records that were not used, or on those of the fit where there are no others.
+    pub fn corrects(&self) -> bool {
+        let figures = self.fit.holdout.unwrap_or(self.fit.fit);
+        match self.verdict {
+            Verdict::NoMismatch | Verdict::DataFault => false,
+            Verdict::LocatedUnexplained => figures.rms_after <= figures.rms_before,
+            _ => true,
+        }
+    }
+}
