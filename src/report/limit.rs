@@ -62,10 +62,12 @@ pub fn limit_sentences(
         }
         text += &alone.map_or_else(String::new, gains_sentence);
         if limit.sum.objective > 0.0 {
-            text += &format!(
-                "These gains are within {:.1} % of the best of all loops of the class (proven bound).\n",
-                percent(g.figures.objective, limit.sum.objective)
-            );
+            let above = percent(g.figures.objective, limit.sum.objective);
+            text += &if g.tail > limit.tail {
+                format!("These gains are {above:.1} % above the bound of a class to which they do not belong.\n")
+            } else {
+                format!("These gains are within {above:.1} % of the best of all loops of the class (proven bound).\n")
+            };
         }
     }
     if limit.sum.missed > 0.01 {
