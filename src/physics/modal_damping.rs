@@ -5,7 +5,7 @@
 //! growing damping minus that without.
 //!
 //! Or, where the resonance is a stage of a chain and its damper feels the stage's rate: zeta_j (1 + g |q1|), q1 the rate of the
-//! stage's deflection over w_j ([`Stage`]).
+//! stage's deflection over w_j (`physics::stage`).
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::mode_shift::mode;

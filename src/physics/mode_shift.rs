@@ -4,7 +4,7 @@
 //! column is the mode's share of the position with the shift minus that without. To first order this is (x - x0) c times
 //! the plant's derivative by ln w_j.
 //!
-//! Or, where the resonance is a stage of a chain, its pole and zero move together ([`Stage`]).
+//! Or, where the resonance is a stage of a chain, its pole and zero move together (`physics::stage`).
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::pair::Pair;
