@@ -52,6 +52,7 @@ struct Answer {
     samples: usize,
 }
 
+/// The answer to one push, over `n` samples.
 fn answer(bench: &Bench, sampled: &Sampled, n: usize, width_s: f64) -> Option<Answer> {
     let t = bench.scene.sample_time_s;
     let samples = (0..n).map(|k| Sample { t: k as f64 * t, ..Sample::default() }).collect();

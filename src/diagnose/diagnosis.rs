@@ -265,7 +265,8 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
                 h.whitened[0]
             ));
         }
-        if selection.mixture() {
+        let mixture = bench.levels.from_repeats && selection.mixture();
+        if mixture {
             let laws: Vec<&str> = model.chosen.iter().map(|c| c.effect.facts().name).collect();
             d.remarks.push(format!(
                 "it takes {} together to explain the records and none leads: likelier one thing that the library lacks; the corrected plant carries the mixture as a stand-in",
@@ -280,11 +281,7 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
                 100.0 * l.share
             ));
         }
-        if (explained >= NAMED_SHARE || clean || decisive)
-            && holds
-            && against.is_none()
-            && beside.is_none()
-            && !selection.mixture()
+        if (explained >= NAMED_SHARE || clean || decisive) && holds && against.is_none() && beside.is_none() && !mixture
         {
             if !clean && explained < NAMED_SHARE {
                 d.remarks.push(format!(

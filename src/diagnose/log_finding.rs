@@ -6,90 +6,68 @@ use super::name::{everywhere, plain, text_of};
 use super::run::Run;
 use std::collections::BTreeMap;
 
-/// The position log is shifted.
+/// The position log is shifted: the documented controller says by how much.
 pub(super) fn misalignment(r: &Replay, sample_time_s: f64, runs: &[&Run]) -> Finding {
-    let (says, port) = text_of("misalignment");
-    let parameters = BTreeMap::from([
-        (
-            "samples".to_owned(),
-            Estimate {
-                value: r.shift_samples,
-                low: r.shift_samples - 0.05,
-                high: r.shift_samples + 0.05,
-                unit: "samples".into(),
-            },
-        ),
-        ("shift_s".to_owned(), plain(r.shift_samples * sample_time_s, "s")),
-    ]);
-    Finding {
-        effect: "misalignment".into(),
-        family: vec!["misalignment".into()],
-        port,
-        p_value: 1e-300,
-        says: format!(
-            "In the log {says}: shifted by {:.2} samples, the documented controller gives the recorded command again.",
-            r.shift_samples
-        ),
-        parameters,
-        place: everywhere(runs),
-    }
-}
-
-/// Position or command is logged in other units, or with the other sign.
-pub(super) fn scale(r: &Replay, runs: &[&Run]) -> Finding {
-    let parameters = BTreeMap::from([
-        ("position_factor".to_owned(), plain(r.position_factor, "1")),
-        ("command_factor".to_owned(), plain(r.command_factor, "1")),
-    ]);
-    let sign = if r.position_factor < 0.0 { "with the sign turned round" } else { "in other units" };
-    Finding {
-        effect: "linear_parameters".into(),
-        family: vec!["linear_parameters".into()],
-        port: crate::physics::Port::Time,
-        p_value: 1e-300,
-        says: format!(
-            "The position is logged {sign}: the controller's command follows from the log only with a factor of {:.6}.",
-            r.position_factor
-        ),
-        parameters,
-        place: everywhere(runs),
-    }
+    let why = format!(
+        "shifted by {:.2} samples, the documented controller gives the recorded command again",
+        r.shift_samples
+    );
+    slipped(r.shift_samples, 0.05, sample_time_s, &why, runs)
 }
 
 /// The position comes before the command that made it.
 pub(super) fn early(shift_samples: f64, sample_time_s: f64, runs: &[&Run]) -> Finding {
+    let why = format!(
+        "the position comes {:.0} samples before the model's answer to the command, more than all of its delay",
+        -shift_samples
+    );
+    slipped(shift_samples, 0.5, sample_time_s, &why, runs)
+}
+
+/// The position log is off by so many samples, known to `off`.
+fn slipped(samples: f64, off: f64, sample_time_s: f64, why: &str, runs: &[&Run]) -> Finding {
     let (says, port) = text_of("misalignment");
-    let whole =
-        Estimate { value: shift_samples, low: shift_samples - 0.5, high: shift_samples + 0.5, unit: "samples".into() };
+    let shift = Estimate { value: samples, low: samples - off, high: samples + off, unit: "samples".into() };
+    let parameters =
+        BTreeMap::from([("samples".to_owned(), shift), ("shift_s".to_owned(), plain(samples * sample_time_s, "s"))]);
     Finding {
         effect: "misalignment".into(),
         family: vec!["misalignment".into()],
         port,
         p_value: 1e-300,
-        says: format!(
-            "In the log {says}: the position comes {:.0} samples before the model's answer to the command, more than all of its delay.",
-            -shift_samples
-        ),
-        parameters: BTreeMap::from([
-            ("samples".to_owned(), whole),
-            ("shift_s".to_owned(), plain(shift_samples * sample_time_s, "s")),
-        ]),
+        says: format!("In the log {says}: {why}."),
+        parameters,
         place: everywhere(runs),
     }
+}
+
+/// Position or command is logged in other units, or with the other sign: the documented controller says so.
+pub(super) fn scale(r: &Replay, runs: &[&Run]) -> Finding {
+    let sign = if r.position_factor < 0.0 { "with the sign turned round" } else { "in other units" };
+    let factors = [
+        ("position_factor".to_owned(), plain(r.position_factor, "1")),
+        ("command_factor".to_owned(), plain(r.command_factor, "1")),
+    ];
+    let why = format!("the controller's command follows from the log only with a factor of {:.6}", r.position_factor);
+    scaled(sign, &why, BTreeMap::from(factors), runs)
 }
 
 /// The position follows the model only with a factor that no machine of this model can have.
 pub(super) fn unit(factor: f64, runs: &[&Run]) -> Finding {
     let sign = if factor < 0.0 { "with the sign turned round" } else { "in other units than the model" };
+    let why = format!("it follows the command as the model says, but times {factor:.6}");
+    scaled(sign, &why, BTreeMap::from([("position_factor".to_owned(), plain(factor, "1"))]), runs)
+}
+
+/// The position is logged with a factor.
+fn scaled(sign: &str, why: &str, parameters: BTreeMap<String, Estimate>, runs: &[&Run]) -> Finding {
     Finding {
         effect: "linear_parameters".into(),
         family: vec!["linear_parameters".into()],
         port: crate::physics::Port::Time,
         p_value: 1e-300,
-        says: format!(
-            "The position is logged {sign}: it follows the command as the model says, but times {factor:.6}."
-        ),
-        parameters: BTreeMap::from([("position_factor".to_owned(), plain(factor, "1"))]),
+        says: format!("The position is logged {sign}: {why}."),
+        parameters,
         place: everywhere(runs),
     }
 }

@@ -1,15 +1,13 @@
 //! What the logs of a case say before any model is fitted: sound, slipped, in other units, or made by another controller.
 
+use super::answers::Answers;
 use super::bench::scene;
 use super::finding::Finding;
 use super::hygiene::{Replay, SampleFault, replay_records, sample_faults, slips};
 use super::judge::{Judged, error};
-use super::linear::{Sampled, free_motions};
 use super::run::Run;
-use super::stack::Basis;
 use crate::controller::Law;
 use crate::lti::{LtiError, Plant};
-use crate::numeric::least_squares::dot;
 use crate::recording::Case;
 
 /// What the logs are worth.
@@ -72,12 +70,11 @@ pub(super) fn check(
         }
     }
     if hygiene.replay.is_none() {
-        let follows = follows(given, runs, sample_time_s)?;
-        if !follows.possible() {
-            let all: Vec<&Run> = runs.iter().collect();
-            hygiene.finding = Some(super::log_finding::unit(follows.factor, &all));
-        } else if let Some(early) = early(given, runs, sample_time_s, &follows)? {
-            let all: Vec<&Run> = runs.iter().collect();
+        let all: Vec<&Run> = runs.iter().collect();
+        let answers = Answers::of(given, runs, sample_time_s)?;
+        if let Some(factor) = answers.other_unit() {
+            hygiene.finding = Some(super::log_finding::unit(factor, &all));
+        } else if let Some(early) = answers.early(given.delay_s / sample_time_s) {
             hygiene.finding = Some(super::log_finding::early(-early, sample_time_s, &all));
             runs.iter_mut().for_each(|r| shift(r, -early));
         }
@@ -90,69 +87,6 @@ pub(super) fn check(
     Ok(hygiene)
 }
 
-/// Factor of the gain beyond which no machine differs from its model, but its log does.
-const OTHER_UNIT: f64 = 8.0;
-/// Share of the position's energy that the scaled model must explain.
-const ALIKE: f64 = 0.8;
-
-/// How the position follows the given plant's answer to the recorded command.
-struct Follows {
-    /// Times what.
-    factor: f64,
-    /// Energy of the position that it leaves, and all of it.
-    left: f64,
-    whole: f64,
-}
-
-impl Follows {
-    /// Whether a machine of this model can do so: where the position follows the command at all, not in other units or signs.
-    fn possible(&self) -> bool {
-        let alike = self.left < (1.0 - ALIKE) * self.whole;
-        !alike || (self.factor > OTHER_UNIT.recip() && self.factor < OTHER_UNIT)
-    }
-}
-
-fn follows(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Follows, LtiError> {
-    let sampled = Sampled::of(given, sample_time_s)?;
-    let (mut ss, mut sy, mut yy) = (0.0, 0.0, 0.0);
-    for run in runs {
-        let mut basis = Basis::default();
-        free_motions(&given.body, sample_time_s, run.len()).into_iter().for_each(|c| basis.add_local(0, c));
-        let input: Vec<f64> = run.input.iter().map(|u| u - run.before).collect();
-        let mut s = vec![0.0; run.len()];
-        sampled.delayed.add_response(&input, &mut s);
-        let mut y = run.position.clone();
-        [&mut s, &mut y].into_iter().for_each(|x| basis.project(x));
-        (ss, sy, yy) = (ss + dot(&s, &s), sy + dot(&s, &y), yy + dot(&y, &y));
-    }
-    Ok(Follows { factor: sy / ss, left: (yy - sy * sy / ss).max(0.0), whole: yy })
-}
-
-/// Most samples by which a position is taken to be early, and the share of the error that moving it back must take.
-const EARLIEST: usize = 20;
-const MOVED_BACK: f64 = 0.3;
-
-/// By how many samples the position comes before the command that made it can have acted: no machine does that, a log that slipped does.
-/// None where moving it back does not help far more than all of the model's own delay.
-fn early(given: &Plant, runs: &[Run], sample_time_s: f64, unmoved: &Follows) -> Result<Option<f64>, LtiError> {
-    let left = |by: f64| -> Result<f64, LtiError> {
-        let mut moved = runs.to_vec();
-        moved.iter_mut().for_each(|r| shift(r, -by));
-        Ok(follows(given, &moved, sample_time_s)?.left)
-    };
-    let mut best = (unmoved.left, 0.0);
-    for by in 1..=EARLIEST {
-        let now = left(by as f64)?;
-        if now > best.0 {
-            break;
-        }
-        best = (now, by as f64);
-    }
-    let own = given.delay_s / sample_time_s;
-    // Up to the model's own delay it may be a machine that is faster than its model.
-    Ok((best.0 < MOVED_BACK * unmoved.left && best.1 > own + 0.5).then_some(best.1))
-}
-
 /// The given plant's answer to each record's command, its free motions fitted to the position: the motion without the noise.
 fn smooth(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Vec<Vec<f64>>, LtiError> {
     let scene = scene(given, runs, sample_time_s, None);
@@ -163,11 +97,16 @@ fn smooth(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Vec<Vec<f64
 
 /// Moves the position log against the others by a real number of samples.
 fn shift(run: &mut Run, samples: f64) {
-    let y = run.position.clone();
+    run.position = shifted(&run.position, samples);
+}
+
+/// A series as it reads a real number of samples later.
+pub(super) fn shifted(y: &[f64], samples: f64) -> Vec<f64> {
     let last = y.len() - 1;
-    for (k, p) in run.position.iter_mut().enumerate() {
+    let at = |k: usize| {
         let at = (k as f64 + samples).clamp(0.0, last as f64);
         let (i, f) = (at.floor() as usize, at.fract());
-        *p = if f == 0.0 { y[i] } else { y[i] + f * (y[(i + 1).min(last)] - y[i]) };
-    }
+        if f == 0.0 { y[i] } else { y[i] + f * (y[(i + 1).min(last)] - y[i]) }
+    };
+    (0..y.len()).map(at).collect()
 }

@@ -4,6 +4,7 @@
 //! simulated position; effects are driven by the recorded motion, so that their answer is exact whatever their size; whitened
 //! errors have variance 1 under noise alone. Spec: `specs/mismatch.md`.
 
+mod answers;
 mod bench;
 mod bootstrap;
 mod bump;

@@ -5,8 +5,7 @@
 
 use super::bench::Bench;
 use super::name::family_width;
-use super::refit::Chosen;
-use super::select::{Model, OWN};
+use super::select::{Model, OWN, Step, gain_of};
 use super::simulated::simulated;
 
 /// Another law in the place of one effect of the model, everything else refitted.
@@ -33,13 +32,13 @@ pub(super) fn by_simulation(
     model: &mut Model,
     by_simulation: &mut Model,
     rivals: &mut [Vec<Rival>],
-    gain: impl Fn(&Chosen) -> f64,
+    steps: &[Step],
 ) {
     for at in 0..rivals.len().min(model.chosen.len()) {
         if by_simulation.cost > NO_JUDGE * model.cost {
             return;
         }
-        let won = gain(&model.chosen[at]);
+        let won = gain_of(steps, &model.chosen[at]);
         let width = family_width(won).max(DOUBT * won);
         let mut best: Option<(f64, usize, Model)> = None;
         for (i, r) in rivals[at].iter_mut().enumerate() {

@@ -107,8 +107,6 @@ pub struct Selection {
     pub simulated: Option<Model>,
     /// For each effect of the model, others in its place.
     pub rivals: Vec<Vec<Rival>>,
-    /// Whether repeats tell what noise is.
-    pub noise_known: bool,
     /// What is still seen in the error of the final model, beyond chance.
     pub leftover: Option<Leftover>,
     /// The search on records without physics, where it was asked for.
@@ -126,12 +124,9 @@ impl Selection {
         gain_of(&self.steps, &self.model.chosen[at])
     }
 
-    /// Whether several laws share the work and none leads: one thing that the library lacks is likelier than so many that it has. Where
-    /// no repeat tells what noise is, what they explain is told in logarithms, and nothing is said of shares.
+    /// Whether several laws share the work and none leads: one thing that the library lacks is likelier than so many that it has. Says
+    /// something only where repeats tell what noise is: otherwise what laws explain is told in logarithms, not in shares.
     pub fn mixture(&self) -> bool {
-        if !self.noise_known {
-            return false;
-        }
         let gains: Vec<f64> = (0..self.model.chosen.len()).map(|at| self.gain(at)).collect();
         gains.len() >= MANY && gains.iter().copied().fold(0.0, f64::max) < LEADS * gains.iter().sum::<f64>()
     }
@@ -285,11 +280,10 @@ pub fn select(
     let mut simulated = simulated(bench, &model);
     if let Some(s) = &mut simulated {
         spare(bench, &mut model, s, &mut rivals, &steps, baseline.cost, settings.iterations);
-        by_simulation(bench, &mut model, s, &mut rivals, |c| gain_of(&steps, c));
+        by_simulation(bench, &mut model, s, &mut rivals, &steps);
     }
     let leftover = leftover(bench, library, &model, simulated.as_ref(), &steps, (baseline.cost, limit));
-    let noise_known = bench.levels.from_repeats;
-    Selection { given, baseline, steps, model, simulated, rivals, noise_known, leftover, bootstrap: calibration }
+    Selection { given, baseline, steps, model, simulated, rivals, leftover, bootstrap: calibration }
 }
 
 /// Free numbers of a candidate.

@@ -75,11 +75,7 @@ pub(super) fn exchange(bench: &Bench, model: &mut Model, steps: &[Step], iterati
     let mut all = Vec::new();
     for at in 0..model.chosen.len() {
         let step = &steps[model.chosen[at].step];
-        let Some(taken) = step.taken.map(|t| &step.tried[t]) else {
-            all.push(Vec::new());
-            continue;
-        };
-        let gain = step.before - taken.1.evidence;
+        let gain = gain_of(steps, &model.chosen[at]);
         let mut found: Vec<Rival> = Vec::new();
         for (i, tried) in &step.tried {
             let c = &step.candidates[*i];

@@ -78,7 +78,7 @@ struct Damper {
 
 impl Damper {
     fn next(&self, from: &Sample) -> Next {
-        self.stage.next(from.i, |s, x| {
+        self.stage.next(from.i, 0.0, |s, x| {
             let damping = |rate: f64| s.damping * (1.0 + self.growth * rate).clamp(FACTOR[0], FACTOR[1]);
             let rate = s.moved[1].abs();
             let guess = s.moved_by(s.w_rad_s, damping(rate), x);

@@ -73,7 +73,7 @@ struct Sliding {
 impl Sliding {
     fn next(&self, from: &Sample, to: &Sample) -> Next {
         let by = 1.0 + (self.slope * (0.5 * (from.x + to.x) - self.centre)).clamp(-LARGEST, LARGEST);
-        self.stage.next(from.i, |s, x| s.moved_by(s.w_rad_s * by, s.damping, x))
+        self.stage.next(from.i, by, |s, x| s.moved_by(s.w_rad_s * by, s.damping, x))
     }
 }
 

@@ -42,8 +42,8 @@ pub(super) struct Stage {
 /// A step taken on trial.
 #[derive(Clone, Copy)]
 pub(super) struct Next {
-    /// Under which command.
-    i: f64,
+    /// Under which command, and what else the law looked at.
+    under: [f64; 2],
     x: f64,
     moved: [f64; 2],
     plain: [f64; 2],
@@ -93,14 +93,14 @@ impl Stage {
         Swing::of(w, z, self.step).next(self.moved, [self.x, x])
     }
 
-    /// The next sample under the command `i`; the law moves the pole, knowing the stage and what enters then. Asked for again under
-    /// one command, the law must be the same.
-    pub(super) fn next(&self, i: f64, law: impl Fn(&Stage, f64) -> [f64; 2]) -> Next {
-        if let Some(next) = self.ahead.get().filter(|n| n.i == i) {
+    /// The next sample under the command `i`; the law moves the pole, knowing the stage, what enters then and `by`, all else that it goes by.
+    pub(super) fn next(&self, i: f64, by: f64, law: impl Fn(&Stage, f64) -> [f64; 2]) -> Next {
+        let under = [i, by];
+        if let Some(next) = self.ahead.get().filter(|n| n.under == under) {
             return next;
         }
         let x = self.entering(i);
-        let next = Next { i, x, moved: law(self, x), plain: self.swing.next(self.plain, [self.x, x]) };
+        let next = Next { under, x, moved: law(self, x), plain: self.swing.next(self.plain, [self.x, x]) };
         self.ahead.set(Some(next));
         next
     }
