@@ -242,8 +242,13 @@ fn a_delay_reads_the_past_and_a_lag_falls_behind() {
     let missing: f64 = run(law("amplifier_lag", &[5.0 * T]).as_mut(), &step).iter().map(|o| o[0]).sum();
     assert!((missing + 5.0).abs() < 1e-9);
     // A limiter climbs in equal steps: 1 - k/4 is missing.
-    let slew = run(law("slew_limit", &[0.25 / T]).as_mut(), &step);
+    let slew = run(law("slew_limit", &[0.25 / T, 0.0]).as_mut(), &step);
     assert!((0..5).all(|k| (slew[k][0] + 1.0 - 0.25 * (k + 1).min(4) as f64).abs() < 1e-12));
+    // Ramping between the samples, the triangle above the ramp is missing: height 1, base 1/S.
+    for slope in [0.3, 0.25, 2.5] {
+        let ramp = run(law("slew_limit", &[slope / T, 1.0]).as_mut(), &step);
+        assert!((ramp.iter().map(|o| o[0]).sum::<f64>() + 0.5 / slope).abs() < 1e-12, "{slope}");
+    }
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod answers;
 mod bench;
 mod bootstrap;
 mod bump;
+mod clock;
 mod columns;
 mod corrected;
 mod diagnosis;

@@ -1,6 +1,7 @@
 //! From numbers to findings: names, families, sentences, intervals.
 
 use super::bench::Bench;
+use super::clock::Clock;
 use super::columns::position_columns;
 use super::finding::{Diagnosis, Estimate, Finding, Verdict, Where};
 use super::linear::{Knob, LinearForm, Sampled, body_numbers};
@@ -10,6 +11,7 @@ use super::rival::Rival;
 use super::run::Run;
 use super::scan::log_tail;
 use super::select::Selection;
+use super::simulated::simulated_with;
 use crate::physics::{Parameter, Setting, effect, facts, library};
 use std::collections::BTreeMap;
 
@@ -250,13 +252,22 @@ fn statistic(name: &str, parameter: (&str, Estimate), p_value: f64, runs: &[&Run
     }
 }
 
-/// Sum of squares with only some of the linear parameters free, and with one effect more where it is given.
+/// Sum of squares with only some of the linear parameters free, and with one effect more where it is given; by simulation where the
+/// model was fitted so.
 fn restricted(
     bench: &Bench,
     keep: impl Fn(Knob) -> bool,
     selection: &Selection,
     more: Option<Chosen>,
 ) -> (f64, Vec<f64>, usize) {
+    if let Some(model) = &selection.simulated {
+        let mut model = model.clone();
+        model.chosen.extend(more);
+        let (cost, p) = simulated_with(bench, &model, &keep);
+        let at: Vec<f64> = (0..p.len()).filter(|&i| keep(bench.form.knobs[i])).map(|i| p[i]).collect();
+        let free = at.len();
+        return (cost, at, free);
+    }
     let knobs: Vec<Knob> = bench.form.knobs.iter().copied().filter(|k| keep(*k)).collect();
     let form = LinearForm { knobs: knobs.clone(), ..bench.form.clone() };
     let start = vec![0.0; knobs.len()];
@@ -292,7 +303,7 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
     if d.verdict == Verdict::LocatedUnexplained || d.verdict == Verdict::DataFault {
         return;
     }
-    let full = selection.model.cost;
+    let full = selection.last().cost;
     let all = bench.form.knobs.len() as f64;
     // Chi-square of as many parameters as were freed, and four of its standard deviations.
     let allowed = |free: usize| {
@@ -337,6 +348,14 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
         }
         d.findings.push(f);
         return;
+    }
+    if d.findings.is_empty() && selection.model.chosen.is_empty() {
+        let clock = Clock::of(bench, fixed);
+        if clock.cost - full < allowed(1) {
+            d.verdict = Verdict::DataFault;
+            d.findings.push(clock.finding(bench));
+            return;
+        }
     }
     if d.verdict == Verdict::NoMismatch {
         d.verdict = Verdict::Refit;

@@ -5,7 +5,7 @@ use super::columns::{Drive, drive};
 use super::linear::{Carrier, LinearForm, Sampled, free_motions};
 use super::lines::Line;
 use super::run::Run;
-use super::stack::{Basis, Stack};
+use super::stack::{Basis, Segment, Stack};
 use super::trajectory::Trajectory;
 use super::whiten::Whitener;
 use crate::lti::Plant;
@@ -93,6 +93,7 @@ const INNER_STEP: f64 = 1e-3;
 
 struct Problem<'a, 'f> {
     fit: &'a Fit<'f>,
+    /// Directions of each record's own, those of the effects aside: they move with the inner parameters.
     local: Basis,
     /// Inner parameters to refine: effect and place.
     inner: Vec<(usize, usize)>,
@@ -157,8 +158,19 @@ impl Problem<'_, '_> {
             fit.whitener.apply(&mut e);
             all.extend(e.into_iter().map(|v| s.weight * v));
         }
-        self.local.project(&mut all);
+        self.taken(&self.settings(x)).project(&mut all);
         all
+    }
+
+    /// Every direction of each record's own.
+    fn taken(&self, settings: &[Setting]) -> Cow<'_, Basis> {
+        let chosen: Vec<(&dyn Effect, &[f64])> =
+            self.fit.chosen.iter().zip(settings).map(|(c, s)| (c.effect as &dyn Effect, &s.inner[..])).collect();
+        let mut basis = Cow::Borrowed(&self.local);
+        for (start, column) in self.fit.free(&chosen) {
+            basis.to_mut().add_local(start, column);
+        }
+        basis
     }
 }
 
@@ -260,8 +272,29 @@ impl Residuals for Problem<'_, '_> {
 }
 
 impl Fit<'_> {
-    /// Directions of each record's own start, constant torque and lines.
+    /// Whitened motions of their own that effects may begin a record in, with the first sample of each.
+    fn free(&self, effects: &[(&dyn Effect, &[f64])]) -> Vec<(usize, Vec<f64>)> {
+        let of = |s: &Segment| {
+            let all = effects.iter().flat_map(|(e, inner)| e.free(inner, self.scene, s.len));
+            all.map(|mut c| {
+                self.whitener.apply(&mut c);
+                (s.start, c)
+            })
+            .collect::<Vec<_>>()
+        };
+        self.stack.segments.iter().flat_map(of).collect()
+    }
+
+    /// Directions of each record's own start, constant torque and lines, and of what the effects may begin it in.
     pub fn local_basis(&self) -> Basis {
+        let mut basis = self.plain_basis();
+        let chosen: Vec<(&dyn Effect, &[f64])> =
+            self.chosen.iter().map(|c| (c.effect as &dyn Effect, &c.setting.inner[..])).collect();
+        self.free(&chosen).into_iter().for_each(|(start, c)| basis.add_local(start, c));
+        basis
+    }
+
+    fn plain_basis(&self) -> Basis {
         let mut basis = Basis::default();
         for (s, run) in self.stack.segments.iter().zip(self.means) {
             let t = self.scene.sample_time_s;
@@ -283,7 +316,7 @@ impl Fit<'_> {
             }
             inner.extend((0..c.setting.inner.len()).filter(|&i| c.continuous[i]).map(|i| (e, i)));
         }
-        Problem { fit: self, local: self.local_basis(), inner, strengths, drives: Vec::new() }
+        Problem { fit: self, local: self.plain_basis(), inner, strengths, drives: Vec::new() }
     }
 
     fn start(&self, p: &[f64], problem: &Problem) -> Vec<f64> {
@@ -349,7 +382,7 @@ impl Fit<'_> {
         let rows = self.stack.total;
         let mut jacobian = vec![0.0; rows * problem.cols()];
         problem.jacobian(&x, &mut jacobian);
-        let mut basis = problem.local.clone();
+        let mut basis = problem.taken(&problem.settings(&x)).into_owned();
         for column in jacobian.chunks_exact(rows) {
             basis.add(column.to_vec());
         }

@@ -9,13 +9,12 @@
 
 use super::bench::Bench;
 use super::corrected::corrected;
-use super::judge::{Judged, Started, started};
+use super::judge::{Begun, Judged, Started, size};
 use super::linear::Knob;
 use super::refit::{Chosen, Refitted};
 use super::run::Run;
 use super::select::Model;
 use super::stack::Basis;
-use crate::numeric::least_squares::dot;
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
 use crate::physics::Effect;
 use rayon::prelude::*;
@@ -26,6 +25,10 @@ const ITERATIONS: usize = 12;
 const TOLERANCE: f64 = 1e-6;
 /// Rounds in which a start is found.
 const ROUNDS: usize = 3;
+/// Most fits one after the other, and the relative fall of the error by one for which another is made: starts that are found anew may
+/// open a way further down.
+const AGAIN: usize = 3;
+const FURTHER: f64 = 1e-4;
 /// Step in a linear parameter.
 const STEP: f64 = 1e-4;
 /// Relative steps in strengths and inner parameters: laws have kinks, and smaller steps see only them.
@@ -60,6 +63,8 @@ struct Record<'a> {
     share: f64,
     /// The free motion that it starts with, as found last: near enough for what is not far.
     start: Vec<f64>,
+    /// What the motions of a start come to, laws resisting, around that one; as the linear plant has it where none was felt yet.
+    felt: Option<Vec<Vec<f64>>>,
     /// The constant torque on it where it does not begin at rest (command_unit).
     constant: Option<f64>,
 }
@@ -86,8 +91,8 @@ impl Problem<'_> {
         (p, chosen)
     }
 
-    /// Every record simulated, from the starts found last; infinite where it runs away.
-    fn simulate(&self, x: &[f64], rounds: usize) -> Vec<Started> {
+    /// Does something with every record under the model at `x`, in parallel.
+    fn each<T: Send>(&self, x: &[f64], of: impl Fn(&Record, &Judged) -> T + Sync) -> Vec<T> {
         let bench = self.bench;
         let (p, chosen) = self.unpack(x);
         let made = corrected(&bench.form, &p, &chosen, &bench.scene);
@@ -100,11 +105,18 @@ impl Problem<'_> {
             fit: None,
             scene: &bench.scene,
         };
-        let away = |run: &Run| Started { error: vec![f64::INFINITY; run.len()], free: vec![0.0; run.len()] };
-        let one = |r: &Record| {
-            started(&judged, r.run, None, r.constant, r.start.clone(), rounds).unwrap_or_else(|_| away(r.run))
-        };
-        self.records.par_iter().map(one).collect()
+        self.records.par_iter().map(|r| of(r, &judged)).collect()
+    }
+
+    /// Every record simulated, from the starts found last; infinite where it runs away.
+    fn simulate(&self, x: &[f64], rounds: usize) -> Vec<Started> {
+        self.each(x, |r, judged| {
+            let one = || {
+                let begun = Begun::new(judged, r.run, None, r.constant)?;
+                begun.found(r.start.clone(), r.felt.as_ref().unwrap_or(&begun.linear), rounds)
+            };
+            one().unwrap_or_else(|_| Started { error: vec![f64::INFINITY; r.run.len()], free: vec![0.0; r.run.len()] })
+        })
     }
 
     /// Whitened simulation error, the mean over the repeats of each segment, one stacked vector, each segment's own directions taken out.
@@ -128,13 +140,29 @@ impl Problem<'_> {
         out
     }
 
-    /// Finds the starts at `x` anew and keeps them; gives the whitened error.
+    /// Finds the starts at `x` anew, keeps them and gives the whitened error.
+    ///
+    /// From rest each time: with a drag a start has more than one place where no small move betters it, and one that was right for
+    /// other numbers holds the fit back.
     fn settle(&mut self, x: &[f64]) -> Vec<f64> {
-        let all = self.simulate(x, ROUNDS);
-        for (r, s) in self.records.iter_mut().zip(&all) {
-            if s.free.iter().all(|v| v.is_finite()) {
-                r.start.clone_from(&s.free);
-            }
+        let found = self.each(x, |r, judged| {
+            let begun = Begun::new(judged, r.run, None, r.constant)?;
+            let near = begun.found(vec![0.0; r.run.len()], &begun.linear, 2)?;
+            begun.better(near.free, ROUNDS)
+        });
+        let mut all = Vec::with_capacity(self.records.len());
+        for (r, found) in self.records.iter_mut().zip(found) {
+            let sound = found.ok().filter(|(s, f): &(Started, Vec<Vec<f64>>)| {
+                s.free.iter().chain(f.iter().flatten()).all(|v| v.is_finite())
+            });
+            all.push(match sound {
+                Some((started, felt)) => {
+                    r.start.clone_from(&started.free);
+                    r.felt = Some(felt);
+                    started
+                }
+                None => Started { error: vec![f64::INFINITY; r.run.len()], free: r.start.clone() },
+            });
         }
         self.whitened(&all)
     }
@@ -208,11 +236,17 @@ impl<'a> Problem<'a> {
             let run = &bench.runs[r];
             let constant = (!run.rested).then(|| bench.constant_torque(run, model).ok()).flatten();
             let share = 1.0 / bench.stack.segments[segment].runs.len() as f64;
-            Record { run, segment, share, start: vec![0.0; run.len()], constant }
+            Record { run, segment, share, start: vec![0.0; run.len()], felt: None, constant }
         };
         let all = bench.stack.segments.iter().enumerate().flat_map(|(i, s)| s.runs.iter().map(move |r| (i, r)));
         let records = all.map(record).collect();
-        Problem { bench, model, free: Free::of(bench, model), local: bench.fit(vec![]).local_basis(), records }
+        Problem {
+            bench,
+            model,
+            free: Free::of(bench, model),
+            local: bench.fit(model.chosen.clone()).local_basis(),
+            records,
+        }
     }
 }
 
@@ -236,6 +270,20 @@ impl Free {
     }
 }
 
+/// The least simulation error of the model with only some of its body and delay free, all else of the linear plant as given: sum of
+/// squares and linear parameters.
+pub(super) fn simulated_with(bench: &Bench, model: &Model, keep: impl Fn(Knob) -> bool) -> (f64, Vec<f64>) {
+    let mut start = model.clone();
+    let kept = |i: usize| keep(bench.form.knobs[i]);
+    start.refitted.p.iter_mut().enumerate().filter(|(i, _)| !kept(*i)).for_each(|(_, v)| *v = 0.0);
+    let mut problem = Problem::new(bench, &start);
+    problem.free.knobs.retain(|&i| kept(i));
+    let (mut x, mut work) = (problem.start(), Workspace::default());
+    let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
+    let outcome = minimise(&mut problem, &mut x, &settings, &mut work);
+    (outcome.cost, problem.unpack(&x).0)
+}
+
 /// The model with body, delay and effects fitted by simulation; none where it has no effect, where its simulation runs away or where
 /// nothing is won.
 pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
@@ -244,15 +292,23 @@ pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
     }
     let mut problem = Problem::new(bench, model);
     let mut x = problem.start();
-    let before = problem.settle(&x);
-    let before = dot(&before, &before);
+    let before = size(&problem.settle(&x));
     if !(before.is_finite() && before < AWAY * model.cost) {
         return None;
     }
     let mut work = Workspace::default();
     let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
-    let outcome = minimise(&mut problem, &mut x, &settings, &mut work);
-    if !outcome.cost.is_finite() || outcome.cost > before {
+    let (mut cost, mut converged) = (before, false);
+    for _ in 0..AGAIN {
+        let outcome = minimise(&mut problem, &mut x, &settings, &mut work);
+        converged = outcome.converged;
+        let further = outcome.cost < (1.0 - FURTHER) * cost;
+        cost = outcome.cost;
+        if !further {
+            break;
+        }
+    }
+    if !cost.is_finite() || cost > before {
         return None;
     }
     let (p, chosen) = problem.unpack(&x);
@@ -269,8 +325,8 @@ pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
         directions.push(d);
     }
     let plant = bench.form.plant(&p);
-    let refitted = Refitted { p, plant, cost: outcome.cost, directions, converged: outcome.converged };
-    Some(Model { chosen, refitted, cost: outcome.cost, ..model.clone() })
+    let refitted = Refitted { p, plant, cost, directions, converged };
+    Some(Model { chosen, refitted, cost, ..model.clone() })
 }
 
 /// Where each number that was moved stands among all numbers of a fit: linear parameters, strengths, inner parameters.

@@ -6,6 +6,7 @@ use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, P
 use super::sample::Scene;
 use super::share::Share;
 use super::unmodelled_resonance::{Ringing, scan, term};
+use std::f64::consts::TAU;
 
 /// Inner: frequency (Hz), damping ratio. Strength: the base's displacement per constant command.
 pub struct BaseMode;
@@ -43,6 +44,16 @@ impl Effect for BaseMode {
 
     fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
         Box::new(Ringing::at_rest(inner[0], inner[1], scene.sample_time_s, 1))
+    }
+
+    fn free(&self, inner: &[f64], scene: &Scene, n: usize) -> Vec<Vec<f64>> {
+        let (w, z) = (TAU * inner[0], inner[1].clamp(0.0, 1.0));
+        let turning = w * ((1.0 - z) * (1.0 + z)).sqrt();
+        let over = |of: fn(f64) -> f64| {
+            let at = |k: usize| k as f64 * scene.sample_time_s;
+            (0..n).map(|k| (-z * w * at(k)).exp() * of(turning * at(k))).collect()
+        };
+        vec![over(f64::cos), over(f64::sin)]
     }
 
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {

@@ -279,6 +279,11 @@ pub trait Effect: Sync {
         None
     }
 
+    /// Motions of its own over `n` samples that a record may begin in, in the recorded position: what still rings from the move before.
+    fn free(&self, _inner: &[f64], _scene: &Scene, _n: usize) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
     /// Its part in the loop's response at `w_rad_s`, sampled as the law samples it.
     fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Cycle

@@ -1,11 +1,12 @@
 //! The amplifier's current changes at a limited rate.
 //!
-//! i_k = i_(k-1) + clip(u_k - i_(k-1), -S T, S T): the rate limiter of textbooks, in samples.
+//! di/dt = S sgn(u - i) until i = u: behind a converter that holds u over a sample the current ramps to every new value, however small
+//! the step. A digital limiter works at the samples instead: i_k = i_(k-1) + clip(u_k - i_(k-1), -S T, S T).
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene};
 
-/// Inner: the largest slope.
+/// Inner: the largest slope, whether the current ramps between the samples (1) or is limited at them (0).
 pub struct SlewLimit;
 
 static FACTS: Facts = Facts {
@@ -15,7 +16,7 @@ static FACTS: Facts = Facts {
     columns: 1,
     fixed: true,
     per_record: false,
-    equation: "i_k = i_(k-1) + clip(u_k - i_(k-1), -S T, S T)",
+    equation: "di/dt = S sgn(u - i) until i = u, u held over the sample; or i_k = i_(k-1) + clip(u_k - i_(k-1), -S T, S T)",
     says: "the amplifier cannot change its current faster than a limit: quick commands arrive late and rounded",
     confused_with: &["current_saturation", "amplifier_lag"],
     experiment: "the same high-frequency burst at three amplitudes: the lag grows with amplitude times frequency",
@@ -25,23 +26,33 @@ static FACTS: Facts = Facts {
 struct Limiter {
     /// Largest change a sample (command_unit).
     step: f64,
+    ramps: bool,
+    /// At the end of the last sample.
     current: Option<f64>,
 }
 
 impl Limiter {
-    fn next(&self, from: &Sample, to: &Sample) -> f64 {
+    /// The current at the end of the sample, and its mean over it.
+    fn next(&self, from: &Sample, to: &Sample) -> [f64; 2] {
         let now = self.current.unwrap_or(from.u);
-        now + (to.u - now).clamp(-self.step, self.step)
+        let off = to.u - now;
+        let end = now + off.clamp(-self.step, self.step);
+        if !self.ramps {
+            return [end, end];
+        }
+        // The share of the sample that the ramp takes, half of its height missing meanwhile.
+        let share = if off.abs() < self.step { off.abs() / self.step } else { 1.0 };
+        [end, end - 0.5 * share * (end - now)]
     }
 }
 
 impl Law for Limiter {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        out[0] = self.next(from, to) - to.u;
+        out[0] = self.next(from, to)[1] - to.u;
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
-        self.current = Some(self.next(from, to));
+        self.current = Some(self.next(from, to)[0]);
     }
 }
 
@@ -55,18 +66,26 @@ impl Effect for SlewLimit {
         let largest = scene.command_step / scene.sample_time_s;
         // Dense towards it: there few samples are touched, and each point touches others.
         let near = (0..9).map(|i| 1.0 - 0.4 * 0.7f64.powi(i));
-        super::logarithmic(0.02, 0.55, 12).into_iter().chain(near).map(|s| vec![s * largest]).collect()
+        let at = super::logarithmic(0.02, 0.55, 12).into_iter().chain(near).map(|s| vec![s * largest, 0.0]);
+        // A ramp shortens every step a little, also where it ends within the sample.
+        at.chain(super::logarithmic(0.02, 3.0, 20).into_iter().map(|s| vec![s * largest, 1.0])).collect()
     }
 
     fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        Box::new(Limiter { step: inner[0] * scene.sample_time_s, current: None })
+        Box::new(Limiter { step: inner[0] * scene.sample_time_s, ramps: inner[1] != 0.0, current: None })
     }
 
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        vec![Parameter::new("max_slope", setting.inner[0], Unit::CommandPerSecond)]
+        vec![
+            Parameter::new("max_slope", setting.inner[0], Unit::CommandPerSecond),
+            Parameter::new("between_samples", setting.inner[1], Unit::Ratio),
+        ]
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        Ok(Setting { inner: vec![given.positive("max_slope")?], strengths: vec![1.0] })
+        Ok(Setting {
+            inner: vec![given.positive("max_slope")?, given.or("between_samples", 0.0)],
+            strengths: vec![1.0],
+        })
     }
 }
