@@ -328,7 +328,7 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
     }
     linear_story(d, bench, selection);
     if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)
-        && let Some(f) = super::name::noise_story(bench)
+        && let Some(f) = super::name::noise_story(bench).or_else(|| super::unrest::unrest(bench))
     {
         d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
         d.findings.push(f);

@@ -37,6 +37,7 @@ mod settle;
 mod simulated;
 mod stack;
 mod trajectory;
+mod unrest;
 mod whiten;
 
 pub use bench::Bench;

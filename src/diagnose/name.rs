@@ -25,6 +25,14 @@ pub(super) fn family_width(gain: f64) -> f64 {
     FAMILY.max(FAMILY_SHARE * gain)
 }
 
+/// Fall of the sum of squares, also as a share of what the refit took, under which a law of a narrow band is no more than another linear
+/// model might take; the share of it that the refit can take from which that is so, and the standard deviations of excess that the refit
+/// leaves then.
+const SLIGHT: f64 = 120.0;
+const SLIGHT_SHARE: f64 = 0.01;
+const CURVED: f64 = 0.3;
+const NEXT_TO_NOTHING: f64 = 4.0;
+
 /// Sliding length over the sensor's noise below which friction counts as dry.
 const DRY: f64 = 12.0;
 
@@ -82,6 +90,12 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
         {
             family.push((*rival).to_owned());
         }
+    }
+    // Where the refit leaves next to nothing, a slight curve in the spectrum may be what its own straightness falls short of.
+    let curve = chosen.effect.facts().port == crate::physics::Port::Structure || own == "line_disturbance";
+    let slight = SLIGHT.max(SLIGHT_SHARE * (selection.given - selection.baseline.cost));
+    if curve && gain < slight && c.concealed > CURVED && selection.baseline.excess_sigma() < NEXT_TO_NOTHING {
+        family.push("linear_parameters".to_owned());
     }
     let log_p = log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library().len() as f64).ln();
     let (says, port) = text_of(name);

@@ -25,44 +25,47 @@ pub struct NoiseLevels {
 }
 
 /// A mean periodogram: samples of variance per bin, so that white noise of variance 1 gives 1.
-struct Periodogram {
-    w_rad_s: Vec<f64>,
-    power: Vec<f64>,
-    count: Vec<f64>,
+pub(super) struct Periodogram {
+    pub w_rad_s: Vec<f64>,
+    pub power: Vec<f64>,
+    /// Bins behind each.
+    pub count: Vec<f64>,
 }
 
-/// Periodograms of series (each of its own length), Hann-tapered, averaged into bands of growing width.
-fn periodogram(series: &[Vec<f64>], sample_time_s: f64) -> Periodogram {
-    let longest = series.iter().map(Vec::len).max().unwrap_or(0);
-    let bands = band_edges(longest);
-    let mut power = vec![0.0; bands.len()];
-    let mut count = vec![0.0; bands.len()];
-    let mut centre = vec![0.0; bands.len()];
-    for x in series {
-        let n = x.len();
-        let mean = x.iter().sum::<f64>() / n as f64;
-        let taper = |i: usize| 1.0 - (TAU * (i as f64 + 0.5) / n as f64).cos();
-        let tapered: Vec<f64> = x.iter().enumerate().map(|(i, v)| (v - mean) * taper(i)).collect();
-        let bins = forward(&tapered);
-        // The taper's mean square is 1.5.
-        let scale = 1.0 / (1.5 * n as f64);
-        for (k, bin) in bins.iter().enumerate().take(n / 2).skip(2) {
-            let share = k as f64 / n as f64;
-            let b = bands.partition_point(|&edge| edge <= share).min(bands.len() - 1);
-            power[b] += bin.norm_sqr() * scale;
-            centre[b] += share;
-            count[b] += 1.0;
+impl Periodogram {
+    /// Of series (each of its own length), Hann-tapered, averaged into bands of growing width.
+    pub fn of(series: &[Vec<f64>], sample_time_s: f64) -> Periodogram {
+        let longest = series.iter().map(Vec::len).max().unwrap_or(0);
+        let bands = band_edges(longest);
+        let mut power = vec![0.0; bands.len()];
+        let mut count = vec![0.0; bands.len()];
+        let mut centre = vec![0.0; bands.len()];
+        for x in series {
+            let n = x.len();
+            let mean = x.iter().sum::<f64>() / n as f64;
+            let taper = |i: usize| 1.0 - (TAU * (i as f64 + 0.5) / n as f64).cos();
+            let tapered: Vec<f64> = x.iter().enumerate().map(|(i, v)| (v - mean) * taper(i)).collect();
+            let bins = forward(&tapered);
+            // The taper's mean square is 1.5.
+            let scale = 1.0 / (1.5 * n as f64);
+            for (k, bin) in bins.iter().enumerate().take(n / 2).skip(2) {
+                let share = k as f64 / n as f64;
+                let b = bands.partition_point(|&edge| edge <= share).min(bands.len() - 1);
+                power[b] += bin.norm_sqr() * scale;
+                centre[b] += share;
+                count[b] += 1.0;
+            }
         }
-    }
-    let mut out = Periodogram { w_rad_s: vec![], power: vec![], count: vec![] };
-    for b in 0..bands.len() {
-        if count[b] > 0.0 {
-            out.w_rad_s.push(TAU * centre[b] / count[b] / sample_time_s);
-            out.power.push(power[b] / count[b]);
-            out.count.push(count[b]);
+        let mut out = Periodogram { w_rad_s: vec![], power: vec![], count: vec![] };
+        for b in 0..bands.len() {
+            if count[b] > 0.0 {
+                out.w_rad_s.push(TAU * centre[b] / count[b] / sample_time_s);
+                out.power.push(power[b] / count[b]);
+                out.count.push(count[b]);
+            }
         }
+        out
     }
-    out
 }
 
 /// Upper edges of bands, as shares of the sample rate: single bins first, then a tenth of a decade wide.
@@ -81,7 +84,7 @@ impl NoiseLevels {
     /// Levels that fit the spectrum of pure-noise series best (Whittle's likelihood, scoring for the two powers, a grid for
     /// the corner).
     pub fn fit(series: &[Vec<f64>], body: &Body, sample_time_s: f64, from_repeats: bool) -> NoiseLevels {
-        let p = periodogram(series, sample_time_s);
+        let p = Periodogram::of(series, sample_time_s);
         let (gain, k, c) = body_numbers(body);
         let through: Vec<f64> =
             p.w_rad_s.iter().map(|w| gain * gain / ((k - w * w).powi(2) + (c * w).powi(2))).collect();

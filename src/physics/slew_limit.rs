@@ -68,7 +68,7 @@ impl Effect for SlewLimit {
         let near = (0..9).map(|i| 1.0 - 0.4 * 0.7f64.powi(i));
         let at = super::logarithmic(0.02, 0.55, 12).into_iter().chain(near).map(|s| vec![s * largest, 0.0]);
         // A ramp shortens every step a little, also where it ends within the sample.
-        at.chain(super::logarithmic(0.02, 3.0, 20).into_iter().map(|s| vec![s * largest, 1.0])).collect()
+        at.chain(super::logarithmic(0.02, 60.0, 34).into_iter().map(|s| vec![s * largest, 1.0])).collect()
     }
 
     fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {

@@ -1,0 +1,150 @@
+//! Noise that the arm itself makes: torque without a pattern, moving air above all, seen through the plant.
+//!
+//! In: what repeats differ by. The spectrum of torque noise carries the body's resonance and falls beyond it by two slopes more than the
+//! torque does; a sensor's noise, white, coloured from sample to sample or with a floor of low frequencies, has no such shape. Both are
+//! fitted by Whittle's likelihood (Whittle 1953), and the torque is named only where it is far ahead.
+
+use super::bench::Bench;
+use super::finding::{Estimate, Finding};
+use super::linear::body_numbers;
+use super::name::{everywhere, text_of};
+use super::run::Run;
+use super::whiten::Periodogram;
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+/// Twice the log-likelihood by which torque noise must be ahead of any noise of the sensor.
+const AHEAD: f64 = 40.0;
+/// Power over that of the sensor's own noise, where it is strongest, from which the noise of a torque is worth a word.
+const LOUD: f64 = 2.0;
+/// Corners that are tried, and colours of the sensor's noise from sample to sample.
+const CORNERS: usize = 18;
+const COLOURS: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.75, 0.9];
+
+/// Two parts of a spectrum fitted together.
+#[derive(Clone, Copy)]
+struct Mixture {
+    /// Minus twice the log-likelihood, up to a constant.
+    cost: f64,
+    /// Powers of the floor and of the part beside it.
+    parts: [f64; 2],
+    corner_hz: f64,
+    /// Most of the second part over the first.
+    ratio: f64,
+}
+
+/// Powers of two shapes by scoring, neither below 0; cost, powers.
+fn two(p: &Periodogram, floor: &[f64], other: &[f64]) -> (f64, [f64; 2]) {
+    let mean =
+        |x: &[f64]| (0..x.len()).map(|j| p.count[j] * p.power[j] / x[j]).sum::<f64>() / p.count.iter().sum::<f64>();
+    let cost = |a: f64, d: f64| -> f64 {
+        let s = |j: usize| (a * floor[j] + d * other[j]).max(f64::MIN_POSITIVE);
+        2.0 * (0..floor.len()).map(|j| p.count[j] * (s(j).ln() + p.power[j] / s(j))).sum::<f64>()
+    };
+    let size = other.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(*v));
+    let start = mean(floor);
+    let mut best = (cost(start, 0.0), [start, 0.0]);
+    // Several beginnings: the likelihood of two powers may have a ridge.
+    for share in [0.01, 0.3, 10.0] {
+        let (mut a, mut d) = (0.5 * start, share * start / size);
+        for _ in 0..40 {
+            let (mut m, mut v) = ([[0.0; 2]; 2], [0.0; 2]);
+            for j in 0..floor.len() {
+                let s = (a * floor[j] + d * other[j]).max(f64::MIN_POSITIVE);
+                let (x, w) = ([floor[j], other[j]], p.count[j] / (s * s));
+                for (i, row) in m.iter_mut().enumerate() {
+                    v[i] += w * p.power[j] * x[i];
+                    row.iter_mut().zip(x).for_each(|(m, y)| *m += w * x[i] * y);
+                }
+            }
+            let det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+            let next = [(m[1][1] * v[0] - m[0][1] * v[1]) / det, (m[0][0] * v[1] - m[1][0] * v[0]) / det];
+            if next.iter().any(|n| !n.is_finite()) {
+                break;
+            }
+            a = (0.5 * (a + next[0])).max(1e-6 * start);
+            d = (0.5 * (d + next[1])).max(0.0);
+        }
+        let c = cost(a, d);
+        if c < best.0 {
+            best = (c, [a, d]);
+        }
+    }
+    best
+}
+
+/// The best mixture of a coloured floor and low-passed noise through `gain` (1 for the sensor's own), over corners and colours.
+fn mixture(p: &Periodogram, sample_time_s: f64, gain: &dyn Fn(f64) -> f64) -> Option<Mixture> {
+    let nyquist = 0.5 / sample_time_s;
+    let all = COLOURS.iter().flat_map(|c| (0..CORNERS).map(move |i| (*c, i)));
+    let one = |(colour, i): (f64, usize)| {
+        let corner_hz = 3.0 * (nyquist / 6.0).powf(i as f64 / (CORNERS - 1) as f64);
+        let wc = TAU * corner_hz;
+        let floor =
+            |w: &f64| (1.0 - colour * colour) / (1.0 + colour * colour - 2.0 * colour * (w * sample_time_s).cos());
+        let low = |w: &f64| gain(*w) * 2.0 * wc / (wc * wc + w * w) / sample_time_s;
+        let floor: Vec<f64> = p.w_rad_s.iter().map(floor).collect();
+        let other: Vec<f64> = p.w_rad_s.iter().map(low).collect();
+        let (cost, parts) = two(p, &floor, &other);
+        let ratio = floor.iter().zip(&other).map(|(f, o)| parts[1] * o / (parts[0] * f)).fold(0.0, f64::max);
+        Mixture { cost, parts, corner_hz, ratio }
+    };
+    all.map(one).min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
+/// Torque noise, where repeats show it clearly.
+pub(super) fn unrest(bench: &Bench) -> Option<Finding> {
+    if bench.repeats.is_empty() {
+        return None;
+    }
+    let t = bench.scene.sample_time_s;
+    let raw = bench.repeats.iter().map(|(_, white)| {
+        let mut x = white.clone();
+        bench.whitener.colour(&mut x);
+        x
+    });
+    let p = Periodogram::of(&raw.collect::<Vec<_>>(), t);
+    let given = &bench.form.given;
+    let (b, k, c) = body_numbers(&given.body);
+    let modes: f64 = given.modes.iter().map(|m| (m.zero_rad_s / m.pole_rad_s).powi(2)).product();
+    let b = b * given.resonance_gain * modes;
+    let through = |w: f64| b * b / ((k - w * w).powi(2) + (c * w).powi(2));
+    let torque = mixture(&p, t, &through)?;
+    let sensor = mixture(&p, t, &|_| 1.0)?;
+    if !(sensor.cost - torque.cost > AHEAD && torque.ratio > LOUD) {
+        return None;
+    }
+    let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
+    let (says, port) = text_of("broadband_disturbance");
+    let rms = torque.parts[1].sqrt();
+    // Half the relative error of the power, which as many bins tell as the band holds.
+    let bins: f64 = p.w_rad_s.iter().zip(&p.count).filter(|(w, _)| **w < TAU * torque.corner_hz).map(|b| b.1).sum();
+    let off = 1.96 * rms * 0.5 / bins.max(1.0).sqrt();
+    let step = (0.5 / t / 6.0).powf(1.0 / (CORNERS - 1) as f64);
+    let parameters = BTreeMap::from([
+        (
+            "rms_command".to_owned(),
+            Estimate { value: rms, low: rms - off, high: rms + off, unit: given.command_unit.clone() },
+        ),
+        (
+            "corner_hz".to_owned(),
+            Estimate {
+                value: torque.corner_hz,
+                low: torque.corner_hz / step,
+                high: torque.corner_hz * step,
+                unit: "Hz".into(),
+            },
+        ),
+    ]);
+    let mut place = everywhere(&runs);
+    place.frequency_hz = vec![[0.0, torque.corner_hz.max(k.sqrt() / TAU)]];
+    Some(Finding {
+        effect: "broadband_disturbance".into(),
+        family: vec!["broadband_disturbance".into()],
+        port,
+        p_value: (-0.5 * (sensor.cost - torque.cost)).exp().max(1e-300),
+        says: format!("{says}: {rms:.3e} {} rms, up to {:.0} Hz.", given.command_unit, torque.corner_hz),
+        parameters,
+        place,
+    })
+}
