@@ -13,6 +13,7 @@ use super::logs::check;
 use super::name::{finding, linear_story, same_drag};
 use super::run::{Run, runs};
 use super::select::{self, SelectSettings, Selection};
+use super::swing::swing;
 use crate::controller::{Controller, ControllerError, Law};
 use crate::lti::{LtiError, Plant};
 use crate::physics::library;
@@ -307,6 +308,11 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
             d.verdict = Verdict::LocatedUnexplained;
             d.findings.push(super::name::unexplained(bench, selection, explained));
         }
+    } else if d.findings.is_empty()
+        && let Some(f) = swing(bench, selection)
+    {
+        d.verdict = Verdict::Named;
+        d.findings.push(f);
     } else if (restless || unaccounted(selection)) && d.findings.is_empty() {
         d.verdict = Verdict::LocatedUnexplained;
         d.findings.push(super::name::unexplained(bench, selection, 0.0));

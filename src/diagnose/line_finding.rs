@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Every fit run with its error under the final model.
-fn left(bench: &Bench, selection: &Selection) -> Vec<(Run, Vec<f64>)> {
+pub(super) fn left(bench: &Bench, selection: &Selection) -> Vec<(Run, Vec<f64>)> {
     let model = &selection.model;
     let mut out = Vec::new();
     // One repeat of every segment at a time stands in for its mean.

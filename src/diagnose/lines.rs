@@ -63,20 +63,33 @@ impl Line {
 /// The statistic is the power of all series at one frequency over the level around it: chi-square with two numbers for each
 /// repeat beyond the first of its group.
 pub fn strongest(series: &[Vec<f64>], groups: &[usize], sample_time_s: f64, spindle_hz: Option<f64>) -> Option<Line> {
+    let share = |i: usize| {
+        let repeats = groups.iter().filter(|g| **g == groups[i]).count();
+        (repeats - 1) as f64 / repeats as f64
+    };
+    let shares: Vec<f64> = (0..groups.len()).map(share).collect();
+    let numbers = (0..groups.len()).map(|i| usize::from(groups[..i].contains(&groups[i])) * 2).sum();
+    peak(series, &shares, numbers, sample_time_s, spindle_hz)
+}
+
+/// The strongest line of series each of which holds `share` of the noise of its own, `numbers` in all at one frequency.
+pub fn peak(
+    series: &[Vec<f64>],
+    shares: &[f64],
+    numbers: usize,
+    sample_time_s: f64,
+    spindle_hz: Option<f64>,
+) -> Option<Line> {
     let longest = series.iter().map(Vec::len).max()?;
     // One grid for all lengths: zeros behind the shorter ones, and as many again, so that no line falls between two bins.
     let n = 2 * longest;
     let mut power = vec![0.0; n / 2];
-    let mut numbers = 0;
-    for (i, x) in series.iter().enumerate() {
-        let repeats = groups.iter().filter(|g| **g == groups[i]).count();
-        let share = (repeats - 1) as f64 / repeats as f64;
+    for (x, share) in series.iter().zip(shares) {
         let variance = dot(x, x) / x.len() as f64;
         let mut padded = x.clone();
         padded.resize(n, 0.0);
         let scale = share * 2.0 / (x.len() as f64 * variance.max(1e-300));
         power.iter_mut().zip(forward(&padded)).for_each(|(p, b)| *p += scale * b.norm_sqr());
-        numbers += usize::from(groups[..i].contains(&groups[i])) * 2;
     }
     if numbers == 0 {
         return None;

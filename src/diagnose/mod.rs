@@ -36,6 +36,7 @@ mod select;
 mod settle;
 mod simulated;
 mod stack;
+mod swing;
 mod trajectory;
 mod unrest;
 mod whiten;
