@@ -9,11 +9,13 @@ use super::fitted::refit;
 use super::held_out::{contradicts, held_out, mean};
 use super::judge::{Judged, rms};
 use super::line_finding::line_findings;
+use super::linear_story::linear_story;
 use super::logs::check;
-use super::name::{finding, linear_story, same_drag};
+use super::name::{finding, same_drag};
 use super::run::{Run, runs};
 use super::select::{self, SelectSettings, Selection};
 use super::swing::swing;
+use super::unrest::unrest;
 use crate::controller::{Controller, ControllerError, Law};
 use crate::lti::{LtiError, Plant};
 use crate::physics::library;
@@ -129,6 +131,7 @@ pub fn diagnose(
             bench = other;
         }
     }
+    remarks.extend(unrest(&bench).map(|u| u.says(&given.command_unit)));
     let bumps = set_aside(&mut bench, given, case.spindle_hz, settings.select.iterations)?;
     // Records whose samples slipped hold nothing that a model could be fitted to.
     let selection = select::select(&mut bench, library(), &settings.select, &mut progress);
@@ -334,7 +337,7 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
     }
     linear_story(d, bench, selection);
     if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)
-        && let Some(f) = super::name::noise_story(bench).or_else(|| super::unrest::unrest(bench))
+        && let Some(f) = super::name::noise_story(bench)
     {
         d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
         d.findings.push(f);

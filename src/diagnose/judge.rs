@@ -165,8 +165,7 @@ impl<'a> Begun<'a> {
     }
 
     /// What of the start's motions is seen around one that is near: a drag resists them, and an arm that is stuck does not swing back.
-    fn felt(&self, free: &[f64]) -> Result<Vec<Vec<f64>>, LtiError> {
-        let here = self.simulated(free.to_vec())?;
+    fn felt(&self, free: &[f64], here: &[f64]) -> Result<Vec<Vec<f64>>, LtiError> {
         let one = |d: &Vec<f64>| {
             let most = d.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
             let step = NUDGE * self.model.scene.noise.max(1e-9 * self.model.scene.travel) / most;
@@ -177,12 +176,28 @@ impl<'a> Begun<'a> {
     }
 
     /// Simulates from a free motion that is near the right one, in a number of rounds; `seen` is what the motions of the start come to.
-    pub fn found(&self, mut free: Vec<f64>, seen: &[Vec<f64>], rounds: usize) -> Result<Started, LtiError> {
+    pub fn found(&self, free: Vec<f64>, seen: &[Vec<f64>], rounds: usize) -> Result<Started, LtiError> {
+        let raw = self.simulated(free.clone())?;
+        self.found_from(free, raw, seen, rounds)
+    }
+
+    /// The same, the simulation from that motion being known.
+    fn found_from(
+        &self,
+        mut free: Vec<f64>,
+        first: Vec<f64>,
+        seen: &[Vec<f64>],
+        rounds: usize,
+    ) -> Result<Started, LtiError> {
+        let mut next = Some(first);
         // Columns start at a size near 1: one that runs away in a loop is no start.
         let sound: Vec<usize> = (0..seen.len()).filter(|&i| seen[i].iter().all(|v| v.abs() < 1e6)).collect();
         let mut best: Option<(f64, Started)> = None;
         for _ in 0..rounds.max(1) {
-            let raw = self.simulated(free.clone())?;
+            let raw = match next.take() {
+                Some(raw) => raw,
+                None => self.simulated(free.clone())?,
+            };
             if raw.iter().any(|v| !v.is_finite()) {
                 return Ok(best.map_or(Started { error: raw, free }, |b| b.1));
             }
@@ -207,8 +222,9 @@ impl<'a> Begun<'a> {
 
     /// A better start from one that is near, and what its motions come to there.
     pub fn better(&self, free: Vec<f64>, rounds: usize) -> Result<(Started, Vec<Vec<f64>>), LtiError> {
-        let felt = self.felt(&free)?;
-        Ok((self.found(free, &felt, rounds)?, felt))
+        let here = self.simulated(free.clone())?;
+        let felt = self.felt(&free, &here)?;
+        Ok((self.found_from(free, here, &felt, rounds)?, felt))
     }
 
     fn simulated(&self, free: Vec<f64>) -> Result<Vec<f64>, LtiError> {

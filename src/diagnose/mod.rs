@@ -22,6 +22,7 @@ mod judge;
 mod leftover;
 mod line_finding;
 mod linear;
+mod linear_story;
 mod lines;
 mod locked;
 mod log_finding;

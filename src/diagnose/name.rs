@@ -1,22 +1,20 @@
 //! From numbers to findings: names, families, sentences, intervals.
 
 use super::bench::Bench;
-use super::clock::Clock;
 use super::columns::position_columns;
-use super::finding::{Diagnosis, Estimate, Finding, Verdict, Where};
-use super::linear::{Knob, LinearForm, Sampled, body_numbers};
+use super::finding::{Estimate, Finding, Where};
+use super::linear::Sampled;
 use super::place::place;
 use super::refit::Chosen;
 use super::rival::Rival;
 use super::run::Run;
 use super::scan::log_tail;
 use super::select::Selection;
-use super::simulated::simulated_with;
-use crate::physics::{Parameter, Setting, effect, facts, library};
+use crate::physics::{Parameter, Setting, facts, library};
 use std::collections::BTreeMap;
 
 /// Difference of the fit (twice the log-likelihood) below which two names are one family.
-const FAMILY: f64 = 20.0;
+pub(super) const FAMILY: f64 = 20.0;
 /// The same as a share of what the effect explains: laws differ from any machine by more than noise.
 const FAMILY_SHARE: f64 = 1e-3;
 
@@ -264,121 +262,4 @@ fn statistic(name: &str, parameter: (&str, Estimate), p_value: f64, runs: &[&Run
         parameters: BTreeMap::from([(parameter.0.to_owned(), parameter.1)]),
         place: everywhere(runs),
     }
-}
-
-/// Sum of squares with only some of the linear parameters free, and with one effect more where it is given; by simulation where the
-/// model was fitted so.
-fn restricted(
-    bench: &Bench,
-    keep: impl Fn(Knob) -> bool,
-    selection: &Selection,
-    more: Option<Chosen>,
-) -> (f64, Vec<f64>, usize) {
-    if let Some(model) = &selection.simulated {
-        let mut model = model.clone();
-        model.chosen.extend(more);
-        let (cost, p) = simulated_with(bench, &model, &keep);
-        let at: Vec<f64> = (0..p.len()).filter(|&i| keep(bench.form.knobs[i])).map(|i| p[i]).collect();
-        let free = at.len();
-        return (cost, at, free);
-    }
-    let knobs: Vec<Knob> = bench.form.knobs.iter().copied().filter(|k| keep(*k)).collect();
-    let form = LinearForm { knobs: knobs.clone(), ..bench.form.clone() };
-    let start = vec![0.0; knobs.len()];
-    let mut chosen = selection.model.chosen.clone();
-    chosen.extend(more);
-    let mut fit = super::refit::Fit { form: &form, ..bench.fit(chosen) };
-    if knobs.is_empty() && fit.chosen.is_empty() {
-        return (fit.cost(&start), start, 0);
-    }
-    let r = fit.refit(&start, 8);
-    (r.cost, r.p, knobs.len())
-}
-
-/// Lags that fit as well as a delay of `delay_s` does, beside linear parameters as given: a lag far above the band is a delay.
-fn lags_like(bench: &Bench, selection: &Selection, delay_s: f64, cost: f64) -> Vec<String> {
-    let as_good = |name: &&str| {
-        let Some(lag) = effect(name) else { return false };
-        let setting = Setting { inner: vec![delay_s], strengths: vec![1.0] };
-        let more = Chosen {
-            effect: lag,
-            setting,
-            continuous: vec![true],
-            range: vec![[0.1 * delay_s, 10.0 * delay_s]],
-            step: 0,
-        };
-        restricted(bench, |_| false, selection, Some(more)).0 < cost + FAMILY
-    };
-    ["amplifier_lag", "sensor_lag"].into_iter().filter(as_good).map(str::to_owned).collect()
-}
-
-/// What happened to the linear parameters: nothing, the delay alone, one mode alone, or a refit.
-pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
-    if d.verdict == Verdict::LocatedUnexplained || d.verdict == Verdict::DataFault {
-        return;
-    }
-    let full = selection.last().cost;
-    let all = bench.form.knobs.len() as f64;
-    // Chi-square of as many parameters as were freed, and four of its standard deviations.
-    let allowed = |free: usize| {
-        let n = all - free as f64;
-        n + 5.0 * (2.0 * n).sqrt() + 10.0
-    };
-    let (fixed, _, _) = restricted(bench, |_| false, selection, None);
-    if fixed - full < allowed(0) {
-        d.remarks.push("the linear parameters agree with the given plant".into());
-        return;
-    }
-    let (delay, p, free) = restricted(bench, |k| k == Knob::Delay, selection, None);
-    if delay - full < allowed(free) {
-        let t = bench.scene.sample_time_s;
-        let value = p[0] * t;
-        let sigma =
-            bench.form.knobs.iter().position(|k| *k == Knob::Delay).map_or(0.0, |i| selection.model.refitted.spread(i))
-                * t;
-        let (says, port) = text_of("extra_delay");
-        let mut family = vec!["extra_delay".to_owned()];
-        if value > 0.0 {
-            family.extend(lags_like(bench, selection, value, delay));
-        }
-        // Only a controller's replay tells a late log from a late machine.
-        if d.replay.is_none() {
-            family.push("misalignment".into());
-        }
-        let f = Finding {
-            effect: "extra_delay".into(),
-            family,
-            port,
-            p_value: log_tail(fixed - delay, 1).min(0.0).exp().max(1e-300),
-            says: format!("{says}: {:.2} microseconds.", value * 1e6),
-            parameters: BTreeMap::from([(
-                "delay_s".to_owned(),
-                Estimate { value, low: value - 1.96 * sigma, high: value + 1.96 * sigma, unit: "s".into() },
-            )]),
-            place: everywhere(&bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect::<Vec<_>>()),
-        };
-        if d.verdict == Verdict::NoMismatch {
-            d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
-        }
-        d.findings.push(f);
-        return;
-    }
-    if d.findings.is_empty() && selection.model.chosen.is_empty() {
-        let clock = Clock::of(bench, fixed);
-        if clock.cost - full < allowed(1) {
-            d.verdict = Verdict::DataFault;
-            d.findings.push(clock.finding(bench));
-            return;
-        }
-    }
-    if d.verdict == Verdict::NoMismatch {
-        d.verdict = Verdict::Refit;
-    }
-    let (b0, k0, c0) = body_numbers(&bench.form.given.body);
-    let refitted = &selection.last().refitted.plant;
-    let (b1, k1, c1) = body_numbers(&refitted.body);
-    d.remarks.push(format!(
-        "linear refit: acceleration gain {b0:.6e} -> {b1:.6e}, stiffness {k0:.6e} -> {k1:.6e} 1/s^2, viscous rate {c0:.4} -> {c1:.4} 1/s, delay {:.3e} -> {:.3e} s",
-        bench.form.given.delay_s, refitted.delay_s
-    ));
 }

@@ -24,11 +24,11 @@ const ITERATIONS: usize = 12;
 /// Relative fall of the sum of squares at which the fit ends.
 const TOLERANCE: f64 = 1e-6;
 /// Rounds in which a start is found.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 2;
 /// Most fits one after the other, and the relative fall of the error by one for which another is made: starts that are found anew may
 /// open a way further down.
 const AGAIN: usize = 3;
-const FURTHER: f64 = 1e-4;
+const FURTHER: f64 = 3e-4;
 /// Step in a linear parameter.
 const STEP: f64 = 1e-4;
 /// Relative steps in strengths and inner parameters: laws have kinks, and smaller steps see only them.
@@ -109,19 +109,19 @@ impl Problem<'_> {
     }
 
     /// Every record simulated, from the starts found last; infinite where it runs away.
-    fn simulate(&self, x: &[f64], rounds: usize) -> Vec<Started> {
+    fn simulate(&self, x: &[f64]) -> Vec<Started> {
         self.each(x, |r, judged| {
             let one = || {
                 let begun = Begun::new(judged, r.run, None, r.constant)?;
-                begun.found(r.start.clone(), r.felt.as_ref().unwrap_or(&begun.linear), rounds)
+                begun.found(r.start.clone(), r.felt.as_ref().unwrap_or(&begun.linear), 1)
             };
             one().unwrap_or_else(|_| Started { error: vec![f64::INFINITY; r.run.len()], free: vec![0.0; r.run.len()] })
         })
     }
 
     /// Whitened simulation error, the mean over the repeats of each segment, one stacked vector, each segment's own directions taken out.
-    fn error(&self, x: &[f64], rounds: usize) -> Vec<f64> {
-        self.whitened(&self.simulate(x, rounds))
+    fn error(&self, x: &[f64]) -> Vec<f64> {
+        self.whitened(&self.simulate(x))
     }
 
     fn whitened(&self, all: &[Started]) -> Vec<f64> {
@@ -147,7 +147,7 @@ impl Problem<'_> {
     fn settle(&mut self, x: &[f64]) -> Vec<f64> {
         let found = self.each(x, |r, judged| {
             let begun = Begun::new(judged, r.run, None, r.constant)?;
-            let near = begun.found(vec![0.0; r.run.len()], &begun.linear, 2)?;
+            let near = begun.found(vec![0.0; r.run.len()], &begun.linear, 1)?;
             begun.better(near.free, ROUNDS)
         });
         let mut all = Vec::with_capacity(self.records.len());
@@ -187,7 +187,7 @@ impl Residuals for Problem<'_> {
     }
 
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) {
-        r.copy_from_slice(&self.error(x, 2));
+        r.copy_from_slice(&self.error(x));
     }
 
     fn jacobian(&mut self, x: &[f64], j: &mut [f64]) {
@@ -200,7 +200,7 @@ impl Residuals for Problem<'_> {
             let moved = |by: f64| {
                 let mut to = x.to_vec();
                 to[i] += by;
-                this.error(&to, 1)
+                this.error(&to)
             };
             let (up, down) = (moved(step), moved(-step));
             column.iter_mut().zip(up.iter().zip(&down)).for_each(|(c, (a, b))| *c = (a - b) / (2.0 * step));

@@ -5,7 +5,7 @@
 //! viscous part belongs to the linear plant; a mean offset belongs to the torque offset.
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
-use super::pivot_friction::dahl;
+use super::pivot_friction::{SLID, dahl};
 use super::sample::{Sample, Scene, logarithmic};
 
 /// Inner: pre-sliding length, Stribeck speed (0 for none), Stribeck rise. Strength: the level at speed.
@@ -47,7 +47,11 @@ impl Law for Slider {
         let z = self.moved(from, to);
         // The mean over a straight path: s - (s - z0) (1 - exp(-r))/r with r the path in lengths.
         let (path, s) = ((to.x - from.x).abs() / self.length, (to.x - from.x).signum());
-        let mean = if path < 1e-6 { 0.5 * (self.z + z) } else { s + (s - self.z) * (-path).exp_m1() / path };
+        let mean = match path {
+            p if p < 1e-6 => 0.5 * (self.z + z),
+            p if p > SLID => s - (s - self.z) / p,
+            p => s + (s - self.z) * (-p).exp_m1() / p,
+        };
         out[0] = -mean * self.level(0.5 * (from.v + to.v));
     }
 

@@ -36,9 +36,12 @@ struct Dahl {
 
 /// Dahl's law over a step `dx`, exact.
 pub(super) fn dahl(z: f64, dx: f64, length: f64) -> f64 {
-    let s = dx.signum();
-    s - (s - z) * (-dx.abs() / length).exp()
+    let (s, path) = (dx.signum(), dx.abs() / length);
+    if path > SLID { s } else { s - (s - z) * (-path).exp() }
 }
+
+/// Path in lengths behind which nothing is left of the past in double precision.
+pub(super) const SLID: f64 = 45.0;
 
 impl Law for Dahl {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {

@@ -1,0 +1,155 @@
+//! What happened to the linear parameters beside the findings: nothing, the delay alone, the log's clock, or a refit.
+
+use super::bench::Bench;
+use super::clock::Clock;
+use super::finding::{Diagnosis, Estimate, Finding, Verdict};
+use super::linear::{Knob, LinearForm, body_numbers};
+use super::name::{FAMILY, everywhere, text_of};
+use super::refit::{Chosen, Fit};
+use super::scan::log_tail;
+use super::select::{Model, Selection};
+use super::simulated::simulated_with;
+use crate::physics::{Setting, effect};
+use std::collections::BTreeMap;
+
+/// How a restricted model is fitted.
+#[derive(Clone, Copy)]
+enum Way<'a> {
+    /// Along the recorded motion.
+    Along(&'a Model),
+    /// By simulation.
+    Simulated(&'a Model),
+}
+
+impl Way<'_> {
+    /// Both ways of judging a selection, the quick one first: along a noisy motion a drag falls short, and the linear parameters with it.
+    fn all(selection: &Selection) -> impl Iterator<Item = Way<'_>> {
+        std::iter::once(Way::Along(&selection.model)).chain(selection.simulated.as_ref().map(Way::Simulated))
+    }
+
+    /// Sum of squares with all linear parameters free.
+    fn full(self) -> f64 {
+        match self {
+            Way::Along(m) | Way::Simulated(m) => m.cost,
+        }
+    }
+
+    /// Sum of squares with only some of the linear parameters free, and with one effect more where it is given; and those parameters.
+    fn restricted(self, bench: &Bench, keep: impl Fn(Knob) -> bool, more: Option<Chosen>) -> (f64, Vec<f64>) {
+        match self {
+            Way::Simulated(model) => {
+                let mut model = model.clone();
+                model.chosen.extend(more);
+                let (cost, p) = simulated_with(bench, &model, &keep);
+                (cost, (0..p.len()).filter(|&i| keep(bench.form.knobs[i])).map(|i| p[i]).collect())
+            }
+            Way::Along(model) => {
+                let knobs: Vec<Knob> = bench.form.knobs.iter().copied().filter(|k| keep(*k)).collect();
+                let form = LinearForm { knobs: knobs.clone(), ..bench.form.clone() };
+                let start = vec![0.0; knobs.len()];
+                let mut chosen = model.chosen.clone();
+                chosen.extend(more);
+                let mut fit = Fit { form: &form, ..bench.fit(chosen) };
+                if knobs.is_empty() && fit.chosen.is_empty() {
+                    return (fit.cost(&start), start);
+                }
+                let r = fit.refit(&start, 8);
+                (r.cost, r.p)
+            }
+        }
+    }
+}
+
+/// Lags that fit as well as a delay of `delay_s` does, beside linear parameters as given: a lag far above the band is a delay.
+fn lags_like(bench: &Bench, way: Way, delay_s: f64, cost: f64) -> Vec<String> {
+    let as_good = |name: &&str| {
+        let Some(lag) = effect(name) else { return false };
+        let setting = Setting { inner: vec![delay_s], strengths: vec![1.0] };
+        let more = Chosen {
+            effect: lag,
+            setting,
+            continuous: vec![true],
+            range: vec![[0.1 * delay_s, 10.0 * delay_s]],
+            step: 0,
+        };
+        way.restricted(bench, |_| false, Some(more)).0 < cost + FAMILY
+    };
+    ["amplifier_lag", "sensor_lag"].into_iter().filter(as_good).map(str::to_owned).collect()
+}
+
+/// What happened to the linear parameters: nothing, the delay alone, one mode alone, or a refit.
+pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
+    if d.verdict == Verdict::LocatedUnexplained || d.verdict == Verdict::DataFault {
+        return;
+    }
+    let all = bench.form.knobs.len() as f64;
+    // Chi-square of as many parameters as were freed, and four of its standard deviations.
+    let allowed = |free: usize| {
+        let n = all - free as f64;
+        n + 5.0 * (2.0 * n).sqrt() + 10.0
+    };
+    let mut fixed = Vec::new();
+    for way in Way::all(selection) {
+        let cost = way.restricted(bench, |_| false, None).0;
+        if cost - way.full() < allowed(0) {
+            d.remarks.push("the linear parameters agree with the given plant".into());
+            return;
+        }
+        fixed.push(cost);
+    }
+    for (way, &fixed) in Way::all(selection).zip(&fixed) {
+        let (delay, p) = way.restricted(bench, |k| k == Knob::Delay, None);
+        if delay - way.full() >= allowed(1) {
+            continue;
+        }
+        let t = bench.scene.sample_time_s;
+        let value = p[0] * t;
+        let sigma =
+            bench.form.knobs.iter().position(|k| *k == Knob::Delay).map_or(0.0, |i| selection.model.refitted.spread(i))
+                * t;
+        let (says, port) = text_of("extra_delay");
+        let mut family = vec!["extra_delay".to_owned()];
+        if value > 0.0 {
+            family.extend(lags_like(bench, way, value, delay));
+        }
+        // Only a controller's replay tells a late log from a late machine.
+        if d.replay.is_none() {
+            family.push("misalignment".into());
+        }
+        let f = Finding {
+            effect: "extra_delay".into(),
+            family,
+            port,
+            p_value: log_tail(fixed - delay, 1).min(0.0).exp().max(1e-300),
+            says: format!("{says}: {:.2} microseconds.", value * 1e6),
+            parameters: BTreeMap::from([(
+                "delay_s".to_owned(),
+                Estimate { value, low: value - 1.96 * sigma, high: value + 1.96 * sigma, unit: "s".into() },
+            )]),
+            place: everywhere(&bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect::<Vec<_>>()),
+        };
+        if d.verdict == Verdict::NoMismatch {
+            d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
+        }
+        d.findings.push(f);
+        return;
+    }
+    if d.findings.is_empty() && selection.model.chosen.is_empty() {
+        let clock = Clock::of(bench, fixed[0]);
+        if clock.cost - selection.model.cost < allowed(1) {
+            d.verdict = Verdict::DataFault;
+            d.findings.push(clock.finding(bench));
+            return;
+        }
+    }
+    if d.verdict == Verdict::NoMismatch {
+        d.verdict = Verdict::Refit;
+    }
+    let (b0, k0, c0) = body_numbers(&bench.form.given.body);
+    let refitted = &selection.last().refitted.plant;
+    let (b1, k1, c1) = body_numbers(&refitted.body);
+    d.remarks.push(format!(
+        "linear refit: acceleration gain {b0:.6e} -> {b1:.6e}, stiffness {k0:.6e} -> {k1:.6e} 1/s^2, viscous rate {c0:.4} -> {c1:.4} 1/s, delay {:.3e} -> {:.3e} s",
+        bench.form.given.delay_s, refitted.delay_s
+    ));
+}
