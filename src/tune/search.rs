@@ -4,10 +4,11 @@
 //! merit and then by index, so the result has the same bytes for any number of threads.
 
 use super::bench::UNSTABLE;
+use super::convex_concave::gains;
 use super::neighbours::{Exact, improve};
 use super::polish::{Goal, Polished, polish};
 use super::starts::starts;
-use super::{Bench, Desk, Score};
+use super::{Bench, Desk, PolishMethod, Score};
 use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::neldermead::NelderMead;
 use rayon::prelude::*;
@@ -94,8 +95,42 @@ pub(super) fn order(a: &Score, b: &Score) -> Ordering {
     }
 }
 
-/// Polishes for the objective; where limits stay missed, first for the limits alone.
+/// Turns of convex-concave steps and quadratic ones.
+const TURNS: usize = 3;
+/// Gain of the objective (ln) that is worth another turn.
+const WORTHLESS: f64 = 1e-6;
+/// Programmes of one run of convex-concave steps.
+const PROGRAMMES: usize = 12;
+
+/// Polishes by the bench's method.
 pub(super) fn refine(bench: &Bench, x: &[f64], steps: usize, desk: &mut Desk) -> Option<Polished> {
+    let best = quadratic(bench, x, steps, desk);
+    if bench.method == PolishMethod::Quadratic {
+        return best;
+    }
+    let stepped = gains(bench, x, PROGRAMMES, desk).and_then(|p| quadratic(bench, &p.x, steps, desk));
+    let better = |a: Option<Polished>, b: Option<Polished>| match (a, b) {
+        (Some(a), Some(b)) => Some(if order(&b.score, &a.score).is_lt() { b } else { a }),
+        (a, b) => a.or(b),
+    };
+    let mut best = better(best, stepped)?;
+    for _ in 0..TURNS {
+        let Some(stepped) = gains(bench, &best.x, PROGRAMMES, desk) else { break };
+        let on = better(quadratic(bench, &stepped.x, steps, desk), Some(stepped))?;
+        if order(&on.score, &best.score).is_ge() {
+            break;
+        }
+        let little = on.score.violation <= 0.0 && best.score.objective - on.score.objective < WORTHLESS;
+        best = on;
+        if little {
+            break;
+        }
+    }
+    Some(best)
+}
+
+/// Polishes for the objective; where limits stay missed, first for the limits alone.
+fn quadratic(bench: &Bench, x: &[f64], steps: usize, desk: &mut Desk) -> Option<Polished> {
     let first = polish(bench, x, Goal::Best, steps, desk)?;
     if first.score.violation <= 0.0 {
         return Some(first);
