@@ -151,3 +151,10 @@ fn what_is_not_proved_has_no_bound_and_says_why() {
     let u = Uncertainty { gain: 0.02, ..Uncertainty::default() };
     assert_eq!(bounded(&plant, &c, &profile, &u, 3).open, Some(WriteOpen::MayClip));
 }
+
+#[test]
+fn figures_of_an_older_certificate_are_read_with_what_they_took_for_granted() {
+    let old = r#"{"dft_low": 0.1, "dft_high": 0.2, "harmonics": [0.3], "command_peak": 2.0, "error": 1e-8}"#;
+    let w: servotune::verify::WriteFigures = serde_json::from_str(old).unwrap();
+    assert_eq!((w.command_error, w.command_error()), (None, 2e-7));
+}

@@ -116,9 +116,9 @@ impl Family {
         (3.0 * top * self.t / TAU + 0.5).ceil().max(1.0) as i64
     }
 
-    /// Bound over the box of the aliases beyond the `n`-th on either side, the hold's 1 - 1/z aside.
-    pub fn far(&self, n: i64, ranges: &[Range]) -> f64 {
-        let w = TAU * (n as f64 + 0.5) / self.t;
+    /// Bound over the box of |P| s² T² from the `n`-th alias on, which must lie above every mode.
+    fn asymptote(&self, n: f64, ranges: &[Range]) -> f64 {
+        let w = TAU * n / self.t;
         let gain = self.gain.abs() * ranges[GAIN].high;
         let mut most = gain;
         for (i, p) in self.pairs.iter().enumerate() {
@@ -131,9 +131,20 @@ impl Family {
             let above = p.zero.map_or((p.pole[0] * f).powi(2), |z| 1.0 + off(z, dz));
             most *= if below > 0.0 { above / below } else { f64::INFINITY };
         }
+        most * self.t * self.t
+    }
+
+    /// Bound over the box of one alias `k` on one side, the hold's 1 - 1/z aside.
+    pub fn alias(&self, k: i64, ranges: &[Range]) -> f64 {
+        let k = k as f64 - 0.5;
+        self.asymptote(k, ranges) / (TAU * k).powi(3)
+    }
+
+    /// Bound over the box of the aliases beyond the `n`-th on either side, the hold's 1 - 1/z aside.
+    pub fn far(&self, n: i64, ranges: &[Range]) -> f64 {
         // Σ 1/|a + 2 pi k|³ over |k| > n is below its integral; 1/s twice from the body and once from the hold.
         let n = n as f64;
-        most * self.t * self.t * (0.5 / (n + 0.5).powi(2) + 0.5 / (n * n)) / TAU.powi(3)
+        self.asymptote(n + 0.5, ranges) * (0.5 / (n + 0.5).powi(2) + 0.5 / (n * n)) / TAU.powi(3)
     }
 
     /// Bound over the box of all aliases together on the line Re s = `right` > 0: rough, and only ever used with a factor near 0.

@@ -22,6 +22,11 @@ pub(super) struct Beside {
     far: f64,
 }
 
+/// Aliases taken one by one beyond those that the modes ask for: each has its own kernel, those beyond only the largest.
+const NEARBY: i64 = 2;
+/// Aliases whose sizes are added one by one.
+const LISTED: i64 = 200;
+
 /// (1 - 1/z)/(s T), with the alias k of s.
 fn hold(x: &Contour, i: usize, k: i64) -> (Complex<f64>, Complex<f64>) {
     let s = x.s[i] + Complex::new(0.0, std::f64::consts::TAU * k as f64 / x.t);
@@ -30,7 +35,7 @@ fn hold(x: &Contour, i: usize, k: i64) -> (Complex<f64>, Complex<f64>) {
 
 impl Beside {
     pub fn of(x: &Contour, window: &Window, bins: &[usize], family: &Family, ranges: &[Range]) -> Beside {
-        let (whole, far) = (family.whole(), family.far(family.whole(), ranges));
+        let whole = family.whole() + NEARBY;
         let most = |s: Complex<f64>| {
             let late = (s * family.delay_s() * share(&ranges[DELAY])).norm();
             // |e^x - 1| <= e^|x| - 1, and neither |e^-s delay| is above 1.
@@ -46,18 +51,28 @@ impl Beside {
                 .product();
             (1.0 + share(&ranges[GAIN])) * (1.0 + late) * pairs - 1.0
         };
-        // Beyond the last one summed: moves shrink, but a delay may turn by anything.
+        // Beyond the last one summed one by one: sizes by the asymptote, moves by the pairs' at the nearest and the dead time's at each.
         let w = std::f64::consts::TAU * (whole as f64 + 0.5) / x.t;
         let pairs = family.pairs.iter().enumerate().map(|(j, p)| 1.0 + p.far(w, Family::shares(ranges, j)));
-        let turned = if share(&ranges[DELAY]) > 0.0 { 3.0 } else { 1.0 };
-        let moved = ((1.0 + share(&ranges[GAIN])) * turned * pairs.product::<f64>() - 1.0).min(2.0);
+        let still = (1.0 + share(&ranges[GAIN])) * pairs.product::<f64>();
+        let late = family.delay_s() * share(&ranges[DELAY]);
+        let last = whole + LISTED;
+        let mut far = family.far(last, ranges);
+        let mut far_moves = 2.0 * far;
+        for k in whole + 1..=last {
+            let one = 2.0 * family.alias(k, ranges);
+            let turned = ((x.right + std::f64::consts::TAU * (k as f64 + 0.5) / x.t) * late).exp_m1().min(2.0);
+            far += one;
+            far_moves += one * (still * (1.0 + turned) - 1.0).min(2.0);
+        }
         let n = x.s.len();
         let mut apart = Vec::with_capacity(n);
         let mut heard = vec![[Vec::with_capacity(n), Vec::with_capacity(n)]; bins.len()];
         for i in 0..n {
-            let rest = far * (1.0 - (x.s[i] * -x.t).exp()).norm();
-            let mut moves = moved * rest;
-            let mut own = vec![[2.0 * rest * x.kernel_most, 2.0 * moved * rest * x.kernel_most]; bins.len()];
+            let held = modulus(1.0 - (x.s[i] * -x.t).exp());
+            let mut moves = far_moves * held;
+            let loudest = 2.0 * held * x.kernel_most;
+            let mut own = vec![[far * loudest, far_moves * loudest]; bins.len()];
             for k in (1..=whole).flat_map(|k| [k, -k]) {
                 let (s, hold) = hold(x, i, k);
                 let (p, m) = (modulus(hold * family.value(s)), most(s));
