@@ -4,9 +4,12 @@ pub(super) use super::diagnose_arguments::DiagnoseArguments;
 pub(super) use super::fleet_arguments::{FleetArguments, TwinFleetArguments};
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
 pub(super) use super::limit_arguments::{BudgetArguments, LimitArguments, NextSweepArguments, ParetoArguments};
+pub(super) use super::polish_arguments::PolishArguments;
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
 pub(super) use super::verify_arguments::VerifyArguments;
+use super::verify_arguments::uncertainty;
 use crate::twin::line::UnknownKind;
+use crate::verify::Uncertainty;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -237,6 +240,10 @@ pub(super) struct TuneArguments {
     /// Leave out the certificate that is otherwise proved and written beside each gain table (gains.certificate.json)
     #[arg(long)]
     pub no_certificate: bool,
+    /// Box around the plant over which the certificate is proved, such as gain=5%,frequency=2%,damping=20%,delay=5%; of a sweep
+    /// the gain alone
+    #[arg(long, value_name = "SHARES", value_parser = uncertainty, conflicts_with_all = ["no_certificate", "machines"])]
+    pub uncertainty: Option<Uncertainty>,
     /// Say how far the table is from the best in its structure and from the best of all loops, and write it beside the table
     /// (gains.limit.json); takes about a minute. Of a sweep, on the model identified from it
     #[arg(long, conflicts_with = "machines")]
@@ -247,6 +254,8 @@ pub(super) struct TuneArguments {
     /// Starts of the search
     #[arg(long, value_name = "N", default_value_t = 12)]
     pub starts: usize,
+    #[command(flatten)]
+    pub polish: PolishArguments,
     #[command(flatten)]
     pub reading: ReadingArguments,
     #[command(flatten)]
@@ -348,12 +357,16 @@ pub(super) enum StudyName {
     GateSeeds,
     /// 100 000 random loops of known truth against the certificate; mutated tables; the four machines
     Certificate,
+    /// The write over boxes of parameters: proved bounds against members drawn from the box
+    CertificateWrite,
     /// The ladder of Table 1 and figures 6, 9, 12-14
     Ladder,
     /// The production line in features (figures 24-34)
     Line,
     /// How far tuned gains are from the best possible: four classes, nine cases of the HDD benchmark plant
     Limits,
+    /// Quadratic steps alone and with convex-concave ones, on the four classes and the nine cases of the HDD benchmark plant
+    Polish,
     /// The DFT under gains never run, predicted and recorded
     Prediction,
     /// 200 random plants of order 22: response, frequency and margin errors

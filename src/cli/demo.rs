@@ -15,6 +15,7 @@ use crate::report::identified::identified_sentences;
 use crate::tune::{GainTable, Hold, InputDigest, Machine, Outcome, Spec, TuneError, TuneSettings, tune};
 use crate::twin::plants::{log_grid, measure};
 use crate::twin::{MachineClass, nominal_controller, paper_machine};
+use crate::verify::Uncertainty;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -83,8 +84,8 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let table = GainTable::of(&outcome, spec.search.seed, sha256_hex(spec_text.as_bytes()), inputs)?;
     let gain_table = file("gains.toml");
     table.write(&gain_table)?;
-    let certificate =
-        proof::beside(&gain_table, &On::Sweep { sweep: &sweep, hold_included: false }, &file("spec.toml"), screen)?;
+    let on = On::Sweep { sweep: &sweep, hold_included: false };
+    let certificate = proof::beside(&gain_table, &on, &file("spec.toml"), Uncertainty::default(), screen)?;
 
     screen.say("4/7 report");
     let page = slot::page(&Slot {

@@ -14,6 +14,7 @@ use crate::identify::{IdentifySettings, identify};
 use crate::report::number::NumberFormat;
 use crate::report::table::{self, Column};
 use crate::tune::{GainTable, Hold, InputDigest, Machine, Outcome, Spec, TuneSettings, tune};
+use crate::verify::Uncertainty;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -198,7 +199,7 @@ fn tuned(job: &Job<'_>, row: &mut Row, screen: &mut Screen) -> Result<(), Failur
         screen.say(&format!("wrote {}", gains.display()));
         if let Some(spec) = job.certify {
             let on = On::Sweep { sweep: &sweep, hold_included: job.hold == Hold::Included };
-            let proof = proof::beside(&gains, &on, spec, screen)?;
+            let proof = proof::beside(&gains, &on, spec, Uncertainty::default(), screen)?;
             screen.say(&format!("machine {}: {}", row.id, proof.says));
             row.certificate = Some(proof);
         }

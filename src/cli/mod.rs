@@ -34,6 +34,7 @@ mod margins;
 mod next_sweep;
 mod pareto;
 mod physics;
+mod polish_arguments;
 mod proof;
 mod response;
 mod screen;

@@ -31,11 +31,17 @@ pub(super) enum On<'a> {
     Sweep { sweep: &'a Sweep, hold_included: bool },
 }
 
-/// Proves the table at `gains` and writes the certificate beside it. That a plant is beyond the proof, or a sweep ends too early, stops no
+/// Proves the table at `gains` over the box `u` and writes the certificate beside it. That a plant is beyond the proof, or a sweep ends too early, stops no
 /// tuning: it is said.
-pub(super) fn beside(gains: &Path, on: &On<'_>, spec: &Path, screen: &mut Screen) -> Result<Proof, Failure> {
+pub(super) fn beside(
+    gains: &Path,
+    on: &On<'_>,
+    spec: &Path,
+    u: Uncertainty,
+    screen: &mut Screen,
+) -> Result<Proof, Failure> {
     let file = verify::beside(gains);
-    Ok(match prove(gains, on, spec) {
+    Ok(match prove(gains, on, spec, u) {
         Ok(c) => {
             write_text(&file, &c.text()?)?;
             screen.say(&format!("wrote {}", file.display()));
@@ -51,7 +57,12 @@ pub(super) fn beside(gains: &Path, on: &On<'_>, spec: &Path, screen: &mut Screen
     })
 }
 
-fn prove(gains: &Path, on: &On<'_>, spec: &Path) -> Result<crate::verify::Certificate, VerifyError> {
+fn prove(
+    gains: &Path,
+    on: &On<'_>,
+    spec: &Path,
+    uncertainty: Uncertainty,
+) -> Result<crate::verify::Certificate, VerifyError> {
     let (mut plants, mut sweeps, mut hold) = (Vec::new(), Vec::new(), false);
     match on {
         On::Plant(file) => plants.push(Source::read(file)?),
@@ -68,7 +79,7 @@ fn prove(gains: &Path, on: &On<'_>, spec: &Path) -> Result<crate::verify::Certif
         spec: &Source::read(spec)?,
         profile: &Source::read(&Spec::profile_path(spec)?)?,
         word: Word::Double,
-        uncertainty: Uncertainty::default(),
+        uncertainty,
     };
     certify(&inputs, &VerifySettings::default())
 }

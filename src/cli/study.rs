@@ -30,6 +30,8 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::Gate => study::gate()?,
         StudyName::GateSeeds => study::gate_seeds()?,
         StudyName::Certificate => study::certificate(&a.data, &mut |words| screen.say(words))?,
+        StudyName::CertificateWrite => study::certificate_write(&a.data, &mut |words| screen.say(words))?,
+        StudyName::Polish => study::polishes(&a.data, &mut |words| screen.say(words))?,
         StudyName::Ladder => study::ladder()?,
         StudyName::Line => study::line_study()?,
         StudyName::Limits => study::limits(&a.data)?,

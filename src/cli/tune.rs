@@ -120,7 +120,12 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     if let Some(file) = &a.controller {
         input("controller", sha256_hex(read_text(file)?.as_bytes()));
     }
-    let settings = TuneSettings { sample_time_s: a.sample_time_s, starts: a.starts, ..TuneSettings::default() };
+    let settings = TuneSettings {
+        sample_time_s: a.sample_time_s,
+        starts: a.starts,
+        polish: a.polish.method(),
+        ..TuneSettings::default()
+    };
     let with = match &given {
         Given::Model(_, Some(physics)) => {
             let high = spec.profile.spiral.distance;
@@ -151,7 +156,7 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
                 (Given::Response { sweep, .. }, _) => On::Sweep { sweep, hold_included: a.hold_included },
                 (Given::Model(..), file) => On::Plant(file.as_deref().ok_or(Failure::NoMachine)?),
             };
-            proof = Some(proof::beside(&a.out, &on, &a.spec, screen)?);
+            proof = Some(proof::beside(&a.out, &on, &a.spec, a.uncertainty.unwrap_or_default(), screen)?);
         }
         if a.gap {
             gap = Some(limit::beside(&a.out, outcome.controller(), given.plant(), &spec, screen)?);

@@ -41,7 +41,12 @@ pub(super) fn run(a: &TuneArguments, machines: &Path, gate: &Path, screen: &mut 
         reading: a.reading.settings(),
         model: model_settings(a),
         hold: if a.hold_included { Hold::Included } else { Hold::NotIncluded },
-        tuning: TuneSettings { sample_time_s: a.sample_time_s, starts: a.starts, ..TuneSettings::default() },
+        tuning: TuneSettings {
+            sample_time_s: a.sample_time_s,
+            starts: a.starts,
+            polish: a.polish.method(),
+            ..TuneSettings::default()
+        },
         overrides,
         keep_infeasible: a.keep_infeasible,
         certify: (!a.no_certificate).then_some(a.spec.as_path()),

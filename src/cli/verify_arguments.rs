@@ -37,7 +37,8 @@ pub(super) struct VerifyArguments {
     /// Limits and write (spec.toml)
     #[arg(long, value_name = "SPEC")]
     pub spec: PathBuf,
-    /// Box around every plant, such as gain=5%,frequency=2%,damping=20%,delay=5%
+    /// Box around every plant, such as gain=5%,frequency=2%,damping=20%,delay=5%; margins, DFT figures, harmonics and the
+    /// command's peak are then bounded over all of it
     #[arg(long, value_name = "SHARES", value_parser = uncertainty)]
     pub uncertainty: Option<Uncertainty>,
     /// Coefficients are held in words of this many bits (fixed point)
@@ -68,7 +69,8 @@ impl VerifyArguments {
     }
 }
 
-fn uncertainty(text: &str) -> Result<Uncertainty, String> {
+/// Shares of a box, such as gain=5%,frequency=2%.
+pub(super) fn uncertainty(text: &str) -> Result<Uncertainty, String> {
     let mut u = Uncertainty::default();
     for part in text.split(',') {
         let wrong =

@@ -10,5 +10,6 @@ pub mod polynomial;
 pub mod random;
 pub mod root;
 pub mod spectrum;
+pub mod twofold;
 pub mod unwrap;
 pub mod wide;

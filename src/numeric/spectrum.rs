@@ -21,6 +21,19 @@ pub fn forward(samples: &[f64]) -> Vec<Complex<f64>> {
     bins
 }
 
+/// The inverse without its 1/N: x_n = sum over k of X_k exp(+2 pi i k n / N), in place.
+///
+/// ```
+/// let mut x = servotune::numeric::spectrum::forward(&[1.0, 2.0, 4.0]);
+/// servotune::numeric::spectrum::backward(&mut x);
+/// assert!((x[2].re - 3.0 * 4.0).abs() < 1e-14 && x[2].im.abs() < 1e-14);
+/// ```
+pub fn backward(bins: &mut [Complex<f64>]) {
+    if !bins.is_empty() {
+        FftPlanner::new().plan_fft_inverse(bins.len()).process(bins);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,7 +3,7 @@
 use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Column, Table};
-use crate::verify::{Bounded, Certificate, Finding, Stability, Verdict};
+use crate::verify::{Bounded, Certificate, Finding, Stability, Verdict, WriteBox, WriteOpen};
 
 /// One table a machine, then the findings and the verdict.
 pub fn certificate_text(c: &Certificate) -> Result<String, ReportError> {
@@ -69,6 +69,7 @@ pub fn certificate_text(c: &Certificate) -> Result<String, ReportError> {
             ])?;
         }
         text += &table.text();
+        text += &case.write_box.as_ref().map_or(String::new(), |w| write_line(w) + "\n");
         for s in &case.sweep_again {
             text += &format!(
                 "Too coarse to promise: sweep {:.1} to {:.1} Hz again, points at most {:.3} Hz apart.\n",
@@ -106,6 +107,11 @@ pub fn certificate_sentence(c: &Certificate) -> String {
             };
             let proven = match end {
                 Some(x) => format!("{way} {x:.4} is proved"),
+                None if l.side == "at_most"
+                    && case.write_box.as_ref().is_some_and(|w| w.open.is_some() && l.proven.low.is_some()) =>
+                {
+                    case.write_box.as_ref().map_or(String::new(), |w| write_line(w).trim_end_matches('.').to_owned())
+                }
                 None if case.write.is_none() && l.proven.high.is_none() => "a sweep alone does not prove it".into(),
                 None => "no bound is proved".into(),
             };
@@ -120,6 +126,22 @@ pub fn certificate_sentence(c: &Certificate) -> String {
     }
     parts.extend(c.findings.iter().map(|f| sentence(f).trim_end_matches('.').to_owned()));
     format!("Not proved: {}.", parts.join("; "))
+}
+
+/// What was done for the write over a box, or why there is no bound.
+fn write_line(w: &WriteBox) -> String {
+    match w.open {
+        None => format!("The write is bounded over the whole box, in {} pieces.", w.boxes),
+        Some(why) => {
+            let why = match why {
+                WriteOpen::NotProvedStable => "the box is not proved stable",
+                WriteOpen::MayClip => "a member may reach output_limit",
+                WriteOpen::NoDecay => "a pole of the plant does not decay",
+                WriteOpen::TooLong => "the record is too long",
+            };
+            format!("The write has no bound over the box: {why}.")
+        }
+    }
 }
 
 /// A finding in words.

@@ -47,9 +47,12 @@ pub fn certificate(data: &Path, say: &mut dyn FnMut(&str)) -> Result<Study, Stud
     text += "\n## The four machines: table and certificate\n\nTuned to `specs/limits/paper.toml` from `specs/controllers/nominal.toml`.\n\n";
     text += &machine_table(&certified);
     let apart = certified.iter().map(|m| m.dft_apart).fold(0.0, f64::max);
+    let travel = crate::twin::paper_profile(crate::twin::MachineClass::Healthy)?.spiral.distance;
+    let errors = certified.iter().filter_map(|m| m.certificate.cases[0].write.as_ref()).map(|w| w.error / travel);
+    let error = errors.fold(0.0, f64::max);
     text += &format!(
-        "\nThe DFT figures are those of one record on the plant as it stands; no box is around them. Their half width, 1e-9 of the travel, is an assumption and no theorem. The certificate's \
-         simulation and the search's, which share no code, lie within {apart:.1e} of the travel of each other on these machines.\n"
+        "\nThe DFT figures are those of one record. Without a box their half width is the bound of rounding, {error:.1e} of the travel at most here. The certificate's \
+         simulation and the search's, which share no code, lie within {apart:.1e} of the travel of each other on these machines. The write over boxes: [certificate_write.md](certificate_write.md).\n"
     );
     for m in &certified {
         text += &format!("\n### {}\n\n```text\n{}```\n", m.class.name(), certificate_text(&m.certificate)?);

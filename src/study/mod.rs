@@ -7,6 +7,7 @@ mod certificate;
 mod certificate_loops;
 mod certificate_mutations;
 mod certificate_sweeps;
+mod certificate_write;
 mod classes;
 mod error;
 mod false_alarms;
@@ -22,10 +23,12 @@ mod mirror;
 mod mismatch;
 mod motor;
 mod plants;
+mod polish;
 mod prediction;
 mod recordings;
 
 pub use certificate::certificate;
+pub use certificate_write::certificate_write;
 pub use classes::classes;
 pub use error::StudyError;
 pub use false_alarms::false_alarms;
@@ -40,6 +43,7 @@ pub use mirror::mirror;
 pub use mismatch::mismatch;
 pub use motor::motor;
 pub use plants::plants;
+pub use polish::polishes;
 pub use prediction::prediction;
 pub use recordings::recordings;
 

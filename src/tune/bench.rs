@@ -7,7 +7,7 @@ use super::machine::{Buffers, PesScore, PesSlopes, Prepared};
 use super::parameters::chain_of;
 use super::requirements::{Found, Requirement};
 use super::spec::Limits;
-use super::{Machine, Parameters, Spec, TuneError, What};
+use super::{Machine, Parameters, PolishMethod, Spec, TuneError, What};
 use crate::controller::Controller;
 use crate::feedback::{Event, GRAZE, Graze, Pulls, QuickMargins};
 use crate::lti::Section;
@@ -25,6 +25,7 @@ pub struct Bench {
     pub(super) harmonics: Vec<usize>,
     pub(super) weight_low: f64,
     pub(super) weight_high: f64,
+    pub(super) method: PolishMethod,
 }
 
 /// The buffers of one thread.
@@ -91,7 +92,16 @@ impl Bench {
         let prepare = |m| Prepared::of(m, &spec.profile, &harmonics, peak, parameters.base());
         let machines = machines.iter().map(prepare).collect::<Result<Vec<_>, _>>()?;
         let [weight_low, weight_high] = weights(&spec.limits);
-        let mut bench = Bench { aimed: Vec::new(), machines, parameters, wanted, harmonics, weight_low, weight_high };
+        let mut bench = Bench {
+            aimed: Vec::new(),
+            machines,
+            parameters,
+            wanted,
+            harmonics,
+            weight_low,
+            weight_high,
+            method: PolishMethod::default(),
+        };
         bench.aim(&vec![vec![0.0; bench.wanted.len()]; bench.machines.len()]);
         Ok(bench)
     }

@@ -107,6 +107,13 @@ pub(super) struct Buffers {
     amplitude: Vec<f64>,
 }
 
+impl Buffers {
+    /// Amplitudes of the bins of the write seen last.
+    pub fn amplitude(&self) -> &[f64] {
+        &self.amplitude
+    }
+}
+
 /// The figures of one write that a search needs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct PesScore {
@@ -168,6 +175,14 @@ impl Prepared {
             noise: NoiseWork::default(),
             spectral: SpectralWork::default(),
             amplitude: Vec::new(),
+        }
+    }
+
+    /// The bins that are looked at.
+    pub fn dft(&self) -> &WindowDft {
+        match &self.source {
+            Source::Model { dft, .. } => dft,
+            Source::Response(s) => s.dft(),
         }
     }
 

@@ -6,6 +6,7 @@
 
 mod bench;
 mod confidence;
+mod convex_concave;
 mod from_table;
 mod gain_table;
 mod judge;
@@ -41,6 +42,7 @@ pub use pareto::{ParetoPoint, ParetoSettings, pareto};
 pub use physical::{
     PhysicalProof, PhysicalTuning, TUNED_AMPLITUDES, equivalent_responses, judge_physical, tune_physical,
 };
+pub use polish::PolishMethod;
 pub use requirements::{Found, Judged, JudgedLimit, Requirement, Side, What};
 pub use spec::{Bounds, HarmonicLimit, Limits, MarginLimits, Search, Spec, SpecError};
 pub use tuning::{TuneError, TuneSettings, tune, tune_jointly};

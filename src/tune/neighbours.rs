@@ -5,7 +5,7 @@
 //! and then by index, so the result has the same bytes for any number of threads.
 
 use super::polish::Polished;
-use super::search::{order, refine, walk_back};
+use super::search::{order, quadratic, walk_back};
 use super::{Bench, Parameter};
 use crate::numeric::random::Random;
 use rayon::prelude::*;
@@ -58,7 +58,7 @@ pub(super) fn improve(
                 let mut desk = bench.desk();
                 let mut random = Random::stream(seed, FIRST_STREAM + (round * tries + i) as u64);
                 let x = walk_back(bench, neighbour(bench, &parents, i, &mut random), &mut desk);
-                (refine(bench, &x, polish_steps, &mut desk), desk.evaluations)
+                (quadratic(bench, &x, polish_steps, &mut desk), desk.evaluations)
             })
             .collect();
         for (end, cost) in found {

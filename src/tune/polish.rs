@@ -8,6 +8,16 @@ use super::linear::{Linear, Row, linearise, rows};
 use super::quadratic::Quadratic;
 use super::{Bench, Desk, Score};
 
+/// How a candidate is polished.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PolishMethod {
+    /// Sequential quadratic programming over gains and filters.
+    #[default]
+    Quadratic,
+    /// The same, begun from convex-concave steps of the gains as well, and followed by them in turn; the best is kept.
+    ConvexConcave,
+}
+
 /// What the polish is after.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Goal {

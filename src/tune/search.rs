@@ -4,10 +4,11 @@
 //! merit and then by index, so the result has the same bytes for any number of threads.
 
 use super::bench::UNSTABLE;
+use super::convex_concave::gains;
 use super::neighbours::{Exact, improve};
 use super::polish::{Goal, Polished, polish};
 use super::starts::starts;
-use super::{Bench, Desk, Score};
+use super::{Bench, Desk, PolishMethod, Score};
 use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::neldermead::NelderMead;
 use rayon::prelude::*;
@@ -80,7 +81,15 @@ pub(super) fn search(
     // The sort is stable: of equals the earlier start stays ahead.
     ends.sort_by(|a, b| order(&a.score, &b.score));
     let around = improve(bench, &mut ends, effort.notches, effort.polish_steps, seed, exact);
-    let evaluations = evaluations + around;
+    let mut evaluations = evaluations + around;
+    if bench.method == PolishMethod::ConvexConcave {
+        let mut desk = bench.desk();
+        for end in ends.iter_mut().take(TURNED) {
+            *end = turns(bench, end.clone(), effort.polish_steps, &mut desk);
+        }
+        ends.sort_by(|a, b| order(&a.score, &b.score));
+        evaluations += desk.evaluations;
+    }
     Found { ends, evaluations, starts: count, feasible_starts }
 }
 
@@ -94,8 +103,53 @@ pub(super) fn order(a: &Score, b: &Score) -> Ordering {
     }
 }
 
-/// Polishes for the objective; where limits stay missed, first for the limits alone.
+/// Turns of convex-concave steps and quadratic ones.
+const TURNS: usize = 3;
+/// Gain of the objective (ln) that is worth another turn.
+const WORTHLESS: f64 = 1e-6;
+/// Programmes of one run of convex-concave steps.
+const PROGRAMMES: usize = 12;
+
+/// Ends that take turns after the search.
+const TURNED: usize = 6;
+
+/// Polishes by the bench's method.
 pub(super) fn refine(bench: &Bench, x: &[f64], steps: usize, desk: &mut Desk) -> Option<Polished> {
+    let best = quadratic(bench, x, steps, desk);
+    if bench.method == PolishMethod::Quadratic {
+        return best;
+    }
+    let stepped = gains(bench, x, PROGRAMMES, desk).and_then(|p| quadratic(bench, &p.x, steps, desk));
+    better(best, stepped).map(|best| turns(bench, best, steps, desk))
+}
+
+/// The better of two ends; of equals the first.
+fn better(a: Option<Polished>, b: Option<Polished>) -> Option<Polished> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if order(&b.score, &a.score).is_lt() { b } else { a }),
+        (a, b) => a.or(b),
+    }
+}
+
+/// Convex-concave steps and quadratic ones in turn, as long as they gain.
+fn turns(bench: &Bench, mut best: Polished, steps: usize, desk: &mut Desk) -> Polished {
+    for _ in 0..TURNS {
+        let Some(stepped) = gains(bench, &best.x, PROGRAMMES, desk) else { break };
+        let Some(on) = better(quadratic(bench, &stepped.x, steps, desk), Some(stepped)) else { break };
+        if order(&on.score, &best.score).is_ge() {
+            break;
+        }
+        let little = on.score.violation <= 0.0 && best.score.objective - on.score.objective < WORTHLESS;
+        best = on;
+        if little {
+            break;
+        }
+    }
+    best
+}
+
+/// Polishes for the objective; where limits stay missed, first for the limits alone.
+pub(super) fn quadratic(bench: &Bench, x: &[f64], steps: usize, desk: &mut Desk) -> Option<Polished> {
     let first = polish(bench, x, Goal::Best, steps, desk)?;
     if first.score.violation <= 0.0 {
         return Some(first);

@@ -6,7 +6,7 @@ use super::neighbours::spread;
 use super::outcome::{AtBound, Infeasible, Outcome, RelaxedLimit, Tuned, Work};
 use super::requirements::Requirement;
 use super::search::{Effort, refine, search};
-use super::{Bench, Machine, Parameters, Side, Spec, SpecError, What, judge};
+use super::{Bench, Machine, Parameters, PolishMethod, Side, Spec, SpecError, What, judge};
 use crate::controller::{Controller, ControllerError};
 use crate::feedback::FeedbackError;
 use crate::frf::FrfShapeError;
@@ -25,11 +25,19 @@ pub struct TuneSettings {
     pub simplex_steps: u64,
     /// Linearisations of the polish from each start.
     pub polish_steps: usize,
+    /// How each candidate is polished.
+    pub polish: PolishMethod,
 }
 
 impl Default for TuneSettings {
     fn default() -> Self {
-        TuneSettings { sample_time_s: 39.6e-6, starts: 12, simplex_steps: 40, polish_steps: 40 }
+        TuneSettings {
+            sample_time_s: 39.6e-6,
+            starts: 12,
+            simplex_steps: 40,
+            polish_steps: 40,
+            polish: PolishMethod::default(),
+        }
     }
 }
 
@@ -118,6 +126,7 @@ pub fn tune_jointly(
 ) -> Result<Outcome, TuneError> {
     let parameters = check(machines, spec, start, settings)?;
     let mut bench = Bench::new(machines, spec, parameters.clone())?;
+    bench.method = settings.polish;
     let mut effort = Effort {
         starts: settings.starts * spec.search.notches.max(1),
         notches: spec.search.notches,

@@ -3,6 +3,7 @@
 use super::bounds::{Bounded, Bounds, Stability};
 use super::table::{self, Finding};
 use super::write::{WriteFigures, write};
+use super::write_box::{BoxFigure, BoxSettings, BoxedLoop, WriteBox, bound_write};
 use super::{SweepAgain, SweepAssumption, Uncertainty, VerifyError, VerifySettings, Word, prove_loop, prove_sweep};
 use crate::document::{parse_toml, read_text, sha256_hex};
 use crate::frf::Sweep;
@@ -55,9 +56,12 @@ pub struct CaseProof {
     pub sha256: String,
     /// Margins.
     pub bounds: Bounds,
-    /// The write, of the plant as it stands: uncertainty is not in it. A sweep alone tells too little of it.
+    /// The write of the plant as it stands. A sweep alone tells too little of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub write: Option<WriteFigures>,
+    /// The write of every member of the box; absent without uncertainty.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub write_box: Option<WriteBox>,
     /// Requirements.
     pub limits: Vec<ProvenLimit>,
     /// Bands to sweep again before more can be proved.
@@ -158,6 +162,8 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
     let mut findings = table::sections(&c, table.sections());
     let held = i.word.hold(table.sections())?;
     let wanted = Requirement::list(&spec.margins, &spec.limits);
+    let bin = |r: &Requirement| if let What::Harmonic { k } = r.what { Some(k) } else { None };
+    let bins: Vec<usize> = wanted.iter().filter_map(bin).collect();
     let (mut cases, mut unfit) = (Vec::new(), Vec::new());
     let t = c.sample_time_s;
     let none = Uncertainty::default();
@@ -179,8 +185,21 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
             let figures = write(&plant, table.sections(), &c, &spec.profile);
             table::figures(&table.after, &bounds, Some(&figures))
         });
-        let limits = limits(&wanted, &bounds, Some(&figures));
-        cases.push(CaseProof { sha256: source.sha256(), bounds, write: Some(figures), limits, sweep_again: vec![] });
+        let write_box = i.uncertainty.any().then(|| {
+            let stable = bounds.stability == Stability::Stable;
+            let boxed = BoxedLoop {
+                plant: &plant,
+                sections: &held,
+                controller: &c,
+                profile: &spec.profile,
+                uncertainty: &i.uncertainty,
+                max_sensitivity: bounds.max_sensitivity.high.filter(|_| stable),
+            };
+            bound_write(&boxed, &bins, &BoxSettings::default())
+        });
+        let limits = limits(&wanted, &bounds, Some(&figures), write_box.as_ref());
+        let (sha256, sweep_again) = (source.sha256(), vec![]);
+        cases.push(CaseProof { sha256, bounds, write: Some(figures), write_box, limits, sweep_again });
     }
     // Without a limit on Ms, a hidden mode that brings L this near to -1 is one to look for.
     let away = 1.0 / spec.margins.max_sensitivity.unwrap_or(MS_UNSAID);
@@ -189,8 +208,9 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
         let (bounds, sweep_again) = prove(&held[..], &i.uncertainty)?;
         let of_table = if plain { bounds.clone() } else { prove(table.sections(), &none)?.0 };
         unfit.push(table::figures(&table.after, &of_table, None));
-        let limits = limits(&wanted, &bounds, None);
-        cases.push(CaseProof { sha256: sweep.source_digest.clone(), bounds, write: None, limits, sweep_again });
+        let limits = limits(&wanted, &bounds, None, None);
+        let sha256 = sweep.source_digest.clone();
+        cases.push(CaseProof { sha256, bounds, write: None, write_box: None, limits, sweep_again });
     }
     // The figures must be those of one of the machines.
     findings.extend(unfit.into_iter().min_by_key(Vec::len).unwrap_or_default());
@@ -218,8 +238,10 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
 fn assumptions(i: &Inputs<'_>) -> Vec<String> {
     let mut all = vec![
         "each plant is the linear model of its file, or any in the box around it".to_owned(),
-        "DFT figures and command peak are those of the profile's one draw of the noise, on the plant as it stands"
-            .to_owned(),
+        format!(
+            "DFT figures and command peak are those of the profile's one draw of the noise, on {}",
+            if i.uncertainty.any() { "every member of the box" } else { "the plant as it stands" }
+        ),
         "the firmware computes its sections without overflow; rounding inside a section is not in the bounds"
             .to_owned(),
     ];
@@ -235,12 +257,24 @@ fn assumptions(i: &Inputs<'_>) -> Vec<String> {
     all
 }
 
+/// Rounding of a member's write, in that of the plant as it stands.
+const MEMBERS: f64 = 10.0;
+
 /// Share of a limit by which it may be missed: a search that ends on a limit stands on it, and no bound of finite width lies on
 /// the right side of a point.
 const TOUCH: f64 = 1e-4;
 
-fn limits(wanted: &[Requirement], b: &Bounds, w: Option<&WriteFigures>) -> Vec<ProvenLimit> {
+fn limits(wanted: &[Requirement], b: &Bounds, w: Option<&WriteFigures>, over: Option<&WriteBox>) -> Vec<ProvenLimit> {
     let around = |x: f64, e: f64| Bounded { low: Some(x - e), high: Some(x + e), hz: None };
+    // Over a box the lower end stays a member's own, as with the margins: what that member misses is missed. Members round much as the plant does.
+    let boxed = |own: Bounded, e: f64, figure: &dyn Fn(&WriteBox) -> Option<BoxFigure>| match over {
+        None => own,
+        Some(o) => figure(o).map_or(Bounded { high: None, ..own }, |f| Bounded {
+            low: own.low.map(|l| l.max(f.seen - MEMBERS * e)),
+            high: Some(f.most + MEMBERS * e),
+            hz: None,
+        }),
+    };
     wanted
         .iter()
         .map(|r| {
@@ -250,10 +284,13 @@ fn limits(wanted: &[Requirement], b: &Bounds, w: Option<&WriteFigures>) -> Vec<P
                 What::MaxSensitivity => b.max_sensitivity,
                 What::GainCrossover => b.gain_crossover_hz,
                 what => w.map_or(Bounded::default(), |w| match what {
-                    What::DftLow => around(w.dft_low, w.error),
-                    What::DftHigh => around(w.dft_high, w.error),
-                    What::Harmonic { k } => w.harmonics.get(k - 1).map_or(Bounded::default(), |a| around(*a, w.error)),
-                    _ => around(w.command_peak, 1e-7 * w.command_peak),
+                    What::DftLow => boxed(around(w.dft_low, w.error), w.error, &|o| o.dft_low),
+                    What::DftHigh => boxed(around(w.dft_high, w.error), w.error, &|o| o.dft_high),
+                    What::Harmonic { k } => w
+                        .harmonics
+                        .get(k - 1)
+                        .map_or(Bounded::default(), |a| boxed(around(*a, w.error), w.error, &|o| o.harmonic(k))),
+                    _ => boxed(around(w.command_peak, w.command_error()), w.command_error(), &|o| o.command_peak),
                 }),
             };
             let unlimited = matches!(r.what, What::PhaseMargin | What::GainMargin) && proven.low.is_none();

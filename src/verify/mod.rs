@@ -5,23 +5,32 @@
 //! Convention: L = P C, negative feedback; spec: `specs/certificate.md`.
 
 mod bounds;
+mod cascade;
 mod certificate;
 mod chain;
 mod clusters;
+mod contour;
+mod core_moves;
 mod error;
 mod expansion;
+mod family;
 mod hidden;
 mod model;
+mod moves;
 mod patch;
 mod plant;
 mod prove;
 mod range;
+mod rounding;
 mod settings;
+mod spectrum_box;
 mod swept;
 mod table;
 mod uncertain;
 mod word;
 mod write;
+mod write_box;
+mod write_piece;
 
 pub use bounds::{Bounded, Bounds, ProvenCrossing, Stability};
 pub use certificate::{CaseProof, Certificate, Inputs, ProvenLimit, SCHEMA, Source, Verdict, certify, choices};
@@ -33,6 +42,7 @@ pub use table::Finding;
 pub use uncertain::Uncertainty;
 pub use word::Word;
 pub use write::WriteFigures;
+pub use write_box::{BoxFigure, BoxHarmonic, BoxSettings, BoxedLoop, WriteBox, WriteOpen, bound_write};
 
 use crate::frf::Frf;
 use crate::lti::{Plant, Section};

@@ -1,13 +1,15 @@
-//! The spiral write again: a cascade of second-order states stepped by matrix exponentials.
+//! The spiral write again, on the cascade of `cascade.rs`.
 //!
 //! In: plant, sections, profile. Out: the window's harmonics, its bands and the command's peak. Shared with the simulation are the
 //! profile's reader and the seeded generator only: the plant is never broken into partial fractions.
 
+use super::cascade::Loop;
+use super::rounding;
 use crate::controller::Controller;
-use crate::lti::{Body, Plant, Section};
+use crate::lti::{Plant, Section};
 use crate::numeric::random::Random;
 use crate::pes::Profile;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -23,164 +25,196 @@ pub struct WriteFigures {
     pub harmonics: Vec<f64>,
     /// Largest |command| (command_unit).
     pub command_peak: f64,
-    /// Half width of the DFT figures (position_unit): rounding of the recursion.
+    /// Half width of the DFT figures (position_unit): rounding, bounded (`rounding.rs`).
     pub error: f64,
+    /// Half width of the command's peak (command_unit): rounding; absent in certificates from before it was bounded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command_error: Option<f64>,
 }
 
-/// The continuous plant without its delay: x' = A x + B u, y = C x.
-struct Cascade {
-    /// [[A, B], [0, 0]].
-    rates: DMatrix<f64>,
-    output: DVector<f64>,
-}
-
-/// Rounding of the recursion as a share of the travel; an assumption, set far above the digits that a record of this length can lose.
-const ROUNDING: f64 = 1e-9;
-
-impl Cascade {
-    /// Every pair of resonances is 1 + (b1 s + b0)/q(s); its states are w/q and s/q, so that all are of one size.
-    fn of(p: &Plant) -> Cascade {
-        let n = 2 * (p.modes.len() + 1);
-        let mut rates = DMatrix::zeros(n + 1, n + 1);
-        let mut output = DVector::zeros(n);
-        // What enters the present pair: the input, and a row over the states before.
-        let mut entering = DVector::zeros(n);
-        for (i, m) in p.modes.iter().enumerate() {
-            let (a, b, w) = (2 * i, 2 * i + 1, m.pole_rad_s);
-            rates[(a, b)] = w;
-            rates[(b, a)] = -w;
-            rates[(b, b)] = -2.0 * m.pole_damping_ratio * w;
-            rates[(b, n)] = 1.0;
-            for j in 0..a {
-                rates[(b, j)] += entering[j];
-            }
-            entering[a] = (m.zero_rad_s - w) * (m.zero_rad_s + w) / w;
-            entering[b] = 2.0 * (m.zero_damping_ratio * m.zero_rad_s - m.pole_damping_ratio * w);
-        }
-        let (a, b) = (n - 2, n - 1);
-        match p.body {
-            Body::SecondOrder { dc_gain, natural_frequency_rad_s: w, damping_ratio } => {
-                rates[(a, b)] = w;
-                rates[(b, a)] = -w;
-                rates[(b, b)] = -2.0 * damping_ratio * w;
-                output[a] = p.resonance_gain * dc_gain * w;
-            }
-            Body::FreeInertia { acceleration_gain, viscous_rate_per_s } => {
-                rates[(a, b)] = 1.0;
-                rates[(b, b)] = -viscous_rate_per_s;
-                output[a] = p.resonance_gain * acceleration_gain;
-            }
-        }
-        rates[(b, n)] = 1.0;
-        for j in 0..a {
-            rates[(b, j)] += entering[j];
-        }
-        Cascade { rates, output }
-    }
-
-    /// State after `h` seconds under a constant input: x -> F x + g u.
-    fn step(&self, h: f64) -> (DMatrix<f64>, DVector<f64>) {
-        let n = self.output.len();
-        let e = (&self.rates * h).exp();
-        (e.view((0, 0), (n, n)).into_owned(), e.view((0, n), (n, 1)).column(0).into_owned())
+impl WriteFigures {
+    /// Half width of the command's peak (command_unit).
+    pub fn command_error(&self) -> f64 {
+        // What older certificates took for granted.
+        self.command_error.unwrap_or(1e-7 * self.command_peak)
     }
 }
 
-/// Simulates the write with these sections and reads the window.
-pub(super) fn write(plant: &Plant, sections: &[Section], c: &Controller, profile: &Profile) -> WriteFigures {
-    let (t, rate) = (c.sample_time_s, profile.pes.sample_rate_hz);
-    let cascade = Cascade::of(plant);
-    let samples = plant.delay_s / t;
-    let nearest = samples.round();
-    let whole = if (samples - nearest).abs() < 1e-9 { nearest } else { samples.floor() };
-    let rest = (plant.delay_s - whole * t).max(0.0);
-    let ((f1, g1), (f2, g2)) = (cascade.step(rest), cascade.step(t - rest));
-    let start = profile.first_servo_sample();
-    let [first, last] = profile.pes.window;
-    let servo = profile.servo_samples();
-    // Instant j/rate as a controller sample and the time since; one within rounding of the next sample is that sample.
-    let place = |j: usize| {
-        let at = j as f64 / rate;
-        let k = (at / t).floor();
-        let since = at - k * t;
-        if since > t * (1.0 - 1e-9) { (k as usize + 1, 0.0) } else { (k as usize, since.max(0.0)) }
-    };
-    let ticks = place(servo - 1).0 + 1;
+/// What a write leaves: the window of the PES and every command.
+pub(super) struct Record {
+    /// PES at the servo samples of the window (position_unit).
+    pub window: Vec<f64>,
+    /// Command of every controller sample, clipped (command_unit).
+    pub command: Vec<f64>,
+    pub sizes: Sizes,
+}
+
+/// Largest sizes that the recursion went through: rounding is a share of them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sizes {
+    /// Of each state, between samples too.
+    pub state: Vec<f64>,
+    /// Of each section's memory.
+    pub memory: Vec<f64>,
+    /// Of |reference| + |position| + |encoder noise|, and of the plant's input.
+    pub error: f64,
+    pub input: f64,
+    /// Whether a command was clipped.
+    pub clipped: bool,
+}
+
+impl Sizes {
+    fn watch(kept: &mut Vec<f64>, seen: impl Iterator<Item = f64>) {
+        for (i, x) in seen.enumerate() {
+            if i == kept.len() {
+                kept.push(0.0);
+            }
+            kept[i] = kept[i].max(x.abs());
+        }
+    }
+}
+
+/// Where the servo samples of the window lie: controller sample and the time since.
+pub(super) struct Clock {
+    t: f64,
+    rate: f64,
+    /// First servo sample of the window, and the one past its end.
+    pub window: [usize; 2],
+    /// Controller samples of the record.
+    pub ticks: usize,
+}
+
+impl Clock {
+    pub fn of(c: &Controller, profile: &Profile) -> Clock {
+        let start = profile.first_servo_sample();
+        let window = profile.pes.window.map(|n| start + n);
+        let mut clock = Clock { t: c.sample_time_s, rate: profile.pes.sample_rate_hz, window, ticks: 0 };
+        clock.ticks = clock.place(profile.servo_samples() - 1).0 + 1;
+        clock
+    }
+
+    /// Instant j/rate as a controller sample and the time since; one within rounding of the next sample is that sample.
+    pub fn place(&self, j: usize) -> (usize, f64) {
+        let at = j as f64 / self.rate;
+        let k = (at / self.t).floor();
+        let since = at - k * self.t;
+        if since > self.t * (1.0 - 1e-9) { (k as usize + 1, 0.0) } else { (k as usize, since.max(0.0)) }
+    }
+}
+
+/// The profile's own draws, one a controller sample: encoder (position_unit) and windage (command_unit).
+pub(super) fn draws(profile: &Profile, t: f64, ticks: usize) -> (Vec<f64>, Vec<f64>) {
     let noise = &profile.noise;
     let (mut white, mut wind) = (Random::stream(noise.seed, 1), Random::stream(noise.seed, 2));
     let keep = (-TAU * noise.windage_corner_hz * t).exp();
     let mut coloured = if noise.windage_rms > 0.0 { wind.normal() } else { 0.0 };
-    let mut x = DVector::zeros(cascade.output.len());
-    let mut memory = vec![[0.0; 2]; sections.len()];
-    let mut held = vec![0.0; whole as usize + 2];
-    let mut window = Vec::with_capacity(last - first);
-    let (mut peak, mut j) = (0.0f64, start + first);
-    for k in 0..ticks {
-        let y = cascade.output.dot(&x);
-        let draw = if noise.encoder_rms > 0.0 { noise.encoder_rms * white.normal() } else { 0.0 };
-        let at = |i: f64| reference(profile, (k as f64 + i) * t);
-        let mut signal = at(0.0) - (y + draw);
-        // Direct form I/II differ in rounding only; here each section keeps its own states w.
-        for (s, m) in sections.iter().zip(&mut memory) {
-            let w = signal - s.a1 * m[0] - s.a2 * m[1];
-            signal = s.b0 * w + s.b1 * m[0] + s.b2 * m[1];
-            *m = [w, m[0]];
-        }
-        if let Some(f) = &c.feedforward {
-            signal += f.factor * f.velocity_s * (at(1.0) - at(-1.0)) / (2.0 * t);
-            signal += f.factor * f.acceleration_s2 * (at(1.0) - 2.0 * at(0.0) + at(-1.0)) / (t * t);
-        }
-        let limit = c.output_limit.unwrap_or(f64::INFINITY);
-        let u = signal.clamp(-limit, limit);
-        peak = peak.max(u.abs());
-        held.rotate_right(1);
-        held[0] = u + noise.windage_rms * coloured;
+    let (mut encoder, mut windage) = (Vec::with_capacity(ticks), Vec::with_capacity(ticks));
+    for _ in 0..ticks {
+        encoder.push(if noise.encoder_rms > 0.0 { noise.encoder_rms * white.normal() } else { 0.0 });
+        windage.push(noise.windage_rms * coloured);
         if noise.windage_rms > 0.0 {
             coloured = keep * coloured + (1.0 - keep * keep).sqrt() * wind.normal();
         }
-        let (now, before) = (held[whole as usize], held[whole as usize + 1]);
-        let middle = &f1 * &x + &g1 * before;
-        while j < start + last && place(j).0 == k {
-            let since = place(j).1;
-            let (from, h, input) = if since < rest { (&x, since, before) } else { (&middle, since - rest, now) };
-            let (f, g) = cascade.step(h);
-            let position = cascade.output.dot(&(f * from + g * input));
+    }
+    (encoder, windage)
+}
+
+/// What the feed-forward adds at controller sample `k`.
+pub(super) fn forward(c: &Controller, profile: &Profile, k: usize) -> f64 {
+    let t = c.sample_time_s;
+    let at = |i: f64| reference(profile, (k as f64 + i) * t);
+    c.feedforward.as_ref().map_or(0.0, |f| {
+        let speed = f.factor * f.velocity_s * (at(1.0) - at(-1.0)) / (2.0 * t);
+        speed + f.factor * f.acceleration_s2 * (at(1.0) - 2.0 * at(0.0) + at(-1.0)) / (t * t)
+    })
+}
+
+/// Simulates the write with these sections and reads the window.
+pub(super) fn write(plant: &Plant, sections: &[Section], c: &Controller, profile: &Profile) -> WriteFigures {
+    let stepped = Loop::of(plant, sections, c);
+    let record = run(&stepped, c, profile);
+    let peak = record.command.iter().fold(0.0f64, |m, u| m.max(u.abs()));
+    let [error, command] = rounding::bound(&stepped, &record, c, profile);
+    WriteFigures { command_error: Some(command), ..of_window(&record.window, profile.pes.sample_rate_hz, peak, error) }
+}
+
+/// The write, sample by sample.
+pub(super) fn simulate(plant: &Plant, sections: &[Section], c: &Controller, profile: &Profile) -> Record {
+    run(&Loop::of(plant, sections, c), c, profile)
+}
+
+fn run(stepped: &Loop<'_>, c: &Controller, profile: &Profile) -> Record {
+    let (t, rate) = (c.sample_time_s, profile.pes.sample_rate_hz);
+    let clock = Clock::of(c, profile);
+    let (encoder, windage) = draws(profile, t, clock.ticks);
+    let mut state = stepped.at_rest();
+    let (window, command) = (Vec::new(), Vec::with_capacity(clock.ticks));
+    let mut record = Record { window, command, sizes: Sizes::default() };
+    let limit = c.output_limit.unwrap_or(f64::INFINITY);
+    let mut j = clock.window[0];
+    for k in 0..clock.ticks {
+        let y = stepped.cascade.output.dot(&state.x);
+        let wanted = reference(profile, k as f64 * t);
+        let error = wanted - (y + encoder[k]);
+        let signal = stepped.law(&mut state, error) + forward(c, profile, k);
+        let u = signal.clamp(-limit, limit);
+        record.command.push(u);
+        let (middle, before, now) = stepped.hold(&mut state, u + windage[k]);
+        let z = &mut record.sizes;
+        z.clipped |= u != signal;
+        z.error = z.error.max(wanted.abs() + y.abs() + encoder[k].abs());
+        z.input = z.input.max(u.abs() + windage[k].abs());
+        Sizes::watch(&mut z.state, state.x.iter().zip(middle.iter()).map(|(a, b)| a.abs().max(b.abs())));
+        Sizes::watch(&mut z.memory, state.memory.iter().map(|m| m[0].abs().max(m[1].abs())));
+        while j < clock.window[1] && clock.place(j).0 == k {
+            let since = clock.place(j).1;
+            let early = since < stepped.rest;
+            let (from, h, input) = if early { (&state.x, since, before) } else { (&middle, since - stepped.rest, now) };
+            let row = stepped.reading(h);
+            let n = from.len();
+            let position = row.rows(0, n).dot(from) + row[n] * input;
             let time = j as f64 / rate;
-            let runout: f64 = noise
-                .runout
-                .iter()
-                .map(|r| {
-                    r.amplitude * (TAU * f64::from(r.order) * noise.spindle_hz * time + r.phase_deg.to_radians()).cos()
-                })
-                .sum();
-            window.push(reference(profile, time) + runout - position);
+            record.window.push(reference(profile, time) + runout(profile, time) - position);
             j += 1;
         }
-        x = &f2 * middle + &g2 * now;
+        stepped.advance(&mut state, &middle, now);
     }
-    of_window(&window, rate, peak, ROUNDING * profile.spiral.distance)
+    record
+}
+
+/// Run-out at the head.
+fn runout(profile: &Profile, time: f64) -> f64 {
+    let noise = &profile.noise;
+    let line = |r: &crate::pes::Runout| {
+        let turns = f64::from(r.order) * noise.spindle_hz * time;
+        r.amplitude * (TAU * turns + r.phase_deg.to_radians()).cos()
+    };
+    noise.runout.iter().map(line).sum()
+}
+
+/// X_k of a window, unscaled, by Horner's rule in z = e^{-2 pi j k/N}.
+pub(super) fn bin(window: &[f64], k: usize) -> Complex<f64> {
+    let z = Complex::from_polar(1.0, -TAU * k as f64 / window.len() as f64);
+    window.iter().rev().fold(Complex::new(0.0, 0.0), |s, x| s * z + x)
+}
+
+/// Bins of the two bands.
+pub(super) fn bands(n: usize, rate: f64) -> [Vec<usize>; 2] {
+    [(600.0, 1500.0), (1500.0, 3000.0)]
+        .map(|(low, high)| (1..=n / 2).filter(|k| (low..=high).contains(&(*k as f64 * rate / n as f64))).collect())
 }
 
 /// The figures of a window.
-fn of_window(window: &[f64], rate: f64, command_peak: f64, error: f64) -> WriteFigures {
+pub(super) fn of_window(window: &[f64], rate: f64, command_peak: f64, error: f64) -> WriteFigures {
     let n = window.len();
-    let harmonics: Vec<f64> = (1..=n / 2)
-        .map(|k| {
-            // Horner's rule in z = e^{-2 pi j k/N}.
-            let z = Complex::from_polar(1.0, -TAU * k as f64 / n as f64);
-            let sum = window.iter().rev().fold(Complex::new(0.0, 0.0), |s, x| s * z + x);
-            sum.norm() / n as f64
-        })
-        .collect();
-    let band = |low: f64, high: f64| {
-        let inside = |k: usize| (low..=high).contains(&(k as f64 * rate / n as f64));
-        harmonics.iter().enumerate().filter(|(i, _)| inside(i + 1)).map(|(_, a)| a * a).sum::<f64>().sqrt()
-    };
-    WriteFigures { dft_low: band(600.0, 1500.0), dft_high: band(1500.0, 3000.0), harmonics, command_peak, error }
+    let harmonics: Vec<f64> = (1..=n / 2).map(|k| bin(window, k).norm() / n as f64).collect();
+    let [dft_low, dft_high] =
+        bands(n, rate).map(|b| b.iter().map(|k| harmonics[k - 1] * harmonics[k - 1]).sum::<f64>().sqrt());
+    WriteFigures { dft_low, dft_high, harmonics, command_peak, error, command_error: None }
 }
 
 /// The reference: the double integral of a pulse of acceleration and one of deceleration.
-fn reference(profile: &Profile, time: f64) -> f64 {
+pub(super) fn reference(profile: &Profile, time: f64) -> f64 {
     let s = &profile.spiral;
     let speed = s.velocity.abs();
     let a = speed / s.acceleration_time_s;

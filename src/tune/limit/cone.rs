@@ -10,7 +10,7 @@ use clarabel::solver::{
 
 /// The programme. Every row is dense: coefficients of x, then the constant.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Programme {
+pub(in crate::tune) struct Programme {
     /// Objective.
     pub cost: Vec<f64>,
     /// Rows that must not be negative.
@@ -25,7 +25,7 @@ pub(super) struct Programme {
 
 /// What the solver said.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Answer {
+pub(in crate::tune) enum Answer {
     /// A point that is (nearly) the best, and a proven bound.
     Found {
         x: Vec<f64>,

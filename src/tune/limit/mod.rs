@@ -5,7 +5,7 @@
 //! the solver's multipliers prove the bound. Spec: `specs/performance_limit.md`.
 
 mod basis;
-mod cone;
+pub(super) mod cone;
 mod cuts;
 mod enclosure;
 mod energy;
