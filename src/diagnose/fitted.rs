@@ -7,6 +7,7 @@ use super::linear::Knob;
 use super::refit::Chosen;
 use super::select::Model;
 use rayon::prelude::*;
+use std::f64::consts::LN_2;
 
 /// Most rounds of refit and noise where no repeat tells what noise is.
 const SETTLING: usize = 8;
@@ -34,6 +35,18 @@ pub(super) fn settled(bench: &Bench, model: Model, iterations: usize) -> Model {
     fitted(&own, model.chosen, &model.refitted.p, iterations)
 }
 
+/// What the last effect of a model takes under the noise that the model leaves, where no repeat tells what noise is: fall of the sum of
+/// squares. Another noise for each of two models may tell them apart where their errors do not.
+pub(super) fn taken_by_last(bench: &Bench, model: &Model, iterations: usize) -> f64 {
+    let mut own = bench.clone();
+    own.renew(&model.refitted.p, &model.chosen);
+    let p = &model.refitted.p;
+    let with = fitted(&own, model.chosen.clone(), p, iterations);
+    let mut chosen = model.chosen.clone();
+    chosen.pop();
+    fitted(&own, chosen, p, iterations).cost - with.cost
+}
+
 /// The better of a fit from where the search stands and one from the given plant.
 pub(super) fn fitted_from_both(bench: &Bench, chosen: &[Chosen], p: &[f64], iterations: usize) -> Model {
     let here = fitted(bench, chosen.to_vec(), p, iterations);
@@ -44,37 +57,63 @@ pub(super) fn fitted_from_both(bench: &Bench, chosen: &[Chosen], p: &[f64], iter
     if there.cost < here.cost { there } else { here }
 }
 
-/// Standard deviations of excess above which the delay is looked for far from the given one.
+/// Standard deviations of excess above which delay and gain are looked for far from the given ones.
 const FAR_OFF: f64 = 5.0;
-/// Farthest that it is looked for (samples), and how finely.
+/// Farthest that a delay is looked for (samples), and how finely.
 const FARTHEST: usize = 60;
 const STRIDE: usize = 3;
 
-/// The given plant with the delay at which it fits best, where that is not its own: a log that slipped by many samples is too far for
-/// a method that goes downhill.
-fn late(bench: &Bench) -> Option<Vec<f64>> {
+/// Farthest that a gain is looked for, as a ratio, and steps of it to a doubling.
+const MOST_GAIN: f64 = 8.0;
+const TO_A_DOUBLING: usize = 4;
+
+/// The given plant with the delay or the gain at which it fits best, where that is not its own: a log that slipped by many samples, or is in
+/// other units, is too far for a method that goes downhill.
+fn far(bench: &Bench, knob: Knob) -> Option<Vec<f64>> {
     let knobs = &bench.form.knobs;
-    let at = knobs.iter().position(|k| *k == Knob::Delay)?;
-    let start = |samples: f64| {
+    let at = knobs.iter().position(|k| *k == knob)?;
+    let values: Vec<f64> = match knob {
+        Knob::Delay => (1..=FARTHEST / STRIDE).map(|i| (i * STRIDE) as f64).collect(),
+        _ => {
+            let steps = (MOST_GAIN.log2() * TO_A_DOUBLING as f64) as i32;
+            (-steps..=steps).filter(|i| *i != 0).map(|i| f64::from(i) / TO_A_DOUBLING as f64 * LN_2).collect()
+        }
+    };
+    let start = |value: f64| {
         let mut p = vec![0.0; knobs.len()];
-        p[at] = samples;
+        p[at] = value;
         p
     };
-    let shifts: Vec<f64> = (1..=FARTHEST / STRIDE).map(|i| (i * STRIDE) as f64).collect();
-    let costs: Vec<f64> = shifts.par_iter().map(|&s| bench.fit(vec![]).cost(&start(s))).collect();
-    let (best, s) = costs.into_iter().zip(shifts).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let costs: Vec<f64> = values.par_iter().map(|&v| bench.fit(vec![]).cost(&start(v))).collect();
+    let (best, v) = costs.into_iter().zip(values).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let nearest = bench.fit(vec![]).cost(&start(0.0));
-    (best < nearest).then(|| start(s))
+    (best < nearest).then(|| start(v))
+}
+
+/// Most times that a refit which has not come to its end goes on.
+const ON: usize = 6;
+
+/// A linear refit that goes on until it meets its tolerance.
+fn to_its_end(bench: &Bench, mut model: Model, iterations: usize) -> Model {
+    for _ in 0..ON {
+        if model.refitted.converged {
+            break;
+        }
+        model = fitted(bench, vec![], &model.refitted.p, iterations);
+    }
+    model
 }
 
 /// The linear refit. A refit moves the motion that it was made along: once more, from there. Without repeats it moves the noise
 /// too.
 pub fn refit(bench: &mut Bench, iterations: usize) -> Model {
-    let mut baseline = fitted(bench, vec![], &vec![0.0; bench.form.knobs.len()], iterations);
-    if baseline.excess_sigma() > FAR_OFF
-        && let Some(start) = late(bench)
-    {
-        let other = fitted(bench, vec![], &start, iterations);
+    let mut baseline =
+        to_its_end(bench, fitted(bench, vec![], &vec![0.0; bench.form.knobs.len()], iterations), iterations);
+    for knob in [Knob::Delay, Knob::Gain] {
+        let Some(start) = Some(&baseline).filter(|b| b.excess_sigma() > FAR_OFF).and_then(|_| far(bench, knob)) else {
+            continue;
+        };
+        let other = to_its_end(bench, fitted(bench, vec![], &start, iterations), iterations);
         if other.cost < baseline.cost {
             baseline = other;
         }
@@ -85,7 +124,7 @@ pub fn refit(bench: &mut Bench, iterations: usize) -> Model {
             bench.renew(&baseline.refitted.p, &[]);
         }
         let before = baseline.refitted.p.clone();
-        baseline = fitted(bench, vec![], &before, iterations);
+        baseline = to_its_end(bench, fitted(bench, vec![], &before, iterations), iterations);
         let moved = before.iter().zip(&baseline.refitted.p).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         if moved < SETTLED {
             break;

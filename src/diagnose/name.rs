@@ -90,9 +90,10 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
         }
     }
     // Where the refit leaves next to nothing, a slight curve in the spectrum may be what its own straightness falls short of.
-    let curve = chosen.effect.facts().port == crate::physics::Port::Structure || own == "line_disturbance";
+    let line = own == "line_disturbance";
+    let curve = line || chosen.effect.facts().port == crate::physics::Port::Structure && c.concealed > CURVED;
     let slight = SLIGHT.max(SLIGHT_SHARE * (selection.given - selection.baseline.cost));
-    if curve && gain < slight && c.concealed > CURVED && selection.baseline.excess_sigma() < NEXT_TO_NOTHING {
+    if curve && gain < slight && selection.baseline.excess_sigma() < NEXT_TO_NOTHING {
         family.push("linear_parameters".to_owned());
     }
     let log_p = log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library().len() as f64).ln();

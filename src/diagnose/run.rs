@@ -90,15 +90,15 @@ const PRINTED: f64 = 1e-7;
 /// Samples at the start over which a command at rest is averaged.
 const AT_REST: usize = 16;
 
-/// Samples for which a drive stands still at the start, up to [`AT_REST`].
-fn still(drive: &[f64]) -> usize {
-    drive.iter().take(AT_REST).take_while(|v| **v == drive[0]).count()
+/// Samples for which a reference stands still at the start, up to [`AT_REST`].
+fn still(reference: Option<&[f64]>) -> usize {
+    reference.map_or(0, |r| r.iter().take(AT_REST).take_while(|v| **v == r[0]).count())
 }
 
-/// A signal before its record began: its mean over the samples for which nothing drives the machine, what the controller held against
-/// springs and cables for instance; otherwise the first sample.
-fn first(signal: &[f64], quiet: usize) -> f64 {
-    let n = quiet.max(1).min(signal.len());
+/// A signal before its record began: its mean as long as the reference stands still, what the controller held against springs
+/// and cables for instance; otherwise the first sample.
+fn first(signal: &[f64], reference: Option<&[f64]>) -> f64 {
+    let n = still(reference).max(1).min(signal.len());
     signal[..n].iter().sum::<f64>() / n as f64
 }
 
@@ -117,18 +117,16 @@ pub fn runs(case: &Case) -> Vec<Run> {
             });
             let began_s = session_s;
             session_s += record.len() as f64 * record.sample_time_s;
-            let standing = record.reference.as_deref().map_or(0, still);
-            let quiet = standing.min(still(&record.excitation));
             let input: Vec<f64> = record.command.iter().zip(&record.excitation).map(|(c, e)| c + e).collect();
             Run {
                 name: entry.name(),
                 role: entry.role,
                 began_s,
                 group,
-                rested: standing >= AT_REST.min(record.position.len()),
+                rested: still(record.reference.as_deref()) >= AT_REST.min(record.position.len()),
                 bumped: false,
-                before: first(&record.command, quiet),
-                origin: first(&record.position, quiet),
+                before: first(&record.command, record.reference.as_deref()),
+                origin: first(&record.position, record.reference.as_deref()),
                 reference: record.reference.clone(),
                 command: record.command.clone(),
                 excitation: record.excitation.clone(),

@@ -2,7 +2,7 @@
 
 use super::bench::Bench;
 use super::bootstrap::{Bootstrap, bootstrap};
-use super::fitted::{fitted, fitted_from_both, refit, settled};
+use super::fitted::{fitted, fitted_from_both, refit, settled, taken_by_last};
 use super::leftover::{Leftover, leftover};
 use super::locked::follows_motion;
 use super::name::{is_drag, same_drag};
@@ -180,7 +180,7 @@ pub fn select(
         bootstrap(bench, library, &baseline, settings.iterations, settings.false_alarm, settings.bootstrap)
     });
     let mut model = baseline.clone();
-    let mut steps = Vec::new();
+    let (mut steps, mut retraced) = (Vec::new(), 0);
     let limit = settings.false_alarm.ln();
     while model.chosen.len() < settings.most {
         progress(&format!("scan of {} effects for finding {}", library.len(), model.chosen.len() + 1));
@@ -232,16 +232,21 @@ pub fn select(
         // Repeats take part with their mean: what differs from record to record by its nature is no first thought.
         let paid = |t: &(usize, Model)| {
             let c = &step.candidates[t.0];
-            let own = if c.effect.facts().per_record { OWN * (model.evidence - t.1.evidence).max(0.0) } else { 0.0 };
-            t.1.evidence + price * numbers(c) + own
+            let begun = begun(bench, &c.setting.inner, c.effect);
+            let own = c.effect.facts().per_record || begun > 0;
+            let dearer = if own { OWN * (model.evidence - t.1.evidence).max(0.0) } else { 0.0 };
+            t.1.evidence + price * (numbers(c) + begun as f64) + dearer
         };
         step.taken = (0..step.tried.len()).min_by(|&a, &b| paid(&step.tried[a]).total_cmp(&paid(&step.tried[b])));
         let accepted = step.taken.and_then(|t| {
             let (i, next) = &step.tried[t];
             let c = &step.candidates[*i];
-            let gain = model.evidence - next.evidence;
-            let log_p =
-                log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library.len() as f64).ln();
+            let mut gain = model.evidence - next.evidence;
+            if !bench.levels.from_repeats {
+                gain = gain.min(taken_by_last(bench, next, settings.iterations));
+            }
+            let free = c.strengths.max(1) + begun(bench, &c.setting.inner, c.effect);
+            let log_p = log_tail(gain, free) + (c.points.max(1) as f64).ln() + (library.len() as f64).ln();
             let log_p = log_p.max(hums(bench, c, gain, library.len()));
             let explained = (baseline.evidence - model.evidence).max(0.0);
             let dragged = model.chosen.iter().any(|c| is_drag(c.effect.facts().name));
@@ -252,6 +257,20 @@ pub fn select(
         });
         if accepted.is_none() {
             step.taken = None;
+        }
+        // A gain that the linear parameters alone would have made is none of the law's: the model without it had not come to its end.
+        if let Some(next) = accepted.as_ref().filter(|_| retraced < AGAIN) {
+            let mut without = fitted(bench, model.chosen.clone(), &next.refitted.p, settings.iterations);
+            if !bench.levels.from_repeats {
+                without = settled(bench, without, settings.iterations);
+            }
+            if without.evidence + FURTHER < model.evidence {
+                if model.chosen.is_empty() {
+                    baseline = without.clone();
+                }
+                (model, retraced) = (without, retraced + 1);
+                continue;
+            }
         }
         steps.push(step);
         match accepted {
@@ -285,6 +304,15 @@ pub fn select(
     let leftover = leftover(bench, library, &model, simulated.as_ref(), &steps, (baseline.cost, limit));
     Selection { given, baseline, steps, model, simulated, rivals, leftover, bootstrap: calibration }
 }
+
+/// Numbers of each record's own that an effect brings with it: motions that a record may begin in.
+pub(super) fn begun(bench: &Bench, inner: &[f64], effect: &dyn Effect) -> usize {
+    effect.free(inner, &bench.scene, 1).len() * bench.stack.segments.len()
+}
+
+/// Most times that a step is made again because the model before it was not at its best, and the fall of the sum of squares that shows it.
+const AGAIN: usize = 3;
+const FURTHER: f64 = 5.0;
 
 /// Free numbers of a candidate.
 fn numbers(c: &Candidate) -> f64 {

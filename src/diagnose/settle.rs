@@ -5,7 +5,7 @@ use super::fitted::{fitted, fitted_from_both};
 use super::name::is_drag;
 use super::refit::Chosen;
 use super::rival::{BETTER, Rival};
-use super::select::{MINOR, Model, OWN, Step, gain_of};
+use super::select::{MINOR, Model, OWN, Step, begun, gain_of};
 use super::simulated::simulated;
 
 /// Takes effects out again that later ones made needless.
@@ -88,7 +88,8 @@ pub(super) fn exchange(bench: &Bench, model: &mut Model, steps: &[Step], iterati
             let mut chosen = model.chosen.clone();
             chosen[at] = Chosen { step: model.chosen[at].step, ..last.clone() };
             let other = fitted_from_both(bench, &chosen, &model.refitted.p, iterations);
-            let dearer = if c.effect.facts().per_record { OWN * gain } else { 0.0 };
+            let each = c.effect.facts().per_record || begun(bench, &last.setting.inner, last.effect) > 0;
+            let dearer = if each { OWN * gain } else { 0.0 };
             if other.cost + BETTER + dearer < model.cost && other.possible() {
                 let cost = model.cost;
                 found.push(Rival { name: own, cost, model: std::mem::replace(model, other) });

@@ -44,7 +44,10 @@ struct Swung {
 impl Ready {
     fn of(bench: &Bench, sampled: &Sampled, run: &Run, error: &[f64]) -> Ready {
         let mut local = Basis::default();
-        for mut c in free_motions(&bench.form.given.body, bench.scene.sample_time_s, run.len()) {
+        let t = bench.scene.sample_time_s;
+        // Lines are looked for elsewhere: at a frequency that the command has too, a swing would take them.
+        let lines = bench.lines.iter().flat_map(|l| l.columns(run, t));
+        for mut c in free_motions(&bench.form.given.body, t, run.len()).into_iter().chain(lines) {
             bench.whitener.apply(&mut c);
             local.add_local(0, c);
         }
