@@ -340,3 +340,46 @@ fn a_command_that_was_measured_and_not_held_is_seen() {
     assert!(d.remarks.iter().any(|r| r.contains("as measured")), "{:?}", d.remarks);
     assert!(d.fit.fit.rms_after < 1.05 * NOISE, "{:?}", d.fit.fit);
 }
+
+#[test]
+fn a_clock_that_runs_wrong_is_a_fault_of_the_log() {
+    // Every frequency 1/41 higher; the delay, 42 of the integrator's steps, is 41 then.
+    let e: f64 = 1.0 / 41.0;
+    let truth = Truth {
+        b: GIVEN.b * (1.0 + e).powi(2),
+        k: GIVEN.k * (1.0 + e).powi(2),
+        c: GIVEN.c * (1.0 + e),
+        delay: GIVEN.delay / (1.0 + e),
+        ..GIVEN
+    };
+    let d = diagnosed(&truth);
+    assert_eq!(d.verdict, Verdict::DataFault);
+    assert_eq!(d.findings[0].effect, "time_base_drift");
+    let relative = &d.findings[0].parameters["relative"];
+    assert!(relative.low < e && e < relative.high && relative.high - relative.low < 0.2 * e, "{relative:?}");
+    // The same body with another gain is another machine, and no clock.
+    let other = diagnosed(&Truth { b: GIVEN.b * 1.1, ..truth });
+    assert_eq!(other.verdict, Verdict::Refit, "{:?}", other.findings);
+}
+
+#[test]
+fn a_gain_that_swings_in_a_phase_of_its_own_in_every_record_is_named() {
+    let (depth, hz) = (0.02, 73.0);
+    let mut phases = Random::new(77);
+    let mut all = records(&GIVEN);
+    for (i, (_, r)) in all.iter_mut().enumerate() {
+        let (u, phase) = (r.command.clone(), phases.between(0.0, std::f64::consts::TAU));
+        let swung = move |t: f64| {
+            let at = (t / T).floor();
+            let w = std::f64::consts::TAU * hz * t + phase;
+            if at < 0.0 { 0.0 } else { u[at as usize] * (1.0 + depth * w.cos()) }
+        };
+        r.position = respond_to(&GIVEN, &swung, 500 + i as u64);
+    }
+    let d = diagnosed_from(all);
+    assert_eq!(d.verdict, Verdict::Named);
+    assert_eq!(d.findings[0].effect, "parametric_gain");
+    let p = &d.findings[0].parameters;
+    assert!((p["depth"].value - depth).abs() < 0.1 * depth, "{:?}", p["depth"]);
+    assert!((p["frequency_hz"].value - hz).abs() < 0.5, "{:?}", p["frequency_hz"]);
+}
