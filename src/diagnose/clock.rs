@@ -15,6 +15,9 @@ use std::collections::BTreeMap;
 const LARGEST: f64 = 0.1;
 const FINEST: f64 = 1e-6;
 
+/// Fall of the sum of squares from which one number in the place of all others is no chance.
+const SURE: f64 = 250.0;
+
 /// A scale of all times.
 pub(super) struct Clock {
     /// By how much the machine's frequencies come out higher, relative.
@@ -57,6 +60,11 @@ impl Clock {
         // Half of chi-square's curvature is one over the variance.
         let sigma = if curve > 0.0 { (0.5 * curve).sqrt().recip() } else { f64::INFINITY };
         Clock { relative: best.x, sigma, cost: best.value, given }
+    }
+
+    /// Whether it takes enough to be told from a chance likeness among small changes of many numbers.
+    pub fn sure(&self) -> bool {
+        self.given - self.cost > SURE
     }
 
     /// The finding.

@@ -136,7 +136,7 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
     }
     if d.findings.is_empty() && selection.model.chosen.is_empty() {
         let clock = Clock::of(bench, fixed[0]);
-        if clock.cost - selection.model.cost < allowed(1) {
+        if clock.sure() && clock.cost - selection.model.cost < allowed(1) {
             d.verdict = Verdict::DataFault;
             d.findings.push(clock.finding(bench));
             return;
