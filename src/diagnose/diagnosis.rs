@@ -74,6 +74,8 @@ const MEASURED: f64 = 0.9;
 const HELD_OUT: f64 = 1.2;
 /// Share of the error in excess of noise that findings must explain to be named.
 pub(super) const NAMED_SHARE: f64 = 0.955;
+/// The same for several laws beside which another still sees something.
+const SEVERAL: f64 = 0.98;
 /// Standard deviations of excess below which a model counts as clean, whatever the share.
 const CLEAN: f64 = 3.0;
 /// Standard deviations of excess, and whitened error per sample, from which something is there though no law was found.
@@ -285,8 +287,10 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
                 100.0 * l.share
             ));
         }
-        if (explained >= NAMED_SHARE || clean || decisive) && holds && against.is_none() && beside.is_none() && !mixture
-        {
+        // Of several laws together more is asked while yet another sees something: each further one is nearer to anything.
+        let several = selection.leftover.is_some() && model.chosen.len() > 1 && !clean && explained < SEVERAL;
+        let told = (explained >= NAMED_SHARE || clean || decisive) && !several && beside.is_none() && !mixture;
+        if told && holds && against.is_none() {
             if !clean && explained < NAMED_SHARE {
                 d.remarks.push(format!(
                     "no other law of the library comes near, but {:.1} % of the error in excess of noise stays unexplained",
