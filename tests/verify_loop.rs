@@ -3,7 +3,7 @@
 
 use servotune::controller::{Controller, Lowpass, Notch, Pid};
 use servotune::feedback::{ModelLoop, closed_loop_poles, margins};
-use servotune::lti::{Body, DiscretePlant, FrequencyResponse, Plant};
+use servotune::lti::{DiscretePlant, FrequencyResponse, Plant};
 use servotune::numeric::random::Random;
 use servotune::twin::plants::random_plant;
 use servotune::twin::{MachineClass, nominal_controller, paper_machine};
@@ -92,32 +92,6 @@ fn random_loops_stable_or_not_agree() {
     assert!((10..140).contains(&unstable), "{unstable} unstable loops: both kinds are wanted");
 }
 
-/// A machine drawn from the box, half of the draws at its corners.
-fn member(plant: &Plant, u: &Uncertainty, r: &mut Random) -> Plant {
-    let mut p = plant.clone();
-    let corner = r.uniform() < 0.5;
-    let mut by = |share: f64| {
-        let x = r.between(-1.0, 1.0);
-        1.0 + share * if corner { x.signum() } else { x }
-    };
-    p.resonance_gain *= by(u.gain);
-    p.delay_s *= by(u.delay);
-    if let Body::SecondOrder { natural_frequency_rad_s, damping_ratio, .. } = &mut p.body {
-        *natural_frequency_rad_s *= by(u.frequency);
-        *damping_ratio *= by(u.damping);
-    }
-    for m in &mut p.modes {
-        // Zero and pole of a mode move together.
-        let f = by(u.frequency);
-        m.zero_rad_s *= f;
-        m.pole_rad_s *= f;
-        let d = by(u.damping);
-        m.zero_damping_ratio *= d;
-        m.pole_damping_ratio *= by(u.damping);
-    }
-    p
-}
-
 #[test]
 fn no_machine_of_a_box_breaks_its_bounds() {
     let c = nominal_controller().unwrap();
@@ -135,7 +109,7 @@ fn no_machine_of_a_box_breaks_its_bounds() {
             let b = prove_loop(&plant, &chain.chain, t, &u, &VerifySettings::default()).unwrap();
             let (mut worst, mut least) = (0.0f64, f64::INFINITY);
             for _ in 0..40 {
-                let sampled = DiscretePlant::of(&member(&plant, &u, &mut r), t).unwrap();
+                let sampled = DiscretePlant::of(&u.draw(&plant, &mut r), t).unwrap();
                 let m = margins(&ModelLoop::new(&sampled, &chain).unwrap());
                 assert!(m.stable || b.stability != Stability::Stable, "{} {u:?}", class.name());
                 worst = worst.max(m.max_sensitivity);

@@ -10,30 +10,6 @@ use servotune::verify::{
     BoxSettings, BoxedLoop, Stability, Uncertainty, VerifySettings, WriteBox, WriteOpen, bound_write, prove_loop,
 };
 
-/// A machine drawn from the box, half of the draws at its corners.
-fn member(plant: &Plant, u: &Uncertainty, r: &mut Random) -> Plant {
-    let mut p = plant.clone();
-    let corner = r.uniform() < 0.5;
-    let mut by = |share: f64| {
-        let x = r.between(-1.0, 1.0);
-        1.0 + share * if corner { x.signum() } else { x }
-    };
-    p.resonance_gain *= by(u.gain);
-    p.delay_s *= by(u.delay);
-    if let Body::SecondOrder { natural_frequency_rad_s, damping_ratio, .. } = &mut p.body {
-        *natural_frequency_rad_s *= by(u.frequency);
-        *damping_ratio *= by(u.damping);
-    }
-    for m in &mut p.modes {
-        let f = by(u.frequency);
-        m.zero_rad_s *= f;
-        m.pole_rad_s *= f;
-        m.zero_damping_ratio *= by(u.damping);
-        m.pole_damping_ratio *= by(u.damping);
-    }
-    p
-}
-
 /// dft_low, dft_high, the box's harmonics, command peak.
 fn exact(plant: &Plant, c: &Controller, profile: &Profile, bins: &[usize]) -> Vec<f64> {
     let run = simulate(plant, c, profile).unwrap();
@@ -85,7 +61,7 @@ fn none_above(name: &str, plant: &Plant, c: &Controller, profile: &Profile, u: &
     let mut worst = vec![0.0f64; bounds.len()];
     let mut r = Random::new(1);
     for _ in 0..40 {
-        for (w, x) in worst.iter_mut().zip(exact(&member(plant, u, &mut r), c, profile, &bins)) {
+        for (w, x) in worst.iter_mut().zip(exact(&u.draw(plant, &mut r), c, profile, &bins)) {
             *w = w.max(x);
         }
     }

@@ -4,7 +4,7 @@
 
 use super::bench::Bench;
 use super::finding::{Estimate, Finding};
-use super::linear::{Knob, body_numbers};
+use super::linear::{Knob, body_numbers, rate_of};
 use super::name::{everywhere, text_of};
 use super::run::Run;
 use super::scan::log_tail;
@@ -32,12 +32,11 @@ pub(super) struct Clock {
 /// The linear parameters under a clock that makes all frequencies 1 + e times as high.
 fn scaled(bench: &Bench, e: f64) -> Vec<f64> {
     let form = &bench.form;
-    let (_, k, c) = body_numbers(&form.given.body);
-    let rate = if k > 0.0 { k.sqrt() } else { c.max(1.0) };
+    let (_, _, c) = body_numbers(&form.given.body);
     let knob = |knob: &Knob| match knob {
         Knob::Gain => 2.0 * e.ln_1p(),
         Knob::Stiffness => e * (2.0 + e),
-        Knob::Viscous => c * e / rate,
+        Knob::Viscous => c * e / rate_of(&form.given.body),
         Knob::Delay => -form.given.delay_s * e / (1.0 + e) / bench.scene.sample_time_s,
         Knob::Pole(_) | Knob::Zero(_) => e.ln_1p(),
         Knob::PoleDamping(_) | Knob::ZeroDamping(_) => 0.0,

@@ -5,7 +5,7 @@
 use super::bench::Bench;
 use super::linear::Knob;
 use super::refit::Chosen;
-use super::select::Model;
+use super::select::{Model, begun};
 use rayon::prelude::*;
 use std::f64::consts::LN_2;
 
@@ -18,8 +18,8 @@ pub(super) fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64], iterations: 
     let mut fit = bench.fit(chosen);
     let refitted = fit.refit(p, iterations);
     let chosen = fit.chosen;
-    let begun = 3 + chosen.iter().map(|c| c.effect.free(&c.setting.inner, &bench.scene, 1).len()).sum::<usize>();
-    let used = refitted.count() + begun * bench.stack.segments.len();
+    let begun = chosen.iter().map(|c| begun(bench, &c.setting.inner, c.effect)).sum::<usize>();
+    let used = refitted.count() + 3 * bench.stack.segments.len() + begun;
     let freedom = bench.stack.total as f64 - used as f64;
     let known = bench.repeats.iter().map(|r| r.1.len()).sum::<usize>() as f64 - bench.stack.total as f64;
     let level = if bench.repeats.is_empty() { 0.0 } else { freedom * freedom / known.max(1.0) };

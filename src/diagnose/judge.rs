@@ -212,7 +212,7 @@ impl<'a> Begun<'a> {
             if size < before {
                 best = Some((size, Started { error: left, free: free.clone() }));
             }
-            // Not below one part in a thousand of the last: found, or running away.
+            // Hardly below the last: found, or running away.
             if size >= (1.0 - FOUND) * before || size.is_nan() {
                 break;
             }

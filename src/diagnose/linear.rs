@@ -139,7 +139,7 @@ pub fn body_numbers(body: &Body) -> (f64, f64, f64) {
 }
 
 /// The unit of the viscous parameter (1/s).
-fn rate_of(body: &Body) -> f64 {
+pub(super) fn rate_of(body: &Body) -> f64 {
     match *body {
         Body::SecondOrder { natural_frequency_rad_s, .. } => natural_frequency_rad_s,
         Body::FreeInertia { viscous_rate_per_s, .. } => viscous_rate_per_s.max(1.0),

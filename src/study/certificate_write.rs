@@ -5,7 +5,7 @@ use super::{Study, StudyError};
 use crate::controller::Controller;
 use crate::frf::Frf;
 use crate::identify::{BodyChoice, Hold, IdentifySettings, identify};
-use crate::lti::{Body, Plant};
+use crate::lti::Plant;
 use crate::numeric::random::Random;
 use crate::pes::{Profile, figures, simulate};
 use crate::tune::{Machine, Spec, TuneSettings, tune};
@@ -114,7 +114,7 @@ fn machine(
         let mut worst = nominal.clone();
         let mut r = Random::new(7);
         for _ in 0..DRAWS {
-            for (w, x) in worst.iter_mut().zip(exact(&member(plant, &u, &mut r), c, profile, &w)?) {
+            for (w, x) in worst.iter_mut().zip(exact(&u.draw(plant, &mut r), c, profile, &w)?) {
                 *w = w.max(x);
             }
         }
@@ -159,30 +159,6 @@ fn exact(plant: &Plant, c: &Controller, profile: &Profile, w: &WriteBox) -> Resu
     let peak = run.command.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let bins = w.harmonics.iter().map(|h| f.harmonics[h.k - 1].amplitude);
     Ok([f.dft_low, f.dft_high].into_iter().chain(bins).chain([peak]).collect())
-}
-
-/// A machine drawn from the box, half of the draws at its corners.
-fn member(plant: &Plant, u: &Uncertainty, r: &mut Random) -> Plant {
-    let mut p = plant.clone();
-    let corner = r.uniform() < 0.5;
-    let mut by = |share: f64| {
-        let x = r.between(-1.0, 1.0);
-        1.0 + share * if corner { x.signum() } else { x }
-    };
-    p.resonance_gain *= by(u.gain);
-    p.delay_s *= by(u.delay);
-    if let Body::SecondOrder { natural_frequency_rad_s, damping_ratio, .. } = &mut p.body {
-        *natural_frequency_rad_s *= by(u.frequency);
-        *damping_ratio *= by(u.damping);
-    }
-    for m in &mut p.modes {
-        let f = by(u.frequency);
-        m.zero_rad_s *= f;
-        m.pole_rad_s *= f;
-        m.zero_damping_ratio *= by(u.damping);
-        m.pole_damping_ratio *= by(u.damping);
-    }
-    p
 }
 
 fn page(rows: &str, tally: &Tally) -> String {

@@ -5,6 +5,8 @@
 
 use super::plant::{Product, Quadratic, RigidBody};
 use super::{Patch, Range};
+use crate::lti::{Body, Plant};
+use crate::numeric::random::Random;
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
@@ -24,6 +26,32 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
+    /// A machine drawn from the box around `plant`, half of the draws at its corners: what a proof over the box is held against.
+    ///
+    /// Zero and pole of a mode move together in frequency; every damping ratio moves on its own.
+    pub fn draw(&self, plant: &Plant, random: &mut Random) -> Plant {
+        let mut p = plant.clone();
+        let corner = random.uniform() < 0.5;
+        let mut by = |share: f64| {
+            let x = random.between(-1.0, 1.0);
+            1.0 + share * if corner { x.signum() } else { x }
+        };
+        p.resonance_gain *= by(self.gain);
+        p.delay_s *= by(self.delay);
+        if let Body::SecondOrder { natural_frequency_rad_s, damping_ratio, .. } = &mut p.body {
+            *natural_frequency_rad_s *= by(self.frequency);
+            *damping_ratio *= by(self.damping);
+        }
+        for m in &mut p.modes {
+            let f = by(self.frequency);
+            m.zero_rad_s *= f;
+            m.pole_rad_s *= f;
+            m.zero_damping_ratio *= by(self.damping);
+            m.pole_damping_ratio *= by(self.damping);
+        }
+        p
+    }
+
     /// Whether anything is uncertain.
     pub fn any(&self) -> bool {
         [self.gain, self.frequency, self.damping, self.delay].iter().any(|x| *x > 0.0)
