@@ -244,12 +244,14 @@ pub fn make(order: &Order, out: &Path, attempt: u64) -> Option<Value> {
         let fact = put(name, q, &u, stage.ts, &mut truth);
         facts.push((named, fact));
     }
+    // Positions are told as recorded: the arm's own, seen through its modes at rest.
+    let seen: f64 = stage.plant.modes.iter().map(|m| (m.wz / m.wp).powi(2)).product();
     for (named, fact) in &facts {
         let figures: Map<String, Value> = fact
             .figures
             .iter()
             .map(|(n, v, l, c)| {
-                let v = if *n == "drop_at_15" { drop_at(15.0 / scale.length, *v) } else { *v };
+                let v = if *n == "drop_at_15" { drop_at(15.0 / scale.length / seen, *v) } else { *v };
                 ((*n).to_owned(), json!(v * scale.length.powi(*l) * scale.command.powi(*c)))
             })
             .collect();
@@ -349,7 +351,7 @@ pub fn visibility(stage: &Stage, given: &Plant, recs: &[Recorded]) -> Option<Map
     Some(map)
 }
 
-/// Fall of the torque factor at `x` tracks, of a machine whose field has fallen by `drop` at 15 tracks.
+/// Fall of the torque factor where the arm stands at `x` tracks, of a machine whose field has fallen by `drop` at 15 tracks.
 fn drop_at(x: f64, drop: f64) -> f64 {
     let fall = drop / (1.0 - drop) * (x / 15.0).powi(2);
     fall / (1.0 + fall)

@@ -312,8 +312,18 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
                 d.findings.extend(found);
             }
         } else if d.findings.is_empty() {
-            d.verdict = Verdict::LocatedUnexplained;
-            d.findings.push(super::name::unexplained(bench, selection, explained));
+            // A swing in one phase for all records may have taken the first step of one that has a phase in each.
+            let of_the_gain = model.chosen.iter().all(|c| c.effect.facts().name == "parametric_gain");
+            match of_the_gain.then(|| swing(bench, selection)).flatten() {
+                Some(f) => {
+                    d.verdict = Verdict::Named;
+                    d.findings.push(f);
+                }
+                None => {
+                    d.verdict = Verdict::LocatedUnexplained;
+                    d.findings.push(super::name::unexplained(bench, selection, explained));
+                }
+            }
         }
     } else if d.findings.is_empty()
         && let Some(f) = swing(bench, selection)

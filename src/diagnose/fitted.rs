@@ -47,16 +47,29 @@ pub(super) fn taken_by_last(bench: &Bench, model: &Model, iterations: usize) -> 
     fitted(&own, chosen, p, iterations).cost - with.cost
 }
 
+/// Share of the iterations after which the worse of two starts is given up.
+const TRIAL: usize = 3;
+
 /// The better of a fit from where the search stands and one from the given plant.
 pub(super) fn fitted_from_both(bench: &Bench, chosen: &[Chosen], p: &[f64], iterations: usize) -> Model {
-    let here = fitted(bench, chosen.to_vec(), p, iterations);
-    if here.excess_sigma() < 5.0 || p.iter().all(|v| *v == 0.0) {
-        return here;
+    let first = iterations.div_ceil(TRIAL);
+    let on = |m: Model| match m.refitted.converged {
+        true => m,
+        false => fitted(bench, m.chosen, &m.refitted.p, iterations - first),
+    };
+    let here = fitted(bench, chosen.to_vec(), p, first);
+    if p.iter().all(|v| *v == 0.0) {
+        return on(here);
     }
-    let there = fitted(bench, chosen.to_vec(), &vec![0.0; p.len()], iterations);
-    if there.cost < here.cost { there } else { here }
+    if here.excess_sigma() < NEAR {
+        return on(here);
+    }
+    let there = fitted(bench, chosen.to_vec(), &vec![0.0; p.len()], first);
+    on(if there.cost < here.cost { there } else { here })
 }
 
+/// Standard deviations of excess below which no other start is tried.
+const NEAR: f64 = 5.0;
 /// Standard deviations of excess above which delay and gain are looked for far from the given ones.
 const FAR_OFF: f64 = 5.0;
 /// Farthest that a delay is looked for (samples), and how finely.
@@ -93,13 +106,21 @@ fn far(bench: &Bench, knob: Knob) -> Option<Vec<f64>> {
 /// Most times that a refit which has not come to its end goes on.
 const ON: usize = 6;
 
-/// A linear refit that goes on until it meets its tolerance.
+/// Least share of what is left above the noise that going on must have taken for a refit to go on once more: where physics is missing the
+/// linear parameters creep along it without an end.
+const CREEP: f64 = 0.01;
+
+/// A linear refit that goes on until it meets its tolerance or only creeps.
 fn to_its_end(bench: &Bench, mut model: Model, iterations: usize) -> Model {
     for _ in 0..ON {
         if model.refitted.converged {
             break;
         }
+        let before = model.cost;
         model = fitted(bench, vec![], &model.refitted.p, iterations);
+        if before - model.cost < CREEP * (model.cost - model.freedom).max(0.0) {
+            break;
+        }
     }
     model
 }

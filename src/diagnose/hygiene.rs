@@ -278,8 +278,17 @@ fn slip(law: &Law, run: &Run, from: usize, shift: f64) -> Option<(usize, f64)> {
     (left < 0.05 * before).then_some((from + first, d))
 }
 
+/// A grid that positions stand on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// Its step (position_unit).
+    pub step: f64,
+    /// By how much the printed decimals leave the step open (position_unit).
+    pub off: f64,
+}
+
 /// The step of the position's grid (position_unit), where the values lie on one that is coarser than the printed digits.
-pub fn quantum(y: &[f64]) -> Option<f64> {
+pub fn quantum(y: &[f64]) -> Option<Grid> {
     let mut values: Vec<f64> = y.to_vec();
     values.sort_by(f64::total_cmp);
     let span = values[values.len() - 1] - values[0];
@@ -293,5 +302,18 @@ pub fn quantum(y: &[f64]) -> Option<f64> {
         (steps - steps.round()).abs() < 0.02 * steps.clamp(1.0, 5.0)
     });
     let decimal = (smallest.log10() - smallest.log10().round()).abs() < 1e-3;
-    (on_grid && !(decimal && span / smallest > 1e4)).then_some(smallest)
+    if !on_grid || decimal && span / smallest > 1e4 {
+        return None;
+    }
+    // From the smallest difference to the whole span, so that printed decimals blur the step ever less.
+    let (mut step, mut off) = (smallest, 0.0);
+    for v in &values {
+        let distance = v - values[0];
+        let count = (distance / step).round();
+        if count > 0.0 {
+            off = (distance - count * step).abs() / count;
+            step = distance / count;
+        }
+    }
+    Some(Grid { step, off: off.max(values.iter().fold(0.0, |m: f64, v| m.max(v.abs())) * f64::EPSILON * step / span) })
 }

@@ -3,6 +3,7 @@
 //! Parameters are relative to the plant that the case came with: 0 everywhere is that plant.
 
 use crate::lti::{Body, DiscretePlant, LtiError, Plant};
+use crate::physics::Sample;
 
 /// One parameter of the linear plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +55,14 @@ impl Carrier {
     /// The arm's own position over the recorded one, both at rest: 1 over the modes' gain at rest.
     pub fn arm_over_record(&self) -> f64 {
         self.plant.modes.iter().map(|m| (m.pole_rad_s / m.zero_rad_s).powi(2)).product()
+    }
+
+    /// The torque of spring and damper along a recorded motion (command_unit): the mean over each interval, by the trapezium.
+    pub(super) fn torque(&self, motion: &[Sample]) -> Vec<f64> {
+        let by = self.arm_over_record();
+        let at = |s: &Sample| by * (self.spring * s.x + self.damper * s.v);
+        let last = motion.len().saturating_sub(1);
+        (0..motion.len()).map(|k| 0.5 * (at(&motion[k]) + at(&motion[(k + 1).min(last)]))).collect()
     }
 }
 

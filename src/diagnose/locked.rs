@@ -52,7 +52,8 @@ pub(super) fn follows_motion(bench: &Bench, model: &Model, at: usize) -> bool {
         if of_segment.len() > 1 {
             let n = of_segment.len() as f64;
             // Repeats come scaled back to the noise of one record.
-            let squares = of_segment.iter().flat_map(|e| basis.coordinates(e, [0, s.len])).map(|c| c * c).sum::<f64>();
+            let spans = vec![[0, s.len]; of_segment.len()];
+            let squares = basis.coordinates(&of_segment, &spans).iter().flatten().map(|c| c * c).sum::<f64>();
             within += squares * (n - 1.0) / n;
             repeats += of_segment.len() - 1;
         }

@@ -3,6 +3,7 @@
 use super::bench::Bench;
 use super::columns::position_columns;
 use super::finding::{Estimate, Finding, Where};
+use super::hygiene::{Grid, quantum};
 use super::linear::Sampled;
 use super::place::place;
 use super::refit::Chosen;
@@ -138,7 +139,7 @@ fn effect_signal(bench: &Bench, selection: &Selection, at: usize) -> Vec<f64> {
 }
 
 /// Parameters of the chosen effect `at` with 95 % intervals: its numbers moved together along each direction that errs independently,
-/// the changes of each parameter added as squares; widened where the model leaves more than noise.
+/// the changes of each parameter added as squares; widened where the model leaves more than noise, and by what no machine follows a law to.
 fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String, Estimate> {
     let model = selection.last();
     let scene = &bench.scene;
@@ -166,7 +167,8 @@ fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String
         .iter()
         .enumerate()
         .map(|(k, p)| {
-            let off = moved.iter().map(|m| m.get(k).map_or(0.0, |q| (q.value - p.value).powi(2))).sum::<f64>().sqrt();
+            let off = moved.iter().map(|m| m.get(k).map_or(0.0, |q| (q.value - p.value).powi(2))).sum::<f64>();
+            let off = off.sqrt().hypot(effect.form(&chosen.setting, p.name) * p.value);
             let e = Estimate {
                 value: p.value,
                 low: p.value - off,
@@ -203,17 +205,22 @@ pub(super) fn unexplained(bench: &Bench, selection: &Selection, explained: f64) 
     }
 }
 
+/// Share of its step to which a scale is graduated.
+const GRADUATION: f64 = 1e-4;
+
 /// What the noise itself tells: a coarse sensor grid, or noise that grows with the speed. Names it only where the mean of the
 /// records is explained.
 pub(super) fn noise_story(bench: &Bench) -> Option<Finding> {
     let whole: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
     let command = &bench.form.given.position_unit;
-    let steps: Vec<f64> = whole.iter().filter_map(|r| super::hygiene::quantum(&r.position)).collect();
-    if steps.len() == whole.len() && !steps.is_empty() {
-        let q = steps.iter().copied().fold(f64::INFINITY, f64::min);
+    let grids: Vec<Grid> = whole.iter().filter_map(|r| quantum(&r.position)).collect();
+    let finest = grids.iter().copied().min_by(|a, b| a.step.total_cmp(&b.step));
+    if let Some(Grid { step: q, off }) = finest.filter(|_| grids.len() == whole.len()) {
         // Rounding to a grid makes noise of step/√12.
         if q * q / 12.0 > GRID * bench.levels.sensor_rms.powi(2) {
-            return Some(statistic("quantisation", ("step", plain(q, command)), 1e-300, &whole));
+            let off = off.max(GRADUATION * q);
+            let step = Estimate { value: q, low: q - off, high: q + off, unit: command.into() };
+            return Some(statistic("quantisation", ("step", step), 1e-300, &whole));
         }
     }
     // Squares of the whitened repeats against the square of the speed.

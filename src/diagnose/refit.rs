@@ -5,12 +5,13 @@ use super::columns::{Drive, drive};
 use super::linear::{Carrier, LinearForm, Sampled, free_motions};
 use super::lines::Line;
 use super::run::Run;
+use super::slopes::Slopes;
 use super::stack::{Basis, Segment, Stack};
 use super::trajectory::Trajectory;
 use super::whiten::Whitener;
 use crate::lti::Plant;
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
-use crate::physics::{Effect, Entry, Sample, Scene, Setting};
+use crate::physics::{Effect, Entry, Scene, Setting};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -86,7 +87,7 @@ impl Refitted {
     }
 }
 
-/// Step of a finite difference in a linear parameter: the answer is smooth and known to ten digits.
+/// Step of the finite difference in a linear parameter: the answer is smooth and known to ten digits.
 const STEP: f64 = 1e-5;
 /// Relative step in an inner parameter: laws have kinks, and smaller steps see only them.
 const INNER_STEP: f64 = 1e-3;
@@ -187,13 +188,8 @@ pub fn simulation_error(
 ) -> Vec<f64> {
     // From rest under the command that stood before: the body's answer to that constant is a free motion.
     let mut command: Vec<f64> = run.input.iter().map(|u| u - run.before).collect();
-    let mut torque: Option<Vec<f64>> = (carrier.spring != 0.0 || carrier.damper != 0.0).then(|| {
-        // The mean over each interval, by the trapezium.
-        let by = carrier.arm_over_record();
-        let at = |s: &Sample| by * (carrier.spring * s.x + carrier.damper * s.v);
-        let samples = &trajectory.samples;
-        (0..run.len()).map(|k| 0.5 * (at(&samples[k]) + at(&samples[(k + 1).min(run.len() - 1)]))).collect()
-    });
+    let sprung = carrier.spring != 0.0 || carrier.damper != 0.0;
+    let mut torque: Option<Vec<f64>> = sprung.then(|| carrier.torque(&trajectory.samples));
     let mut y = vec![0.0; run.len()];
     for (drive, strengths) in effects {
         for (column, s) in drive.segments[segment].iter().zip(drive.own(strengths, segment)) {
@@ -228,21 +224,33 @@ impl Residuals for Problem<'_, '_> {
 
     fn jacobian(&mut self, x: &[f64], j: &mut [f64]) {
         self.keep(x);
-        let base = self.error(x);
-        let p = self.fit.form.knobs.len();
+        let (p, strengths) = (self.fit.form.knobs.len(), self.strengths.len());
         let this = &*self;
-        j.par_chunks_exact_mut(base.len()).enumerate().for_each(|(i, column)| {
-            let mut moved = x.to_vec();
-            // A strength enters linearly: any step is exact, and one of its own size keeps the digits.
-            let step = match i {
-                i if i < p => STEP,
-                i if i < p + this.strengths.len() => x[i].abs().max(1e-9),
-                _ => INNER_STEP,
+        let settings = this.settings(x);
+        let drives: Vec<(&Drive, &[f64])> =
+            this.drives.iter().zip(&settings).map(|(d, s)| (&d.1, &s.strengths[..])).collect();
+        let slopes = Slopes::at(this.fit, &x[..p], &drives);
+        let taken = this.taken(&settings);
+        let base = if this.inner.is_empty() { Vec::new() } else { this.error(x) };
+        j.par_chunks_exact_mut(this.rows()).enumerate().for_each(|(i, column)| {
+            let raw = match (i.checked_sub(p), &slopes) {
+                (None, Some(slopes)) => slopes.knob(i, STEP),
+                (Some(k), Some(slopes)) if k < strengths => slopes.strength(this.strengths[k]),
+                (_, None) => return,
+                (Some(_), _) => {
+                    let mut moved = x.to_vec();
+                    moved[i] += INNER_STEP;
+                    for ((c, a), b) in column.iter_mut().zip(this.error(&moved)).zip(&base) {
+                        *c = (a - b) / INNER_STEP;
+                    }
+                    return;
+                }
             };
-            moved[i] += step;
-            for ((c, a), b) in column.iter_mut().zip(this.error(&moved)).zip(&base) {
-                *c = (a - b) / step;
+            for (s, mut part) in this.fit.stack.segments.iter().zip(raw) {
+                this.fit.whitener.apply(&mut part);
+                column[s.start..s.start + s.len].iter_mut().zip(&part).for_each(|(c, v)| *c = s.weight * v);
             }
+            taken.project(column);
         });
     }
 

@@ -161,6 +161,10 @@ const LEADS: f64 = 0.8;
 
 /// Share of a law that the linear parameters can imitate above which these records say nothing of it.
 const CONCEALED: f64 = 0.9995;
+/// The same where the linear parameters have come to their end within so many standard deviations of the noise: what is still seen is not
+/// theirs.
+const NEARLY_ALL: f64 = 0.999_99;
+const SETTLED: f64 = 5.0;
 /// Share of its gain by which an effect of each record's own must beat one of the machine.
 pub(super) const OWN: f64 = 0.05;
 
@@ -185,6 +189,7 @@ pub fn select(
     while model.chosen.len() < settings.most {
         progress(&format!("scan of {} effects for finding {}", library.len(), model.chosen.len() + 1));
         let mut step = scan(bench, library, &model);
+        let concealed = if model.excess_sigma() < SETTLED { NEARLY_ALL } else { CONCEALED };
         // Two forms of the leading effect, one of each other.
         let mut worth: Vec<usize> = Vec::new();
         for (i, c) in step.candidates.iter().enumerate() {
@@ -201,7 +206,7 @@ pub fn select(
                 && c.effect.possible(&c.setting, &[])
                 && (c.log_p_value(library.len()) < limit && hums(bench, c, c.gain, library.len()) < limit
                     || (!bench.levels.from_repeats && c.gain > LOOK))
-                && c.concealed < CONCEALED
+                && c.concealed < concealed
                 && seen < 1 + usize::from(leads)
                 && worth.len() < settings.refits
             {
@@ -264,7 +269,8 @@ pub fn select(
             if !bench.levels.from_repeats {
                 without = settled(bench, without, settings.iterations);
             }
-            if without.evidence + FURTHER < model.evidence {
+            let linear = model.evidence - without.evidence;
+            if linear > FURTHER.max(OF_THE_GAIN * (model.evidence - next.evidence)) {
                 if model.chosen.is_empty() {
                     baseline = without.clone();
                 }
@@ -310,9 +316,11 @@ pub(super) fn begun(bench: &Bench, inner: &[f64], effect: &dyn Effect) -> usize 
     effect.free(inner, &bench.scene, 1).len() * bench.stack.segments.len()
 }
 
-/// Most times that a step is made again because the model before it was not at its best, and the fall of the sum of squares that shows it.
+/// Most times that a step is made again because the model before it was not at its best, and the fall of the sum of squares that shows it,
+/// as a number and as a share of the step's gain.
 const AGAIN: usize = 3;
 const FURTHER: f64 = 5.0;
+const OF_THE_GAIN: f64 = 0.05;
 
 /// Free numbers of a candidate.
 fn numbers(c: &Candidate) -> f64 {

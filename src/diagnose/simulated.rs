@@ -290,6 +290,7 @@ pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
     if model.chosen.is_empty() {
         return None;
     }
+    let model = &with_late_numbers(model);
     let mut problem = Problem::new(bench, model);
     let mut x = problem.start();
     let before = size(&problem.settle(&x));
@@ -327,6 +328,24 @@ pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
     let plant = bench.form.plant(&p);
     let refitted = Refitted { p, plant, cost, directions, converged };
     Some(Model { chosen, refitted, cost, ..model.clone() })
+}
+
+/// The model with those inner numbers free that the search takes in steps; they err in no direction yet.
+fn with_late_numbers(model: &Model) -> Model {
+    let mut open = model.clone();
+    let strengths = model.chosen.iter().filter(|c| !c.effect.facts().fixed).map(|c| c.setting.strengths.len());
+    let mut at = model.refitted.p.len() + strengths.sum::<usize>();
+    for c in &mut open.chosen {
+        let late = c.effect.late(&c.setting.inner);
+        for i in 0..c.setting.inner.len() {
+            if let Some((_, range)) = late.iter().find(|(place, _)| *place == i && !c.continuous[i]) {
+                (c.continuous[i], c.range[i]) = (true, *range);
+                open.refitted.directions.iter_mut().for_each(|d| d.insert(at, 0.0));
+            }
+            at += usize::from(c.continuous[i]);
+        }
+    }
+    open
 }
 
 /// Where each number that was moved stands among all numbers of a fit: linear parameters, strengths, inner parameters.

@@ -5,6 +5,7 @@
 
 use super::run::Run;
 use crate::numeric::least_squares::dot;
+use crate::numeric::wide::wide;
 use nalgebra::DMatrix;
 
 /// One stretch of the stacked vector.
@@ -80,6 +81,7 @@ pub struct Basis {
 /// A column that keeps less than this share of its length after projection adds no direction.
 const DEPENDENT: f64 = 1e-5;
 
+#[inline(always)]
 fn axpy(out: &mut [f64], a: f64, x: &[f64]) {
     out.iter_mut().zip(x).for_each(|(o, x)| *o += a * x);
 }
@@ -93,29 +95,41 @@ impl Basis {
     /// Takes every direction of the basis out of a stacked vector.
     pub fn project(&self, x: &mut [f64]) {
         // Local directions are orthonormal among themselves, and global ones to them: one pass of each, in turn.
-        for (start, q) in &self.local {
-            let part = &mut x[*start..*start + q.len()];
-            let a = dot(part, q);
-            axpy(part, -a, q);
-        }
-        for q in &self.global {
-            let a = dot(x, q);
-            axpy(x, -a, q);
-        }
+        wide(|| {
+            for (start, q) in &self.local {
+                let part = &mut x[*start..*start + q.len()];
+                let a = dot(part, q);
+                axpy(part, -a, q);
+            }
+            for q in &self.global {
+                let a = dot(x, q);
+                axpy(x, -a, q);
+            }
+        });
     }
 
-    /// The coordinates of a vector that is zero outside `span`; `x` holds the span only.
-    pub fn coordinates(&self, x: &[f64], span: [usize; 2]) -> Vec<f64> {
-        let mut out = Vec::with_capacity(self.dimension());
+    /// The coordinates of vectors that are zero outside their spans; each of `columns` holds its span only.
+    ///
+    /// Direction by direction, so that each is fetched once for all of them.
+    pub fn coordinates<C: AsRef<[f64]>>(&self, columns: &[C], spans: &[[usize; 2]]) -> Vec<Vec<f64>> {
+        let mut out = vec![Vec::with_capacity(self.dimension()); columns.len()];
         for (start, q) in &self.local {
-            let (low, high) = (span[0].max(*start), span[1].min(start + q.len()));
-            out.push(if low < high {
-                dot(&x[low - span[0]..high - span[0]], &q[low - start..high - start])
-            } else {
-                0.0
-            });
+            for ((x, span), out) in columns.iter().map(C::as_ref).zip(spans).zip(&mut out) {
+                let (low, high) = (span[0].max(*start), span[1].min(start + q.len()));
+                out.push(if low < high {
+                    dot(&x[low - span[0]..high - span[0]], &q[low - start..high - start])
+                } else {
+                    0.0
+                });
+            }
         }
-        out.extend(self.global.iter().map(|q| dot(x, &q[span[0]..span[1]])));
+        wide(|| {
+            for q in &self.global {
+                for ((x, span), out) in columns.iter().map(C::as_ref).zip(spans).zip(&mut out) {
+                    out.push(dot(x, &q[span[0]..span[1]]));
+                }
+            }
+        });
         out
     }
 
@@ -181,7 +195,7 @@ impl Normal {
         let m = columns.len();
         let part = |i: usize| &columns[i][..];
         // What the basis takes of each column, as coordinates: the projected column itself is never needed.
-        let taken: Vec<Vec<f64>> = (0..m).map(|i| basis.coordinates(part(i), spans[i])).collect();
+        let taken = basis.coordinates(columns, spans);
         let own = |i: usize, j: usize| {
             let [low, high] = [spans[i][0].max(spans[j][0]), spans[i][1].min(spans[j][1])];
             if low < high {

@@ -10,6 +10,7 @@ mod plant_file;
 mod response;
 mod section;
 mod state;
+mod term_answers;
 
 pub use discrete::{DiscretePlant, Intersample, RealForm};
 pub use modal::{ModalForm, ModalTerm};
@@ -18,3 +19,4 @@ pub use plant_file::PlantFile;
 pub use response::FrequencyResponse;
 pub use section::{Section, SectionError, Sections, step_chain};
 pub use state::{PlantNumbers, PlantState};
+pub use term_answers::TermAnswers;

@@ -1,12 +1,13 @@
 //! The plant stepping in time: exact at every controller sample and between them.
 
 use super::{DiscretePlant, Intersample};
+use crate::numeric::wide::wide;
 
 /// State of one simulated plant, from rest at position 0.
 ///
 /// Order of calls for sample k: [`PlantState::position`] (and [`PlantState::between`] for instants before k+1 need the
 /// command of sample k, so call [`PlantState::command`] first), then [`PlantState::advance`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct PlantState {
     re: Vec<f64>,
     im: Vec<f64>,
@@ -16,6 +17,20 @@ pub struct PlantState {
     /// Ring of the commands u[k] back to u[k-D-1].
     commands: Vec<f64>,
     head: usize,
+}
+
+impl Clone for PlantState {
+    fn clone(&self) -> PlantState {
+        PlantState { re: self.re.clone(), im: self.im.clone(), commands: self.commands.clone(), ..*self }
+    }
+
+    /// Without a new allocation, as a copy at every sample needs.
+    fn clone_from(&mut self, from: &PlantState) {
+        self.re.clone_from(&from.re);
+        self.im.clone_from(&from.im);
+        self.commands.clone_from(&from.commands);
+        (self.velocity, self.rigid, self.head) = (from.velocity, from.rigid, from.head);
+    }
 }
 
 impl PlantState {
@@ -74,6 +89,27 @@ impl PlantState {
         sum + at.now * now + at.before * before + self.rigid + self.velocity * at.offset_s
     }
 
+    /// Position at the next sample, should `u` be the command of this one.
+    #[inline]
+    pub fn after(&self, plant: &DiscretePlant, u: f64) -> f64 {
+        let n = self.commands.len();
+        let back = |i: usize| self.commands[(self.head + i) % n];
+        // The ring holds the commands before this one; `u` would stand in front of them.
+        let (now, before) = (if n == 2 { u } else { back(n - 3) }, back(n - 2));
+        let mut sum = 0.0;
+        for i in 0..self.re.len() {
+            sum += (plant.lambda_re[i] * self.re[i] - plant.lambda_im[i] * self.im[i])
+                + (plant.now_re[i] * now + plant.before_re[i] * before);
+        }
+        if plant.rigid2 != 0.0 {
+            let (d, h) = (plant.rest_s, plant.sample_time_s - plant.rest_s);
+            sum += self.velocity * plant.sample_time_s
+                + before * (plant.rigid2 * d * (h + 0.5 * d) + plant.rigid1 * d)
+                + now * (0.5 * plant.rigid2 * h * h + plant.rigid1 * h);
+        }
+        sum + self.rigid
+    }
+
     /// To the next sample.
     #[inline]
     pub fn advance(&mut self, plant: &DiscretePlant) {
@@ -104,6 +140,12 @@ const LANES: usize = 4;
 impl DiscretePlant {
     /// Adds the plant's answer, from rest, to an input held over each sample; `input` and `out` have one length.
     pub fn add_response(&self, input: &[f64], out: &mut [f64]) {
+        wide(|| self.add_terms(input, out));
+        self.add_rigid(input, 1.0, out);
+    }
+
+    #[inline(always)]
+    fn add_terms(&self, input: &[f64], out: &mut [f64]) {
         let delayed = |k: usize, back: usize| if k >= back { input[k - back] } else { 0.0 };
         let whole = self.whole;
         for from in (0..self.lambda_re.len()).step_by(LANES) {
@@ -123,12 +165,17 @@ impl DiscretePlant {
                 }
             }
         }
+    }
+
+    /// Adds `share` times the answer of the double integrator alone, from rest.
+    pub(super) fn add_rigid(&self, input: &[f64], share: f64, out: &mut [f64]) {
+        let delayed = |k: usize, back: usize| if k >= back { input[k - back] } else { 0.0 };
         if self.rigid2 != 0.0 {
             let (d, h) = (self.rest_s, self.sample_time_s - self.rest_s);
             let (mut position, mut velocity) = (0.0, 0.0);
             for (k, y) in out.iter_mut().enumerate().take(input.len()) {
-                *y += position;
-                let (now, before) = (delayed(k, whole), delayed(k, whole + 1));
+                *y += share * position;
+                let (now, before) = (delayed(k, self.whole), delayed(k, self.whole + 1));
                 position += velocity * self.sample_time_s
                     + before * (self.rigid2 * d * (h + 0.5 * d) + self.rigid1 * d)
                     + now * (0.5 * self.rigid2 * h * h + self.rigid1 * h);
@@ -175,5 +222,42 @@ impl Intersample {
     /// Gains of u[k-D] and u[k-D-1].
     pub fn inputs(&self) -> [f64; 2] {
         [self.now, self.before]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::lti::{Body, Mode, Plant};
+    use crate::numeric::random::Random;
+
+    #[test]
+    fn the_position_after_a_command_is_that_of_the_plant_moved_on() {
+        let bodies = [
+            Body::SecondOrder { dc_gain: 75.0, natural_frequency_rad_s: 369.0, damping_ratio: 0.22 },
+            Body::FreeInertia { acceleration_gain: 1e5, viscous_rate_per_s: 0.0 },
+        ];
+        for (body, delay_s) in bodies.into_iter().flat_map(|b| [0.0, 1e-5, 4e-5, 1.3e-4].map(|d| (b, d))) {
+            let mode = Mode {
+                pole_rad_s: 5e3,
+                pole_damping_ratio: 0.02,
+                zero_rad_s: 4.5e3,
+                zero_damping_ratio: 0.03,
+            };
+            let (position_unit, command_unit) = ("track".into(), "V".into());
+            let modes = vec![mode];
+            let plant =
+                Plant { position_unit, command_unit, body, delay_s, resonance_gain: 1.0, modes, physics: Vec::new() };
+            let sampled = DiscretePlant::of(&plant, 4e-5).unwrap();
+            let (mut state, mut random) = (PlantState::at_rest(&sampled), Random::new(2));
+            for _ in 0..50 {
+                let u = random.normal();
+                let ahead = state.after(&sampled, u);
+                state.command(u);
+                state.advance(&sampled);
+                assert!((ahead - state.position()).abs() <= 1e-12 * state.position().abs().max(1e-6));
+            }
+        }
     }
 }

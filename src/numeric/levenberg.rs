@@ -53,6 +53,9 @@ pub struct LevenbergOutcome {
     pub evaluations: usize,
 }
 
+/// Most times that the damping by longest lengths is taken back by a factor of 8.
+const PRESSES: usize = 14;
+
 /// Memory that many runs share.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
@@ -65,6 +68,8 @@ pub struct Workspace {
     trial: Vec<f64>,
     damped: Vec<f64>,
     extra: Vec<f64>,
+    /// 1 over the longest length of each scaled component of the step.
+    measure: Vec<f64>,
 }
 
 impl Workspace {
@@ -107,7 +112,7 @@ pub fn minimise(
         work.qr.apply_q_transposed(&mut work.c);
         let mut moved = false;
         for _ in 0..20 {
-            work.solve_damped(damping);
+            let short = work.solve_within(damping, |i| problem.limit(i).step);
             // What the linear model promises: |r|² - |r + J s|² = 2 cᵀ R s - |R s|².
             let promised = work.promise();
             let steps = work.step.iter().zip(work.qr.scale());
@@ -125,13 +130,15 @@ pub fn minimise(
                 let ratio = if promised > 0.0 { (gained / promised).min(1.0) } else { 1.0 };
                 damping = (damping * (1.0 - (2.0 * ratio - 1.0).powi(3)).max(0.1)).max(1e-12);
                 growth = 2.0;
-                out.converged = gained <= settings.tolerance * cost && promised <= 10.0 * settings.tolerance * cost;
+                let little = gained <= settings.tolerance * cost && promised <= 10.0 * settings.tolerance * cost;
+                // A step that its longest length cuts short promises little and is no end.
+                out.converged = little && !short;
                 cost = trial_cost;
                 moved = true;
                 break;
             }
             if promised <= settings.tolerance * cost {
-                out.converged = true;
+                out.converged = !short;
                 break;
             }
             damping *= growth;
@@ -146,8 +153,35 @@ pub fn minimise(
 }
 
 impl Workspace {
-    /// The minimiser of |R s - c|² + damping |s|² by Givens rotations on the triangle.
-    fn solve_damped(&mut self, damping: f64) {
+    /// A damped step of which no component is longer than its longest; whether that cut it short.
+    ///
+    /// Directions that the data hardly tell are damped in the measure of those lengths, the least that is enough. A component cut off alone
+    /// would leave the others the answer to a step that is not made.
+    fn solve_within(&mut self, damping: f64, longest: impl Fn(usize) -> f64) -> bool {
+        let n = self.qr.cols();
+        self.measure.clear();
+        self.measure.extend((0..n).map(|i| (longest(i) * self.qr.scale()[i]).recip()));
+        self.solve_damped(damping, 0.0);
+        let over = |w: &Workspace| w.step.iter().zip(&w.measure).map(|(s, m)| (s * m).abs()).fold(0.0, f64::max);
+        if over(self) <= 1.0 {
+            return false;
+        }
+        // What is promised bounds how hard the lengths need to press: with this much a step of full length would not pay.
+        let whole = dot(&self.c[..n], &self.c[..n]);
+        let mut press = whole;
+        for _ in 0..PRESSES {
+            press /= 8.0;
+            self.solve_damped(damping, press);
+            if over(self) > 1.0 {
+                self.solve_damped(damping, 8.0 * press);
+                break;
+            }
+        }
+        true
+    }
+
+    /// The minimiser of |R s - c|² + damping |s|² + press |measure s|² by Givens rotations on the triangle.
+    fn solve_damped(&mut self, damping: f64, press: f64) {
         let n = self.qr.cols();
         self.step.clear();
         self.step.extend_from_slice(&self.c[..n]);
@@ -158,11 +192,10 @@ impl Workspace {
                 self.damped[i * n + j] = self.qr.r(i, j);
             }
         }
-        let root = damping.sqrt();
         self.extra.resize(n, 0.0);
         for j in 0..n {
             self.extra[j..].fill(0.0);
-            self.extra[j] = root;
+            self.extra[j] = (damping + press * self.measure[j].powi(2)).sqrt();
             let mut below = 0.0;
             for k in j..n {
                 let (a, b) = (self.damped[k * n + k], self.extra[k]);

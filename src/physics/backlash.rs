@@ -62,6 +62,11 @@ impl Effect for Backlash {
         vec![Parameter::new("gap", setting.inner[0], Unit::Position)]
     }
 
+    /// A machine holds to this law to about a hundredth.
+    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+        0.01
+    }
+
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting { inner: vec![given.positive("gap")?], strengths: vec![1.0] })
     }

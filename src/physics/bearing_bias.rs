@@ -109,6 +109,11 @@ impl Effect for BearingBias {
         ]
     }
 
+    /// Bearings and cables hold to their laws to about a hundredth.
+    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+        0.01
+    }
+
     fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let shortest = given.or("shortest_move", (6.0 * scene.noise).max(1e-4 * scene.travel));
         let inner = vec![given.positive("critical_length")?, given.positive("relaxation_time_s")?, shortest];

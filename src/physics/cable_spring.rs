@@ -83,6 +83,11 @@ impl Effect for CableSpring {
         ]
     }
 
+    /// Bearings and cables hold to their laws to about a hundredth.
+    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+        0.01
+    }
+
     fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let inner = vec![given.or("creep_time_s", 0.0), given.or("centre", scene.centre)];
         Ok(Setting { inner, strengths: vec![given.need("stiffness")?, given.or("quadratic", 0.0)] })

@@ -95,6 +95,11 @@ impl Effect for CoulombFriction {
         setting.strengths.first().is_some_and(|s| *s > 0.0)
     }
 
+    /// Bearings and cables hold to their laws to about a hundredth.
+    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+        0.01
+    }
+
     fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let length = if given.has("sliding_length") {
             given.positive("sliding_length")?

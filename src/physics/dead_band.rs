@@ -52,6 +52,11 @@ impl Effect for DeadBand {
         ]
     }
 
+    /// A machine holds to this law to about a hundredth.
+    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+        0.01
+    }
+
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let half =
             if given.has("half_width") { given.positive("half_width")? } else { 0.5 * given.positive("width")? };

@@ -252,6 +252,9 @@ impl<'a> Given<'a> {
     }
 }
 
+/// Share of a number that its law is taken to hold to, where the effect does not say.
+const FORM: f64 = 0.002;
+
 /// One effect of the library.
 pub trait Effect: Sync {
     /// What is known beforehand.
@@ -271,6 +274,16 @@ pub trait Effect: Sync {
     /// where they are not known yet.
     fn possible(&self, _setting: &Setting, _errors: &[f64]) -> bool {
         true
+    }
+
+    /// Share by which a number may be off because no machine follows a law to the letter; long records make intervals narrower than that.
+    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+        FORM
+    }
+
+    /// Inner numbers that the search takes in steps and the last fit as measures: place and range. They are above 0.
+    fn late(&self, _inner: &[f64]) -> Vec<(usize, [f64; 2])> {
+        Vec::new()
     }
 
     /// Inner numbers under which the same thing is possible, where `setting` is not: a wave of twice its period carried by its second

@@ -30,7 +30,6 @@ pub struct Machine {
     direct: DiscretePlant,
     pushed: PlantState,
     torqued: PlantState,
-    trial: PlantState,
     /// Both as they were when the last command was taken, for instants before the next sample.
     held: [PlantState; 2],
     /// What the position effects add at the head at this sample.
@@ -133,7 +132,6 @@ impl Machine {
         let history = vec![0.0; delayed.whole_delay_samples() + 2];
         Ok(Machine {
             reach: unit.position(),
-            trial: torqued.clone(),
             held: [pushed.clone(), torqued.clone()],
             offset: 0.0,
             delayed,
@@ -235,11 +233,9 @@ impl Machine {
         Sample { t: after, session, x, v: (3.0 * x - 4.0 * self.x[0] + self.x[1]) / (2.0 * t), ..self.now }
     }
 
-    fn solve(&mut self) -> f64 {
-        self.trial.clone_from(&self.torqued);
-        self.trial.command(-self.standing[1]);
-        self.trial.advance(&self.direct);
-        let free = self.origin + self.pushed.position() + self.trial.position() + self.free(self.k + 1);
+    fn solve(&self) -> f64 {
+        let torqued = self.torqued.after(&self.direct, -self.standing[1]);
+        let free = self.origin + self.pushed.position() + torqued + self.free(self.k + 1);
         let from = self.now.scaled(self.arm);
         let law = |w: f64| {
             let to = self.ahead(free + self.reach * w).scaled(self.arm);

@@ -9,10 +9,11 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::mode_shift::mode;
-use super::pair::Pair;
+use super::pair::{Pair, Turn};
 use super::sample::{Sample, Scene, logarithmic};
 use super::stage::{Next, Stage};
 use nalgebra::Complex;
+use std::cell::Cell;
 
 /// Inner: number of the mode, growth of its damping per amplitude, form (0: modal, 1: stage of a chain).
 pub struct ModalDamping;
@@ -36,26 +37,38 @@ const FACTOR: [f64; 2] = [0.02, 50.0];
 
 struct Joint {
     pair: Option<Pair>,
+    /// The step without the growing damping.
+    plain: Option<Turn>,
     growth: f64,
     step: f64,
+    /// The modal coordinate with it and without.
     q: [Complex<f64>; 2],
+    /// The next ones under a current: asked for by the column and by the step.
+    ahead: Cell<Option<(f64, [Complex<f64>; 2])>>,
 }
 
 impl Joint {
+    fn of(pair: Option<Pair>, growth: f64, step: f64) -> Joint {
+        let plain = pair.map(|p| Turn::of(p.pole, p.residue, step));
+        Joint { pair, plain, growth, step, q: [Complex::new(0.0, 0.0); 2], ahead: Cell::new(None) }
+    }
+
     fn next(&self, from: &Sample) -> [Complex<f64>; 2] {
-        let Some(pair) = self.pair else { return self.q };
+        if let Some((_, next)) = self.ahead.get().filter(|(i, _)| *i == from.i) {
+            return next;
+        }
+        let (Some(pair), Some(plain)) = (self.pair, self.plain) else { return self.q };
         let damped = |amplitude: f64| {
             let by = (1.0 + self.growth * amplitude).clamp(FACTOR[0], FACTOR[1]);
-            Complex::new(pair.pole.re * by, pair.pole.im)
+            Turn::of(Complex::new(pair.pole.re * by, pair.pole.im), pair.residue, self.step)
         };
         // Amplitude at the start, then at the middle of both ends: second order in the step.
         let amplitude = 2.0 * self.q[0].norm();
-        let guess = Pair::step(damped(amplitude), pair.residue, self.q[0], from.i, self.step);
+        let guess = damped(amplitude).after(self.q[0], from.i);
         let middle = 0.5 * (amplitude + 2.0 * guess.norm());
-        [
-            Pair::step(damped(middle), pair.residue, self.q[0], from.i, self.step),
-            Pair::step(pair.pole, pair.residue, self.q[1], from.i, self.step),
-        ]
+        let next = [damped(middle).after(self.q[0], from.i), plain.after(self.q[1], from.i)];
+        self.ahead.set(Some((from.i, next)));
+        next
     }
 }
 
@@ -67,6 +80,7 @@ impl Law for Joint {
 
     fn commit(&mut self, from: &Sample, _to: &Sample) {
         self.q = self.next(from);
+        self.ahead.set(None);
     }
 }
 
@@ -129,8 +143,7 @@ impl Effect for ModalDamping {
         {
             return Box::new(Damper { stage, growth: inner[1] });
         }
-        let q = [Complex::new(0.0, 0.0); 2];
-        Box::new(Joint { pair: Pair::of(scene, inner[0]), growth: inner[1], step: scene.sample_time_s, q })
+        Box::new(Joint::of(Pair::of(scene, inner[0]), inner[1], scene.sample_time_s))
     }
 
     fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {

@@ -7,10 +7,11 @@
 //! Or, where the resonance is a stage of a chain, its pole and zero move together (`physics::stage`).
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
-use super::pair::Pair;
+use super::pair::{Pair, Turn};
 use super::sample::{Sample, Scene, logarithmic};
 use super::stage::{Next, Stage};
 use nalgebra::Complex;
+use std::cell::Cell;
 
 /// Inner: number of the mode, shift per position, centre, form (0: modal, 1: stage of a chain).
 pub struct ModeShift;
@@ -34,21 +35,34 @@ const LARGEST: f64 = 0.5;
 
 struct Shifted {
     pair: Option<Pair>,
+    /// The step without the shift.
+    plain: Option<Turn>,
     slope: f64,
     centre: f64,
     step: f64,
     /// The modal coordinate with the shift and without.
     q: [Complex<f64>; 2],
+    /// The next ones under a shift and a current: asked for by the column and by the step.
+    ahead: Cell<Option<([f64; 2], [Complex<f64>; 2])>>,
 }
 
 impl Shifted {
+    fn of(pair: Option<Pair>, slope: f64, centre: f64, step: f64) -> Shifted {
+        let plain = pair.map(|p| Turn::of(p.pole, p.residue, step));
+        Shifted { pair, plain, slope, centre, step, q: [Complex::new(0.0, 0.0); 2], ahead: Cell::new(None) }
+    }
+
     fn next(&self, from: &Sample, to: &Sample) -> [Complex<f64>; 2] {
-        let Some(pair) = self.pair else { return self.q };
+        let (Some(pair), Some(plain)) = (self.pair, self.plain) else { return self.q };
         let by = 1.0 + (self.slope * (0.5 * (from.x + to.x) - self.centre)).clamp(-LARGEST, LARGEST);
-        [
-            Pair::step(pair.pole * by, pair.residue / by, self.q[0], from.i, self.step),
-            Pair::step(pair.pole, pair.residue, self.q[1], from.i, self.step),
-        ]
+        let under = [by, from.i];
+        if let Some((_, next)) = self.ahead.get().filter(|(u, _)| *u == under) {
+            return next;
+        }
+        let shifted = Turn::of(pair.pole * by, pair.residue / by, self.step);
+        let next = [shifted.after(self.q[0], from.i), plain.after(self.q[1], from.i)];
+        self.ahead.set(Some((under, next)));
+        next
     }
 }
 
@@ -60,6 +74,7 @@ impl Law for Shifted {
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
         self.q = self.next(from, to);
+        self.ahead.set(None);
     }
 }
 
@@ -112,9 +127,8 @@ impl Effect for ModeShift {
         {
             return Box::new(Sliding { stage, slope: inner[1], centre: inner[2] });
         }
-        let zero = Complex::new(0.0, 0.0);
         let pair = Pair::of(scene, inner[0]);
-        Box::new(Shifted { pair, slope: inner[1], centre: inner[2], step: scene.sample_time_s, q: [zero; 2] })
+        Box::new(Shifted::of(pair, inner[1], inner[2], scene.sample_time_s))
     }
 
     fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {

@@ -81,6 +81,11 @@ impl Effect for NonlinearSpring {
         }
     }
 
+    /// A machine holds to this law to about a hundredth.
+    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+        0.01
+    }
+
     fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let centre = given.or("centre", scene.centre);
         if given.has("stop_stiffness") {

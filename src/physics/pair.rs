@@ -33,10 +33,22 @@ impl Pair {
     pub(super) fn all(scene: &Scene) -> Vec<(f64, Pair)> {
         (0..scene.plant.modes.len()).map(|j| j as f64).filter_map(|j| Some((j, Pair::of(scene, j)?))).collect()
     }
+}
 
-    /// q after `step` under q' = pole q + residue u with u held.
-    pub(super) fn step(pole: Complex<f64>, residue: Complex<f64>, q: Complex<f64>, u: f64, step: f64) -> Complex<f64> {
+/// One step of q' = pole q + residue u with u held: exact.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Turn {
+    turn: Complex<f64>,
+    gain: Complex<f64>,
+}
+
+impl Turn {
+    pub(super) fn of(pole: Complex<f64>, residue: Complex<f64>, step: f64) -> Turn {
         let turn = (pole * step).exp();
-        q * turn + residue * u * (turn - 1.0) / pole
+        Turn { turn, gain: residue * (turn - 1.0) / pole }
+    }
+
+    pub(super) fn after(&self, q: Complex<f64>, u: f64) -> Complex<f64> {
+        q * self.turn + self.gain * u
     }
 }

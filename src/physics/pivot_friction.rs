@@ -4,7 +4,9 @@
 //! level; exact over a step: z1 = s - (s - z0) exp(-|dx|/x_s), s = sgn(dx). Maxwell-slip form (Al-Bender, Lampaert, Swevers
 //! 2005): a row of spring-slider elements with evenly spread yield lengths up to 2 x_s, whose first loading is the parabola
 //! z = d/x_s - (d/x_s)²/4. In every shape x_s is the sliding level over the first stiffness. The inner parameter `shape`
-//! chooses: 0 Dahl, 1 Maxwell slip with that parabola, 2 Maxwell slip with Dahl's first loading 1 - exp(-d/x_s).
+//! chooses: 0 is Dahl's law; above 0 it is Maxwell slip with the first loading z = 1 - (1 + m d/x_s)^(-1/m), m = shape/2 - 1
+//! (survival of a generalised Pareto law of yield lengths, Pickands 1975): 1 the parabola, 2 Dahl's 1 - exp(-d/x_s), towards 0 one
+//! spring that slips at once, above 2 elements that yield ever later.
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::sample::{Sample, Scene, logarithmic};
@@ -53,7 +55,7 @@ impl Law for Dahl {
     }
 }
 
-/// A row of spring-slider elements whose first loading is a given curve, linear between nodes (Iwan 1966): element i yields
+/// A row of spring-slider elements whose first loading is a curve, linear between nodes (Iwan 1966): element i yields
 /// at node i and has the stiffness by which the curve's slope falls there. Unloading and nested loops follow Masing's rule.
 struct MaxwellSlip {
     /// Yield lengths (position_unit).
@@ -65,8 +67,10 @@ struct MaxwellSlip {
 }
 
 impl MaxwellSlip {
-    /// `curve` from 0 to 1 over distances in sliding lengths, up to `end` of them.
-    fn of(curve: fn(f64) -> f64, end: f64, length: f64) -> MaxwellSlip {
+    fn of(shape: f64, length: f64) -> MaxwellSlip {
+        let tail = 0.5 * shape - 1.0;
+        let curve = |d: f64| first_loading(d, tail);
+        let end = loaded_to(ELASTIC, tail);
         // Nodes closer at the start, where the curve bends most.
         let node = |i: usize| end * (i as f64 / ELEMENTS as f64).powf(1.5);
         let level = |i: usize| curve(node(i)) / curve(end);
@@ -102,14 +106,25 @@ impl Law for MaxwellSlip {
     }
 }
 
-/// First loading of evenly spread yield lengths; all slide at two sliding lengths.
-fn parabola(d: f64) -> f64 {
-    if d < 2.0 { d * (1.0 - 0.25 * d) } else { 1.0 }
+/// Share of the level that no element holds any more at the last node.
+const ELASTIC: f64 = 0.0025;
+/// Forms beside Dahl's law, from nearly one spring to a long tail.
+const SHAPES: [f64; 2] = [0.1, 3.5];
+
+/// First loading over `d` sliding lengths; `tail` below 0 ends at -1/tail lengths.
+fn first_loading(d: f64, tail: f64) -> f64 {
+    if tail.abs() < 1e-6 { 1.0 - (-d).exp() } else { 1.0 - (1.0 + tail * d).max(0.0).powf(-1.0 / tail) }
 }
 
-/// First loading of Dahl's law.
-fn exponential(d: f64) -> f64 {
-    1.0 - (-d).exp()
+/// Sliding lengths after which a share `left` of the level is still to come; all of it where the loading ends.
+fn loaded_to(left: f64, tail: f64) -> f64 {
+    if tail < -1e-6 {
+        -1.0 / tail
+    } else if tail < 1e-6 {
+        -left.ln()
+    } else {
+        (left.powf(-tail) - 1.0) / tail
+    }
 }
 
 impl Effect for PivotFriction {
@@ -125,11 +140,10 @@ impl Effect for PivotFriction {
     }
 
     fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        if inner[1] < 0.5 {
+        if inner[1] < 0.5 * SHAPES[0] {
             Box::new(Dahl { length: inner[0], z: 0.0 })
         } else {
-            let (curve, end): (fn(f64) -> f64, f64) = if inner[1] < 1.5 { (parabola, 2.0) } else { (exponential, 6.0) };
-            Box::new(MaxwellSlip::of(curve, end, inner[0]))
+            Box::new(MaxwellSlip::of(inner[1].clamp(SHAPES[0], SHAPES[1]), inner[0]))
         }
     }
 
@@ -141,8 +155,21 @@ impl Effect for PivotFriction {
         ]
     }
 
+    fn late(&self, inner: &[f64]) -> Vec<(usize, [f64; 2])> {
+        if inner[1] < 0.5 * SHAPES[0] { Vec::new() } else { vec![(1, SHAPES)] }
+    }
+
     fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         setting.strengths.first().is_some_and(|s| *s > 0.0)
+    }
+
+    /// The first stiffness lies below the smallest strokes: curves that agree above them differ by a tenth there. Dahl's law has one curve.
+    fn form(&self, setting: &Setting, parameter: &str) -> f64 {
+        match parameter {
+            "sliding_length" if setting.inner[1] >= 0.5 * SHAPES[0] => 0.1,
+            "sliding_length" => 0.02,
+            _ => 0.01,
+        }
     }
 
     fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {

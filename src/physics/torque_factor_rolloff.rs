@@ -69,6 +69,11 @@ impl Effect for TorqueFactorRolloff {
         Box::new(Rolloff { whole: inner[0] > 1.5, travel: scene.travel * scene.arm_over_record() })
     }
 
+    /// Between fields that fall as their curvature says (a parabola, a bell, the edge of a gap) the fall at one place differs by so much.
+    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+        0.05
+    }
+
     /// A magnet's field falls towards its ends and does not rise again on the way.
     fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         let s = &setting.strengths;

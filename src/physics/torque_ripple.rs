@@ -5,6 +5,7 @@
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::encoder_cyclic_error::EncoderCyclicError;
 use super::sample::{Sample, Scene};
+use std::cell::Cell;
 use std::f64::consts::TAU;
 
 /// Inner: the period; 0 for a torque of its own, 1 for a factor of the current. Strengths: cosine and sine.
@@ -27,13 +28,19 @@ static FACTS: Facts = Facts {
 struct Ripple {
     wave: f64,
     factor: bool,
+    /// Position that was asked for last, its sine and cosine: where one interval ends, the next begins.
+    last: Cell<[f64; 3]>,
 }
 
 impl Law for Ripple {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        let (s0, c0) = (self.wave * from.x).sin_cos();
+        let [x, mut s0, mut c0] = self.last.get();
+        if x != from.x {
+            (s0, c0) = (self.wave * from.x).sin_cos();
+        }
         let (s1, c1) = (self.wave * 0.5 * (from.x + to.x)).sin_cos();
         let (s2, c2) = (self.wave * to.x).sin_cos();
+        self.last.set([to.x, s2, c2]);
         // The acting command is the mean over the interval already.
         let by = if self.factor { from.i } else { 1.0 } / 6.0;
         (out[0], out[1]) = (by * (c0 + 4.0 * c1 + c2), by * (s0 + 4.0 * s1 + s2));
@@ -52,7 +59,7 @@ impl Effect for TorqueRipple {
     }
 
     fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Ripple { wave: TAU / inner[0], factor: inner[1] > 0.5 })
+        Box::new(Ripple { wave: TAU / inner[0], factor: inner[1] > 0.5, last: Cell::new([f64::NAN; 3]) })
     }
 
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {

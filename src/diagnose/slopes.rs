@@ -1,0 +1,139 @@
+//! Slopes of the simulation error in the linear parameters and in the strengths of the effects.
+//!
+//! In: a fit, its linear parameters and what its effects' laws give. Out: for each of them the slope of the error of every mean run, not yet
+//! whitened. A linear parameter moves few terms of the plant: the answers are kept term by term. Spring, damper and strengths enter
+//! linearly: their slope is one answer.
+
+use super::columns::Drive;
+use super::linear::{Carrier, Knob, Sampled};
+use super::refit::Fit;
+use crate::lti::TermAnswers;
+use crate::physics::Entry;
+
+/// Everything that the slopes at one point share.
+pub(super) struct Slopes<'a> {
+    fit: &'a Fit<'a>,
+    p: &'a [f64],
+    carrier: Carrier,
+    sampled: Sampled,
+    drives: &'a [(&'a Drive, &'a [f64])],
+    records: Vec<Answers>,
+}
+
+/// One mean run.
+struct Answers {
+    /// To command and command effects.
+    command: TermAnswers,
+    /// To the torques of effects.
+    effects: Option<TermAnswers>,
+    /// To spring and damper of the carrier.
+    body: Option<TermAnswers>,
+    /// The answer of all three.
+    sum: Vec<f64>,
+}
+
+impl Answers {
+    fn of(
+        fit: &Fit,
+        carrier: &Carrier,
+        sampled: &Sampled,
+        drives: &[(&Drive, &[f64])],
+        segment: usize,
+    ) -> Answers {
+        let run = &fit.means[segment];
+        let mut command: Vec<f64> = run.input.iter().map(|u| u - run.before).collect();
+        let mut torque: Option<Vec<f64>> = None;
+        for (drive, strengths) in drives {
+            for (column, s) in drive.segments[segment].iter().zip(drive.own(strengths, segment)) {
+                let into = match drive.entry {
+                    Entry::Command => &mut command,
+                    Entry::Torque => torque.get_or_insert_with(|| vec![0.0; run.len()]),
+                    Entry::Position => continue,
+                };
+                into.iter_mut().zip(column).for_each(|(o, v)| *o += s * v);
+            }
+        }
+        let body = (carrier.spring != 0.0 || carrier.damper != 0.0).then(|| {
+            TermAnswers::of(&sampled.direct, &carrier.torque(&fit.trajectories[segment].samples))
+        });
+        let command = TermAnswers::of(&sampled.delayed, &command);
+        let effects = torque.map(|w| TermAnswers::of(&sampled.direct, &w));
+        let mut made = Answers { command, effects, body, sum: Vec::new() };
+        made.sum = made.under(sampled, 1.0, run.len());
+        made
+    }
+
+    /// The position under another plant, its spring and damper `body` times as strong.
+    fn under(&self, sampled: &Sampled, body: f64, len: usize) -> Vec<f64> {
+        let mut y = vec![0.0; len];
+        self.command.add(&sampled.delayed, 1.0, &mut y);
+        if let Some(w) = &self.effects {
+            w.add(&sampled.direct, 1.0, &mut y);
+        }
+        if let Some(w) = &self.body {
+            w.add(&sampled.direct, body, &mut y);
+        }
+        y
+    }
+}
+
+impl<'a> Slopes<'a> {
+    /// At linear parameters `p`, the effects' laws and strengths as given; none where these parameters make no plant.
+    pub fn at(fit: &'a Fit<'a>, p: &'a [f64], drives: &'a [(&'a Drive, &'a [f64])]) -> Option<Slopes<'a>> {
+        let carrier = fit.form.carrier(p);
+        let sampled = Sampled::of(&carrier.plant, fit.scene.sample_time_s).ok()?;
+        let records = (0..fit.means.len()).map(|i| Answers::of(fit, &carrier, &sampled, drives, i)).collect();
+        Some(Slopes { fit, p, carrier, sampled, drives, records })
+    }
+
+    /// The slope in linear parameter `i`, of every mean run; by a difference over `step` where it does not enter linearly.
+    pub fn knob(&self, i: usize, step: f64) -> Vec<Vec<f64>> {
+        let mut moved = self.p.to_vec();
+        moved[i] += step;
+        let there = self.fit.form.carrier(&moved);
+        let here = &self.carrier;
+        if matches!(self.fit.form.knobs[i], Knob::Stiffness | Knob::Viscous) {
+            let [spring, damper] = [there.spring - here.spring, there.damper - here.damper].map(|d| -d / step);
+            let less = Carrier { spring, damper, ..there };
+            let along = self.fit.trajectories.iter();
+            return along.map(|t| self.answer(Entry::Torque, &less.torque(&t.samples))).collect();
+        }
+        // Gain and modes weigh spring and damper alike.
+        let weigh = |c: &Carrier| c.arm_over_record() * if c.spring != 0.0 { c.spring } else { c.damper };
+        let body = if weigh(here) != 0.0 { weigh(&there) / weigh(here) } else { 1.0 };
+        let Ok(sampled) = Sampled::of(&there.plant, self.fit.scene.sample_time_s) else {
+            return self.records.iter().map(|r| vec![0.0; r.sum.len()]).collect();
+        };
+        let one = |r: &Answers| {
+            let mut y = r.under(&sampled, body, r.sum.len());
+            y.iter_mut().zip(&r.sum).for_each(|(y, base)| *y = (base - *y) / step);
+            y
+        };
+        self.records.iter().map(one).collect()
+    }
+
+    /// The slope in strength `place` of an effect, of every mean run.
+    pub fn strength(&self, (effect, place): (usize, usize)) -> Vec<Vec<f64>> {
+        let (drive, strengths) = &self.drives[effect];
+        let one = |(segment, run): (usize, &super::run::Run)| {
+            let own = drive.own(strengths, segment);
+            // The strengths of another record move nothing here.
+            let column = place.checked_sub(strengths.len() - own.len()).and_then(|j| drive.segments[segment].get(j));
+            match column {
+                Some(column) => self.answer(drive.entry, &column.iter().map(|v| -v).collect::<Vec<f64>>()),
+                None => vec![0.0; run.len()],
+            }
+        };
+        self.fit.means.iter().enumerate().map(one).collect()
+    }
+
+    fn answer(&self, entry: Entry, column: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; column.len()];
+        match entry {
+            Entry::Command => self.sampled.delayed.add_response(column, &mut y),
+            Entry::Torque => self.sampled.direct.add_response(column, &mut y),
+            Entry::Position => y.copy_from_slice(column),
+        }
+        y
+    }
+}
