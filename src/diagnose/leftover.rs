@@ -6,7 +6,6 @@ use super::scan::{Candidate, Ground};
 use super::select::{Model, Step, hums, scan};
 use super::simulated::simulation_error;
 use crate::physics::Effect;
-use rayon::prelude::*;
 use serde::Serialize;
 
 /// The strongest thing that is still seen.
@@ -70,7 +69,5 @@ fn in_simulation(bench: &Bench, library: &[&'static dyn Effect], model: &Model) 
     basis.project(&mut error);
     let plant = bench.form.carrier(&model.refitted.p).plant;
     let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
-    let mut candidates = ground.scan(library);
-    candidates.par_iter_mut().take(10).for_each(|c| ground.refine(c));
-    candidates
+    ground.best(library)
 }

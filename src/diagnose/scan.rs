@@ -116,8 +116,17 @@ pub struct Ground<'a, 'f> {
 
 /// Points of a grid from one that is worked out in full to the next.
 const STRIDE: usize = 10;
+/// The same up to there from either end of a class.
+const FIRST: usize = 2;
 /// Points that are worked out in full because the others make them look best.
 const PROMISING: usize = 6;
+/// Classes of points that are refined.
+const REFINED: usize = 10;
+/// Most peaks of a class, the share of the strongest that one must reach, and points between two: of a wave the nearest point sees half,
+/// and one of another length may look stronger until both are refined.
+const PEAKS: usize = 3;
+const RISES: f64 = 0.4;
+const BESIDE: usize = 1;
 
 impl<'a, 'f> Ground<'a, 'f> {
     /// The ground of a fit: `error` is whitened and has `basis` taken out; torques and commands are seen through `plant`.
@@ -199,52 +208,75 @@ impl<'a, 'f> Ground<'a, 'f> {
         self.normal(effect, inner).explained(effect.facts().fixed)
     }
 
-    /// The best point of every effect, one candidate for each combination of its discrete inner parameters; best first.
-    pub fn scan(&self, effects: &[&'static dyn Effect]) -> Vec<Candidate> {
-        let mut all: Vec<Candidate> = effects
+    /// The best point of every effect, one candidate for each combination of its discrete inner parameters, the strongest of them refined.
+    pub fn best(&self, effects: &[&'static dyn Effect]) -> Vec<Candidate> {
+        let mut classes = self.scan(effects);
+        classes.par_iter_mut().take(REFINED).for_each(|peaks| {
+            peaks.par_iter_mut().for_each(|c| {
+                self.refine(c);
+                if let Some(inner) = c.effect.instead(&c.setting).filter(|_| !c.effect.possible(&c.setting, &[])) {
+                    self.put(c, inner);
+                    self.refine(c);
+                }
+            });
+        });
+        let strongest = |peaks: Vec<Candidate>| peaks.into_iter().reduce(|a, b| if b.gain > a.gain { b } else { a });
+        classes.into_iter().filter_map(strongest).collect()
+    }
+
+    /// Scans effects: the peaks of every class of points, the strongest first, classes likewise.
+    fn scan(&self, effects: &[&'static dyn Effect]) -> Vec<Vec<Candidate>> {
+        let mut all: Vec<Vec<Candidate>> = effects
             .par_iter()
             .flat_map(|e| {
                 let grid = e.grid(self.fit.scene);
                 let free = continuous(&grid);
-                classes(&grid).into_par_iter().map(move |class| self.best(*e, &grid, &free, &class)).flatten()
+                classes(&grid).into_par_iter().map(move |class| self.peaks(*e, &grid, &free, &class))
             })
             .collect();
-        all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        all.retain(|peaks| !peaks.is_empty());
+        all.sort_by(|a, b| b[0].gain.total_cmp(&a[0].gain));
         all
     }
 
-    /// The best of some points of a grid, none where none can be worked out.
-    fn best(
-        &self,
-        effect: &'static dyn Effect,
-        grid: &[Vec<f64>],
-        free: &[bool],
-        class: &[usize],
-    ) -> Option<Candidate> {
+    /// The strongest points of a class, none beside another; none where none can be worked out.
+    fn peaks(&self, effect: &'static dyn Effect, grid: &[Vec<f64>], free: &[bool], class: &[usize]) -> Vec<Candidate> {
         let fixed = effect.facts().fixed;
         let last = class.len() - 1;
-        let anchors: Vec<usize> = (0..last).step_by(if last < STRIDE { 1 } else { STRIDE }).chain([last]).collect();
+        // Near the ends points lie farther apart: the longest waves, the lowest frequencies.
+        let ends =
+            |i: &usize| i.is_multiple_of(STRIDE) || (i.min(&(last - i)) < &STRIDE && (last - i).is_multiple_of(FIRST));
+        let anchors: Vec<usize> = (0..=last).filter(|i| last < STRIDE || *i == last || ends(i)).collect();
         let known: Vec<Normal> = anchors.par_iter().map(|&i| self.normal(effect, &grid[class[i]])).collect();
-        let mut worth: Vec<(f64, usize)> = (0..=last)
+        let worth: Vec<f64> = (0..=last)
             .into_par_iter()
-            .filter(|i| !anchors.contains(i))
             .map(|i| {
                 let next = anchors.partition_point(|&a| a < i);
+                if anchors[next] == i {
+                    return known[next].explained(fixed).gain;
+                }
                 let (low, high) = (anchors[next - 1], anchors[next]);
                 let share = (i - low) as f64 / (high - low) as f64;
                 let right = self.right(effect, &grid[class[i]]);
-                (Normal::between(&known[next - 1], &known[next], share, right).explained(fixed).gain, i)
+                Normal::between(&known[next - 1], &known[next], share, right).explained(fixed).gain
             })
             .collect();
-        worth.sort_by(|a, b| b.0.total_cmp(&a.0));
-        worth.truncate(PROMISING);
+        // Tops first: what is between two anchors is a guess, and the neighbours of a good guess would leave no room for another top.
+        let top = |i: usize| (i == 0 || worth[i - 1] <= worth[i]) && (i == last || worth[i + 1] < worth[i]);
+        let mut looked: Vec<usize> = (0..=last).filter(|i| !anchors.contains(i)).collect();
+        looked.sort_by(|&a, &b| top(b).cmp(&top(a)).then(worth[b].total_cmp(&worth[a])));
+        looked.truncate(PROMISING);
         let promising: Vec<(usize, Normal)> =
-            worth.par_iter().map(|&(_, i)| (i, self.normal(effect, &grid[class[i]]))).collect();
-        let mut best: Option<Candidate> = None;
-        for (i, normal) in anchors.into_iter().zip(known).chain(promising) {
-            let s = normal.explained(fixed);
-            if s.gain.is_finite() && best.as_ref().is_none_or(|b| s.gain > b.gain) {
-                best = Some(Candidate {
+            looked.par_iter().map(|&i| (i, self.normal(effect, &grid[class[i]]))).collect();
+        let all = anchors.into_iter().zip(known).chain(promising).map(|(i, normal)| (i, normal.explained(fixed)));
+        let mut all: Vec<(usize, Explained)> = all.filter(|(_, s)| s.gain.is_finite()).collect();
+        // The sort is stable: of equals the order of their making stands.
+        all.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
+        let mut peaks: Vec<(usize, Candidate)> = Vec::new();
+        for (i, s) in all {
+            let rises = peaks.first().is_none_or(|(_, best)| s.gain > RISES * best.gain);
+            if peaks.len() < PEAKS && rises && peaks.iter().all(|(at, _)| i.abs_diff(*at) > BESIDE) {
+                let candidate = Candidate {
                     effect,
                     gain: s.gain,
                     concealed: s.concealed,
@@ -253,14 +285,15 @@ impl<'a, 'f> Ground<'a, 'f> {
                     setting: Setting { inner: grid[class[i]].clone(), strengths: s.strengths },
                     continuous: free.to_vec(),
                     range: range(grid),
-                });
+                };
+                peaks.push((i, candidate));
             }
         }
-        best
+        peaks.into_iter().map(|(_, c)| c).collect()
     }
 
     /// Puts a candidate at other inner numbers.
-    pub fn put(&self, candidate: &mut Candidate, inner: Vec<f64>) {
+    fn put(&self, candidate: &mut Candidate, inner: Vec<f64>) {
         let s = self.explain(candidate.effect, &inner);
         candidate.gain = s.gain;
         candidate.concealed = s.concealed;
@@ -268,7 +301,7 @@ impl<'a, 'f> Ground<'a, 'f> {
     }
 
     /// Moves the continuous inner parameters of a candidate to where it explains most: one at a time, by steps that shrink.
-    pub fn refine(&self, candidate: &mut Candidate) {
+    fn refine(&self, candidate: &mut Candidate) {
         let mut step: Vec<f64> = candidate.continuous.iter().map(|&c| if c { 0.1 } else { 0.0 }).collect();
         for _ in 0..10 {
             let mut moved = false;

@@ -12,7 +12,6 @@ use super::scan::{Candidate, Ground, log_tail};
 use super::settle::{exchange, prune, spare};
 use super::simulated::simulated;
 use crate::physics::{Effect, Port, Setting};
-use rayon::prelude::*;
 
 /// How the search decides.
 #[derive(Clone, Debug, PartialEq)]
@@ -374,14 +373,7 @@ fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Model, p: &[f
     let plant = bench.form.carrier(p).plant;
     let ahead = model.cost - error.iter().map(|e| e * e).sum::<f64>();
     let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
-    let mut candidates = ground.scan(library);
-    candidates.par_iter_mut().take(10).for_each(|c| {
-        ground.refine(c);
-        if let Some(inner) = c.effect.instead(&c.setting).filter(|_| !c.effect.possible(&c.setting, &[])) {
-            ground.put(c, inner);
-            ground.refine(c);
-        }
-    });
+    let mut candidates = ground.best(library);
     candidates.iter_mut().for_each(|c| c.gain += ahead.min(0.0));
     candidates
 }

@@ -33,13 +33,7 @@ struct Answers {
 }
 
 impl Answers {
-    fn of(
-        fit: &Fit,
-        carrier: &Carrier,
-        sampled: &Sampled,
-        drives: &[(&Drive, &[f64])],
-        segment: usize,
-    ) -> Answers {
+    fn of(fit: &Fit, carrier: &Carrier, sampled: &Sampled, drives: &[(&Drive, &[f64])], segment: usize) -> Answers {
         let run = &fit.means[segment];
         let mut command: Vec<f64> = run.input.iter().map(|u| u - run.before).collect();
         let mut torque: Option<Vec<f64>> = None;
@@ -53,9 +47,8 @@ impl Answers {
                 into.iter_mut().zip(column).for_each(|(o, v)| *o += s * v);
             }
         }
-        let body = (carrier.spring != 0.0 || carrier.damper != 0.0).then(|| {
-            TermAnswers::of(&sampled.direct, &carrier.torque(&fit.trajectories[segment].samples))
-        });
+        let body = (carrier.spring != 0.0 || carrier.damper != 0.0)
+            .then(|| TermAnswers::of(&sampled.direct, &carrier.torque(&fit.trajectories[segment].samples)));
         let command = TermAnswers::of(&sampled.delayed, &command);
         let effects = torque.map(|w| TermAnswers::of(&sampled.direct, &w));
         let mut made = Answers { command, effects, body, sum: Vec::new() };

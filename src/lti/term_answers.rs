@@ -88,12 +88,8 @@ mod tests {
 
     fn plant(body: Body, pole_hz: f64, delay_s: f64) -> DiscretePlant {
         let w = std::f64::consts::TAU * pole_hz;
-        let mode = |w: f64| Mode {
-            pole_rad_s: w,
-            pole_damping_ratio: 0.02,
-            zero_rad_s: 0.9 * w,
-            zero_damping_ratio: 0.03,
-        };
+        let mode =
+            |w: f64| Mode { pole_rad_s: w, pole_damping_ratio: 0.02, zero_rad_s: 0.9 * w, zero_damping_ratio: 0.03 };
         let plant = Plant {
             position_unit: "track".into(),
             command_unit: "V".into(),

@@ -3,6 +3,7 @@
 //! In: a [`Diagnosed`]. Out: a [`Page`]. Convention: the first lines are for the person at the machine, the pictures for the
 //! engineer; every error is recorded less simulated position. Spec: `specs/mismatch.md`.
 
+use super::diagnosis_chance::chance_blocks;
 use super::diagnosis_error::{error_figure, spectrum_figure};
 use super::diagnosis_law::{amplitude_figure, law_figures, unexplained_figure};
 use super::diagnosis_place::{Map, time_map, zone_map};
@@ -93,7 +94,9 @@ pub fn diagnosis_page(made: &Diagnosed, provenance: Vec<(String, String)>) -> Re
     if !laws.blocks.is_empty() {
         sections.push(laws);
     }
-    sections.push(Section { heading: "The search".into(), blocks: search_blocks(&shown)? });
+    let mut search = search_blocks(&shown)?;
+    search.extend(chance_blocks(&shown)?);
+    sections.push(Section { heading: "The search".into(), blocks: search });
     let mut logs = log_blocks(&shown)?;
     logs.push(Block::Table(noise_table(&shown)?));
     logs.extend(d.remarks.iter().map(|r| Block::Prose(r.clone())));

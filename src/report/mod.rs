@@ -4,6 +4,7 @@
 //! a page, [`page::Page`] as one HTML file that needs nothing else. Convention: every number has its unit beside it;
 //! every text from outside is escaped. Spec: `specs/report.md`.
 
+mod diagnosis_chance;
 mod diagnosis_error;
 mod diagnosis_law;
 mod diagnosis_place;
