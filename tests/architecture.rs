@@ -28,7 +28,7 @@ const HOMES: [(&str, &[&str]); 12] = [
         &[
             "src/tune/search.rs",
             "src/tune/neighbours.rs",
-            "src/tune/limit/gains.rs",
+            "src/tune/limit/branch.rs",
             "src/gate/",
             "src/twin/",
             "src/study/",

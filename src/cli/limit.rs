@@ -7,8 +7,8 @@ use crate::document::write_text;
 use crate::lti::Plant;
 use crate::report::limit::{limit_sentences, limit_table};
 use crate::tune::{
-    GainsBound, GainsSettings, Limit, LimitError, LimitPlant, LimitSettings, Machine, Spec, Standing, TuneError,
-    TuneSettings, Verdict, gains_bound, limit, standing, tune,
+    GainsBound, GainsSettings, Limit, LimitError, LimitPlant, LimitSettings, Machine, Spec, Standing, StructureBound,
+    StructureSettings, TuneError, TuneSettings, Verdict, gains_bound, limit, standing, structure_bound, tune,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,10 @@ struct Document<'a> {
     /// The best gains that a wide search found in the spec's structure: evidence, no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     best_in_structure: Option<&'a Standing>,
-    /// What the PID gains alone could still do, the filters as they stand: a global search with a bound.
+    /// What all numbers of the structure together could still do: a global search with a bound.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    whole_structure: Option<&'a StructureBound>,
+    /// The same of the PID gains alone, the filters as they stand.
     #[serde(skip_serializing_if = "Option::is_none")]
     pid_gains_alone: Option<&'a GainsBound>,
 }
@@ -32,9 +35,10 @@ impl<'a> Document<'a> {
         limit: &'a Limit,
         gains: Option<&'a Standing>,
         best_in_structure: Option<&'a Standing>,
-        pid_gains_alone: Option<&'a GainsBound>,
+        within: Option<&'a Within>,
     ) -> Document<'a> {
-        Document { schema: "servotune.limit/1", limit, gains, best_in_structure, pid_gains_alone }
+        let (whole_structure, pid_gains_alone) = (within.map(|w| &w.structure), within.map(|w| &w.alone));
+        Document { schema: "servotune.limit/1", limit, gains, best_in_structure, whole_structure, pid_gains_alone }
     }
 
     fn write(&self, file: &Path, screen: &mut Screen) -> Result<(), Failure> {
@@ -42,6 +46,22 @@ impl<'a> Document<'a> {
         write_text(file, &(text + "\n"))?;
         screen.say(&format!("wrote {}", file.display()));
         Ok(())
+    }
+}
+
+/// The bounds of what the structure of given gains could do.
+struct Within {
+    structure: StructureBound,
+    alone: GainsBound,
+}
+
+impl Within {
+    fn of(plant: &Plant, gains: &Controller, spec: &Spec) -> Result<Within, TuneError> {
+        let machine = Machine::Model(plant);
+        Ok(Within {
+            structure: structure_bound(&machine, gains, spec, &StructureSettings::default())?,
+            alone: gains_bound(&machine, gains, spec, &GainsSettings::default())?,
+        })
     }
 }
 
@@ -87,10 +107,11 @@ pub(super) fn beside(
     let bound = limit(&seen, t, controller.feedforward.as_ref(), spec, &settings)?;
     let own = standing(&seen, controller, spec)?;
     let best = searched(plant, &seen, spec, Some(controller), t, STARTS)?;
-    let alone = gains_bound(&Machine::Model(plant), controller, spec, &GainsSettings::default())?;
+    let within = Within::of(plant, controller, spec)?;
     let file = gains.with_extension("limit.json");
-    Document::of(&bound, Some(&own), Some(&best), Some(&alone)).write(&file, screen)?;
-    Ok(Gap { file, says: limit_sentences(&bound, Some(&own), Some((&best, STARTS)), Some(&alone)) })
+    Document::of(&bound, Some(&own), Some(&best), Some(&within)).write(&file, screen)?;
+    let (structure, alone) = (Some(&within.structure), Some(&within.alone));
+    Ok(Gap { file, says: limit_sentences(&bound, Some(&own), Some((&best, STARTS)), structure, alone) })
 }
 
 pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Failure> {
@@ -110,14 +131,14 @@ pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Fai
         0 => None,
         starts => Some(searched(&plant, &seen, &spec, gains.as_ref(), t, starts)?),
     };
-    let global = |g: &Controller| gains_bound(&Machine::Model(&plant), g, &spec, &GainsSettings::default());
-    let alone = gains.as_ref().map(global).transpose()?;
-    let document = Document::of(&found, figures.as_ref(), searched.as_ref(), alone.as_ref());
+    let within = gains.as_ref().map(|g| Within::of(&plant, g, &spec)).transpose()?;
+    let document = Document::of(&found, figures.as_ref(), searched.as_ref(), within.as_ref());
     if let Some(file) = &a.out {
         document.write(file, screen)?;
     }
     let mut text = limit_table(&found, figures.as_ref(), &plant.position_unit)?.text();
-    text += &limit_sentences(&found, figures.as_ref(), searched.as_ref().map(|s| (s, a.search)), alone.as_ref());
+    let (structure, alone) = (within.as_ref().map(|w| &w.structure), within.as_ref().map(|w| &w.alone));
+    text += &limit_sentences(&found, figures.as_ref(), searched.as_ref().map(|s| (s, a.search)), structure, alone);
     screen.result(&document, &text)?;
     Ok(if found.verdict == Verdict::Impossible { Ending::Rejected } else { Ending::Accepted })
 }

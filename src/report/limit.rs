@@ -3,7 +3,7 @@
 use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Column, Table};
-use crate::tune::{GainsBound, Limit, Standing, Verdict};
+use crate::tune::{GainsBound, Limit, Standing, StructureBound, Verdict};
 
 /// Limit, given gains and the gap, by band and weighted sum.
 pub fn limit_table(limit: &Limit, gains: Option<&Standing>, unit: &str) -> Result<Table, ReportError> {
@@ -34,11 +34,12 @@ pub fn limit_table(limit: &Limit, gains: Option<&Standing>, unit: &str) -> Resul
     Ok(table)
 }
 
-/// What limit, gains, search (with its number of starts) and the bound of the PID gains alone say together.
+/// What limit, gains, search (with its number of starts) and the bounds within the structure say together.
 pub fn limit_sentences(
     limit: &Limit,
     gains: Option<&Standing>,
     searched: Option<(&Standing, usize)>,
+    structure: Option<&StructureBound>,
     alone: Option<&GainsBound>,
 ) -> String {
     let mut text = String::new();
@@ -60,13 +61,16 @@ pub fn limit_sentences(
                 percent(g.figures.objective, s.figures.objective).max(0.0)
             );
         }
+        text += &structure.map_or_else(String::new, structure_sentence);
         text += &alone.map_or_else(String::new, gains_sentence);
         if limit.sum.objective > 0.0 {
             let above = percent(g.figures.objective, limit.sum.objective);
             text += &if g.tail > limit.tail {
                 format!("These gains are {above:.1} % above the bound of a class to which they do not belong.\n")
             } else {
-                format!("These gains are within {above:.1} % of the best of all loops of the class (proven bound).\n")
+                format!(
+                    "These gains are within {above:.1} % of the best of all loops of the class (proven bound), of whatever structure.\n"
+                )
             };
         }
     }
@@ -74,6 +78,31 @@ pub fn limit_sentences(
         text += "The rounds ended before the bound stopped rising: more --rounds may raise it.\n";
     }
     text
+}
+
+/// What the global search over all numbers of the structure says.
+fn structure_sentence(s: &StructureBound) -> String {
+    if !s.member {
+        return "These gains lie outside the spec's bounds or miss a demand as the global search over all numbers reads it: its bound does not speak of them.\n"
+            .to_owned();
+    }
+    let end = if s.left == 0 {
+        "the search came to its end".to_owned()
+    } else {
+        format!("it ended early with {} boxes open, so that the truth may be far nearer", s.left)
+    };
+    if s.objective > 0.0 {
+        format!(
+            "These gains are within {:.1} % of the best in their structure, all numbers between the spec's bounds (proven: global search with a bound over {} boxes; {end}).\n",
+            100.0 * (s.own / s.objective - 1.0),
+            s.boxes
+        )
+    } else {
+        format!(
+            "Of the whole structure {} boxes gave no bound of its own; that of all loops holds there too.\n",
+            s.boxes
+        )
+    }
 }
 
 /// What the global search over the PID gains says.

@@ -84,7 +84,7 @@ fn loop_table(cases: &[LoopCase]) -> String {
     row("stable in truth", &|c| one(c.stable));
     row("proved stable", &|c| one(c.proved_stable));
     row("unstable and proved stable (false)", &|c| one(c.proved_stable && !c.stable));
-    row("stability left undecided", &|c| one(c.undecided));
+    row("stability left undecided", &|c| one(c.undecided.is_some()));
     row("loops with a truth outside its bounds", &|c| one(c.broken));
     row("limits met in truth", &|c| c.met);
     row("limits missed in truth", &|c| c.missed);
@@ -95,11 +95,27 @@ fn loop_table(cases: &[LoopCase]) -> String {
     row("loops proved", &|c| one(c.table_passed));
     let (met, refused) = cases.iter().fold((0, 0), |(m, r), c| (m + c.met, r + c.refusals));
     let cells: usize = cases.iter().map(|c| c.cells).sum();
+    text += &open_table(cases);
     text += &format!(
         "\nNeedless refusals: {:.3} % of the limits met. Cells a loop, mean: {:.0}; they are counted instead of seconds, so that this page is the same on every machine.\n",
         100.0 * refused as f64 / met.max(1) as f64,
         cells as f64 / cases.len().max(1) as f64
     );
+    text
+}
+
+/// The loops whose stability was left open, one by one.
+fn open_table(cases: &[LoopCase]) -> String {
+    let open: Vec<_> = cases.iter().filter_map(|c| c.undecided).collect();
+    if open.is_empty() {
+        return String::new();
+    }
+    let mut text = "\nThe loops left undecided, with their truth. No margin is told of them, and no limit of theirs is proved.\n\n\
+                    | seed | largest pole, size less 1 | Ms | cells |\n|---|---|---|---|\n"
+        .to_owned();
+    for o in open {
+        text += &format!("| {} | {:.2e} | {:.4e} | {} |\n", o.seed, o.beyond, o.max_sensitivity, o.cells);
+    }
     text
 }
 

@@ -36,13 +36,24 @@ pub(super) struct LoopRow {
     pub proven_max_sensitivity: Option<f64>,
 }
 
+/// A loop whose stability the proof left open.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OpenLoopCase {
+    pub seed: u64,
+    /// Size of its largest pole in truth, less 1.
+    pub beyond: f64,
+    /// Its largest sensitivity in truth.
+    pub max_sensitivity: f64,
+    pub cells: usize,
+}
+
 /// What one loop came to.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LoopCase {
     pub narrow: bool,
     pub stable: bool,
     pub proved_stable: bool,
-    pub undecided: bool,
+    pub undecided: Option<OpenLoopCase>,
     /// Truth outside the bounds.
     pub broken: bool,
     /// Limits met in truth, missed in truth.
@@ -117,7 +128,8 @@ fn judge(seed: u64) -> Result<(LoopCase, LoopRow), StudyError> {
     let (sampled, sections) = (DiscretePlant::of(&plant, T)?, c.sections()?);
     let l = ModelLoop::new(&sampled, &sections)?;
     let m = margins(&l);
-    let stable = closed_loop_poles(&l)?.iter().all(|z| z.norm() < 1.0);
+    let largest = closed_loop_poles(&l)?.iter().map(|z| z.norm()).fold(0.0, f64::max);
+    let stable = largest < 1.0;
     // Half the sample rate is a phase crossing where L is negative there.
     let end = l.at(PI / T).re;
     let end_db = (end < 0.0).then(|| 20.0 * (-end).log10().abs());
@@ -127,7 +139,12 @@ fn judge(seed: u64) -> Result<(LoopCase, LoopRow), StudyError> {
         narrow,
         stable,
         proved_stable: b.stability == Stability::Stable,
-        undecided: b.stability == Stability::Undecided,
+        undecided: (b.stability == Stability::Undecided).then_some(OpenLoopCase {
+            seed,
+            beyond: largest - 1.0,
+            max_sensitivity: m.max_sensitivity,
+            cells: b.cells,
+        }),
         cells: b.cells,
         ..LoopCase::default()
     };
@@ -138,7 +155,9 @@ fn judge(seed: u64) -> Result<(LoopCase, LoopRow), StudyError> {
     let mut limit = |truth: Option<f64>, proven: Bounded, at_least: bool| {
         let by = 1.0 + r.between(-AROUND, AROUND);
         let Some(truth) = truth else { return };
-        let low = proven.low.unwrap_or(if at_least { f64::INFINITY } else { 0.0 });
+        // No lower end of a margin says that no crossing limits it; of a loop whose stability is open it says nothing.
+        let unlimited = at_least && b.stability == Stability::Stable;
+        let low = proven.low.unwrap_or(if unlimited { f64::INFINITY } else { 0.0 });
         let high = proven.high.unwrap_or(f64::INFINITY);
         case.broken |= truth < low * (1.0 - TRUTH) || truth > high * (1.0 + TRUTH);
         let required = truth * by;

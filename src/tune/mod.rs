@@ -33,7 +33,7 @@ pub use gain_table::{CrossingRow, GainTable, GainTableError, InputDigest, Proven
 pub use judge::{Proof, judge};
 pub use limit::{
     Bound, Figures, GainsBound, GainsSettings, Limit, LimitError, LimitPlant, LimitSettings, LimitWork, Standing,
-    Verdict, gains_bound, limit, standing,
+    StructureBound, StructureSettings, Verdict, gains_bound, limit, standing, structure_bound,
 };
 pub use machine::{Hold, Machine, Route};
 pub use outcome::{AtBound, Infeasible, Outcome, RelaxedLimit, Tuned, Work};

@@ -55,7 +55,7 @@ pub const DERIVATIVE_FILTER_S: f64 = 12e-6;
 /// Damping of a low-pass where no start controller names one.
 pub const LOWPASS_DAMPING: f64 = 0.7;
 /// Centres may not come closer to half the sample rate than this share of it: the prewarping ends there.
-const BELOW_HALF_RATE: f64 = 0.99;
+pub(super) const BELOW_HALF_RATE: f64 = 0.99;
 
 /// The free numbers and everything that stays.
 #[derive(Clone, Debug, PartialEq)]

@@ -134,6 +134,9 @@ pub enum SpecError {
     /// The write is none.
     #[error("profile: {0}")]
     Profile(#[from] ProfileError),
+    /// What is wrong stands in this file.
+    #[error("{}: {source}", file.display())]
+    File { file: PathBuf, source: Box<SpecError> },
 }
 
 /// Most notches, and most low-passes, that a search sets.
@@ -146,7 +149,11 @@ impl Spec {
         let folder = file.parent().unwrap_or(Path::new("."));
         let profile = read_toml(&folder.join(&document.profile))?;
         let spec = Spec { profile, margins: document.margins, limits: document.limits, search: document.search };
-        spec.check()?;
+        spec.check().map_err(|source| {
+            let file =
+                if matches!(source, SpecError::Profile(_)) { Spec::profile_path(file) } else { Ok(file.to_owned()) };
+            file.map_or_else(|e| e, |file| SpecError::File { file, source: Box::new(source) })
+        })?;
         Ok(spec)
     }
 

@@ -1,18 +1,17 @@
 //! The best PID gains that given filters could have: a global search with a bound.
 //!
 //! In: a machine, a controller whose filters stay, a spec with its bounds of the gains. Out: a value that no gains of the box reach below, the best
-//! seen, and what is left open. Method: branch and bound, best box first, over [`super::enclosure`]; boxes are taken in batches of fixed
-//! size, so that the result has the same bytes for any number of threads.
+//! seen, and what is left open. Method: branch and bound ([`super::branch`]) over [`super::enclosure`].
 
+use super::branch::{Ending, search};
 use super::enclosure::{Cut, Filtered, GainBox};
 use crate::controller::Controller;
-use crate::feedback::LoopOnGrid;
+use crate::feedback::{LoopOnGrid, ResponseCurve};
 use crate::frf::Frf;
 use crate::lti::{DiscretePlant, FrequencyResponse};
 use crate::pes::SpectralPes;
 use crate::tune::machine::{bins, curve};
 use crate::tune::{Hold, Machine, Spec, TuneError};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// How long is searched.
@@ -53,22 +52,20 @@ pub struct GainsBound {
 
 /// How many times later the way back comes than in tuning: slow loops forget in between.
 const LASTING: f64 = 4.0;
-/// Boxes a batch.
-const BATCH: usize = 64;
 
-/// Bounds what the gains of a controller could still do on a machine.
-pub fn gains_bound(
+/// A machine's response and its write read off it, the model taken as a sweep that resolves it, so that one formula serves both; the way back comes
+/// `times` later than in tuning.
+pub(super) fn lasting(
     machine: &Machine<'_>,
     controller: &Controller,
     spec: &Spec,
-    settings: &GainsSettings,
-) -> Result<GainsBound, TuneError> {
+    times: f64,
+) -> Result<(ResponseCurve, SpectralPes), TuneError> {
     let t = controller.sample_time_s;
     let frf;
     let curve = match machine {
         Machine::Response { frf, hold, continuation } => curve(frf, *hold, *continuation, t)?,
         Machine::Model(plant) => {
-            // The model as a sweep that resolves it, so that one formula serves both.
             let sampled = DiscretePlant::of(plant, t)?;
             let grid = crate::feedback::SampledPlant::of_model(&sampled);
             let w = grid.w_rad_s().to_vec();
@@ -77,8 +74,19 @@ pub fn gains_bound(
         }
     };
     let harmonics: Vec<usize> = spec.limits.harmonics.iter().map(|h| h.k).collect();
-    let write =
-        SpectralPes::lasting(&spec.profile, &curve, controller, bins(&spec.profile, &harmonics), false, LASTING)?;
+    let bins = bins(&spec.profile, &harmonics);
+    let write = SpectralPes::lasting(&spec.profile, &curve, controller, bins, false, times)?;
+    Ok((curve, write))
+}
+
+/// Bounds what the gains of a controller could still do on a machine.
+pub fn gains_bound(
+    machine: &Machine<'_>,
+    controller: &Controller,
+    spec: &Spec,
+    settings: &GainsSettings,
+) -> Result<GainsBound, TuneError> {
+    let (curve, write) = lasting(machine, controller, spec, LASTING)?;
     let filtered = Filtered::new(spec, controller, curve.sampled(), &write);
     let b = &spec.search.bounds;
     let pid = &controller.pid;
@@ -93,60 +101,28 @@ pub fn gains_bound(
     let met = filtered.cut(&given, &mut LoopOnGrid::default()) == Cut::Open;
     let member = met && filtered.lower(&given, true).is_finite();
     let own = filtered.lower(&given, false);
-    let mut best = member.then_some(own);
-    // Open boxes, the lowest last.
-    let mut open: Vec<(f64, GainBox)> = vec![(0.0, whole)];
-    // The lowest bound of a box that was closed because it lies within reach of the best.
-    let mut closed = f64::INFINITY;
-    let mut boxes = 0;
-    while boxes < settings.boxes {
-        let enough = best.map_or(f64::INFINITY, |x| x * (1.0 - settings.near));
-        open.retain(|(bound, _)| {
-            let keep = *bound < enough;
-            closed = if keep { closed } else { closed.min(*bound) };
-            keep
-        });
-        if open.is_empty() {
-            break;
+    let best = member.then_some(own);
+    let ending = Ending { boxes: settings.boxes, near: settings.near };
+    let judge = |parent: f64, half: GainBox| {
+        let mut on = LoopOnGrid::default();
+        if filtered.cut(&half, &mut on) == Cut::Out {
+            return None;
         }
-        let batch = open.split_off(open.len().saturating_sub(BATCH));
-        let parts: Vec<(f64, GainBox)> =
-            batch.iter().flat_map(|(bound, b)| filtered.halved(b).map(|half| (*bound, half))).collect();
-        boxes += parts.len();
-        let judged: Vec<Option<(f64, GainBox, f64)>> = parts
-            .into_par_iter()
-            .map(|(parent, half)| {
-                let mut on = LoopOnGrid::default();
-                if filtered.cut(&half, &mut on) == Cut::Out {
-                    return None;
-                }
-                let bound = filtered.lower(&half, true).max(parent);
-                let middle = point(half.map(|[a, b]| 0.5 * (a + b)));
-                let met = bound.is_finite() && filtered.cut(&middle, &mut on) == Cut::Open;
-                bound
-                    .is_finite()
-                    .then(|| (bound, half, if met { filtered.lower(&middle, true) } else { f64::INFINITY }))
-            })
-            .collect();
-        for (bound, half, value) in judged.into_iter().flatten() {
-            if value < best.unwrap_or(f64::INFINITY) {
-                best = Some(value);
-            }
-            open.push((bound, half));
-        }
-        // The sort is stable: of equals the order of their making stands.
-        open.sort_by(|a, b| b.0.total_cmp(&a.0));
-    }
-    let lowest = open.last().map_or(f64::INFINITY, |(bound, _)| *bound);
-    let objective = lowest.min(closed).min(best.unwrap_or(f64::INFINITY));
+        let bound = filtered.lower(&half, true).max(parent);
+        let middle = point(half.map(|[a, b]| 0.5 * (a + b)));
+        let met = bound.is_finite() && filtered.cut(&middle, &mut on) == Cut::Open;
+        let value = if met { filtered.lower(&middle, true) } else { f64::INFINITY };
+        bound.is_finite().then_some((bound, half, value))
+    };
+    let found = search(whole, best, &ending, |b| filtered.halved(b), judge);
     let reach = settings.reach;
     Ok(GainsBound {
         reach,
-        objective: if objective.is_finite() { objective } else { 0.0 },
+        objective: found.bound,
         own,
         member,
-        best,
-        boxes,
-        left: open.len(),
+        best: found.best,
+        boxes: found.boxes,
+        left: found.left,
     })
 }

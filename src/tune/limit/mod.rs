@@ -4,19 +4,30 @@
 //! gains are from it. Method: on the finite write only the first taps of the Youla parameter count, and every demand kept is convex in them;
 //! the solver's multipliers prove the bound. Spec: `specs/performance_limit.md`.
 
+mod admitted;
 mod basis;
+mod branch;
 pub(super) mod cone;
 mod cuts;
 mod enclosure;
 mod energy;
+mod factor;
+mod floor;
+mod form;
 mod gains;
 mod horizon;
+mod logs;
 mod programme;
+mod span;
+mod structure;
 mod taps;
+mod tie;
+mod whole;
 
 pub use gains::{GainsBound, GainsSettings, gains_bound};
 pub use horizon::LimitPlant;
 pub use programme::{Bound, Figures, Limit, LimitSettings, LimitWork, Standing, Verdict, limit, standing};
+pub use whole::{StructureBound, StructureSettings, structure_bound};
 
 use crate::lti::LtiError;
 use crate::pes::PesError;
