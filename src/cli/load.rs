@@ -12,7 +12,8 @@ use std::path::Path;
 
 /// A plant, its physics entries not looked at yet.
 pub(super) fn plant(file: &Path) -> Result<Plant, Failure> {
-    let read: PlantFile = parse_toml(file, &read_text(file)?)?;
+    let read: PlantFile = parse_toml(file, &read_text(file)?)
+        .map_err(|e| e.expecting("a plant model, as `servotune identify SWEEP --out` writes it"))?;
     Plant::try_from(read).map_err(|source| Failure::Plant { file: file.into(), source })
 }
 
@@ -23,7 +24,8 @@ pub(super) fn controller(file: &Path) -> Result<Controller, Failure> {
     if text.lines().any(|l| l.trim_start().starts_with("[[section]]")) {
         return Ok(GainTable::parse(file, &text)?.controller());
     }
-    let controller: Controller = parse_toml(file, &text)?;
+    let controller: Controller = parse_toml(file, &text)
+        .map_err(|e| e.expecting("a controller with its [pid] and filters, or a gain table of `servotune tune`"))?;
     controller.check().map_err(|source| Failure::Controller { file: file.into(), source })?;
     Ok(controller)
 }

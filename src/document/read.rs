@@ -19,6 +19,18 @@ pub enum DocumentError {
     Content { file: PathBuf, line: usize, column: usize, found: String },
 }
 
+impl DocumentError {
+    /// The same with what the file should be, where its content is something else.
+    pub fn expecting(self, what: &str) -> DocumentError {
+        match self {
+            DocumentError::Content { file, line, column, found } => {
+                DocumentError::Content { file, line, column, found: format!("{found}; expected {what}") }
+            }
+            other => other,
+        }
+    }
+}
+
 /// The whole text of a file.
 pub fn read_text(file: &Path) -> Result<String, DocumentError> {
     let bytes =

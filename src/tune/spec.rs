@@ -142,12 +142,16 @@ pub enum SpecError {
 /// Most notches, and most low-passes, that a search sets.
 pub(super) const FILTERS: usize = 3;
 
+/// What the files should be.
+const A_SPEC: &str = "a spec: the path of a `profile`, then [margins], [limits] and [search]";
+const A_PROFILE: &str = "a profile of the move that is judged";
+
 impl Spec {
     /// The spec in a file; the profile's path is relative to the file's folder.
     pub fn read(file: &Path) -> Result<Spec, SpecError> {
-        let document: SpecFile = read_toml(file)?;
+        let document: SpecFile = read_toml(file).map_err(|e| e.expecting(A_SPEC))?;
         let folder = file.parent().unwrap_or(Path::new("."));
-        let profile = read_toml(&folder.join(&document.profile))?;
+        let profile = read_toml(&folder.join(&document.profile)).map_err(|e| e.expecting(A_PROFILE))?;
         let spec = Spec { profile, margins: document.margins, limits: document.limits, search: document.search };
         spec.check().map_err(|source| {
             let file =
@@ -168,7 +172,7 @@ impl Spec {
 
     /// The profile's path as a spec file names it, resolved against the file's folder.
     pub fn profile_path(file: &Path) -> Result<PathBuf, SpecError> {
-        let document: SpecFile = read_toml(file)?;
+        let document: SpecFile = read_toml(file).map_err(|e| e.expecting(A_SPEC))?;
         Ok(file.parent().unwrap_or(Path::new(".")).join(document.profile))
     }
 
