@@ -130,3 +130,111 @@ impl<'a> Slopes<'a> {
         y
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::diagnose::bench::Bench;
+    use crate::diagnose::columns::drive;
+    use crate::diagnose::refit::Chosen;
+    use crate::diagnose::run::Run;
+    use crate::numeric::random::Random;
+    use crate::physics::{Setting, effect};
+    use crate::recording::Role;
+    use crate::twin::recording::{multisine, record, scene, stroke};
+    use crate::twin::{MachineClass, nominal_controller, paper_machine};
+
+    const SAMPLES: usize = 600;
+
+    fn run(group: usize, seed: u64) -> Run {
+        let plant = paper_machine(MachineClass::Tunable).unwrap();
+        let controller = nominal_controller().unwrap();
+        let scene = scene(&plant, controller.sample_time_s, 5.0, SAMPLES, 3e-3);
+        let reference = stroke(SAMPLES, SAMPLES / 10, SAMPLES / 3, 2.0 + group as f64);
+        let excitation = multisine(SAMPLES, 40, 0.03);
+        let mut random = Random::new(seed);
+        let rows = record(&scene, &[], &controller, &reference, &excitation, &mut random).unwrap();
+        let column = |i: usize| -> Vec<f64> { rows.iter().map(|r| r[i]).collect() };
+        let (command, excitation) = (column(2), column(1));
+        Run {
+            name: format!("r{seed}"),
+            role: Role::Fit,
+            began_s: 0.0,
+            group,
+            reference: Some(column(0)),
+            input: command.iter().zip(&excitation).map(|(u, d)| u + d).collect(),
+            command,
+            excitation,
+            position: column(3),
+            before: 0.0,
+            origin: 0.0,
+            rested: true,
+            bumped: false,
+            pes: None,
+            spindle_rad: None,
+            temperature: None,
+        }
+    }
+
+    fn chosen(name: &str, inner: &[f64], strengths: &[f64]) -> Chosen {
+        Chosen {
+            effect: effect(name).unwrap(),
+            setting: Setting { inner: inner.to_vec(), strengths: strengths.to_vec() },
+            continuous: vec![false; inner.len()],
+            range: vec![[0.1, 10.0]; inner.len()],
+            step: 0,
+        }
+    }
+
+    /// Against central differences of the simulation error, which is made without any of this.
+    #[test]
+    fn slopes_are_those_of_the_simulation_error() {
+        let plant = paper_machine(MachineClass::Tunable).unwrap();
+        let t = nominal_controller().unwrap().sample_time_s;
+        let runs = vec![run(0, 1), run(0, 2), run(1, 3), run(1, 4)];
+        let bench = Bench::new(&plant, runs, t, None).unwrap();
+        let laws = || {
+            vec![
+                chosen("pivot_friction", &[2.5, 0.0], &[0.012]),
+                chosen("dead_band", &[0.01], &[1.0]),
+                chosen("offset_drift", &[], &[1e-4, 2e-4]),
+            ]
+        };
+        let mut random = Random::new(9);
+        let p: Vec<f64> = bench.form.knobs.iter().map(|_| 0.01 * random.normal()).collect();
+        let fit = bench.fit(laws());
+        let made: Vec<_> =
+            laws().iter().map(|c| drive(c.effect, &c.setting.inner, fit.scene, fit.trajectories)).collect();
+        let settings = laws();
+        let drives: Vec<_> = made.iter().zip(&settings).map(|(d, c)| (d, &c.setting.strengths[..])).collect();
+        let slopes = Slopes::at(&fit, &p, &drives).unwrap();
+        let close = |found: &[Vec<f64>], up: &[Vec<f64>], down: &[Vec<f64>], step: f64, what: &str| {
+            for (f, (u, d)) in found.iter().zip(up.iter().zip(down)) {
+                let size = f.iter().fold(1e-12, |m: f64, v| m.max(v.abs()));
+                for (f, (u, d)) in f.iter().zip(u.iter().zip(d)) {
+                    let difference = (u - d) / (2.0 * step);
+                    // One-sided against central: the curvature over the step.
+                    assert!((f - difference).abs() < 2e-3 * size, "{what}: {f} {difference} of {size}");
+                }
+            }
+        };
+        for (i, knob) in bench.form.knobs.iter().enumerate() {
+            let moved = |by: f64| {
+                let mut to = p.clone();
+                to[i] += by;
+                fit.errors(&to)
+            };
+            close(&slopes.knob(i, 1e-5), &moved(1e-5), &moved(-1e-5), 1e-5, &format!("{knob:?}"));
+        }
+        for (e, place) in [(0, 0), (2, 0), (2, 1)] {
+            let moved = |by: f64| {
+                let mut all = laws();
+                all[e].setting.strengths[place] += by;
+                bench.fit(all).errors(&p)
+            };
+            let step = 1e-4;
+            close(&slopes.strength((e, place)), &moved(step), &moved(-step), step, "strength");
+        }
+    }
+}

@@ -33,6 +33,9 @@ static FACTS: Facts = Facts {
 /// Largest share by which a frequency is let move.
 const LARGEST: f64 = 0.5;
 
+/// Shift and current, and the coordinates that they lead to.
+type Ahead = ([f64; 2], [Complex<f64>; 2]);
+
 struct Shifted {
     pair: Option<Pair>,
     /// The step without the shift.
@@ -43,7 +46,7 @@ struct Shifted {
     /// The modal coordinate with the shift and without.
     q: [Complex<f64>; 2],
     /// The next ones under a shift and a current: asked for by the column and by the step.
-    ahead: Cell<Option<([f64; 2], [Complex<f64>; 2])>>,
+    ahead: Cell<Option<Ahead>>,
 }
 
 impl Shifted {

@@ -65,8 +65,11 @@ impl Case {
     /// Reads `case.toml` of a folder and every record it lists.
     pub fn read(folder: &Path, settings: &RecordSettings) -> Result<Case, RecordingError> {
         let file = folder.join("case.toml");
-        let read: CaseFile = read_toml(&file)
-            .map_err(|e| e.expecting("a case: `id`, `plant`, [[records]] with `file` and `role`, and a `controller` where there is one"))?;
+        let read: CaseFile = read_toml(&file).map_err(|e| {
+            e.expecting(
+                "a case: `id`, `plant`, [[records]] with `file` and `role`, and a `controller` where there is one",
+            )
+        })?;
         let refuse = |key: &'static str, found: String, expected: &'static str| RecordingError::Case {
             file: file.clone(),
             key,
