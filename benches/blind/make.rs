@@ -352,7 +352,7 @@ pub fn visibility(stage: &Stage, given: &Plant, recs: &[Recorded]) -> Option<Map
 }
 
 /// Fall of the torque factor where the arm stands at `x` tracks, of a machine whose field has fallen by `drop` at 15 tracks.
-fn drop_at(x: f64, drop: f64) -> f64 {
+pub fn drop_at(x: f64, drop: f64) -> f64 {
     let fall = drop / (1.0 - drop) * (x / 15.0).powi(2);
     fall / (1.0 + fall)
 }

@@ -7,7 +7,7 @@ use crate::effects::{self, Faults, Truth};
 use crate::family::family;
 use crate::fit::absorb;
 use crate::machine::{Mode, Plant, Units};
-use crate::make::{Order, Stage, linear, visibility};
+use crate::make::{Order, Stage, drop_at, linear, visibility};
 use crate::physics::{Physics, Slip};
 use crate::random::Random;
 use crate::world::{Drive, Noise};
@@ -136,7 +136,8 @@ pub fn make(order: &Order, null: bool, out: &Path, attempt: u64) -> Option<Value
             json!({"sliding_length": s.length(), "level_command": s.level() / (plant.b * plant.gain),
             "stiffness_per_s2": s.stiffness(), "small_signal_hz": w / TAU}),
         );
-        answer.insert("torque_factor_rolloff".into(), json!({"drop_at_15": 0.06}));
+        let seen: f64 = stage.plant.modes.iter().map(|m| (m.wz / m.wp).powi(2)).product();
+        answer.insert("torque_factor_rolloff".into(), json!({"drop_at_15": drop_at(15.0 / seen, 0.06)}));
         answer.insert("cable_spring".into(), facts.figures.iter().map(|f| (f.0.to_owned(), json!(f.1))).collect());
     }
     let all: Vec<usize> = (0..stage.plans.len()).collect();

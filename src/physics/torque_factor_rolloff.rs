@@ -71,7 +71,7 @@ impl Effect for TorqueFactorRolloff {
 
     /// Between fields that fall as their curvature says (a parabola, a bell, the edge of a gap) the fall at one place differs by so much.
     fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
-        0.05
+        0.07
     }
 
     /// A magnet's field falls towards its ends and does not rise again on the way.
