@@ -118,8 +118,9 @@ pub struct Ground<'a, 'f> {
 const STRIDE: usize = 10;
 /// The same up to there from either end of a class.
 const FIRST: usize = 2;
-/// Points that are worked out in full because the others make them look best.
+/// Points that are worked out in full because the others make them look best: so many, and one more for so many points.
 const PROMISING: usize = 6;
+const MORE: usize = 32;
 /// Classes of points that are refined.
 const REFINED: usize = 10;
 /// Most peaks of a class, the share of the strongest that one must reach, and points between two: of a wave the nearest point sees half,
@@ -258,14 +259,14 @@ impl<'a, 'f> Ground<'a, 'f> {
                 let (low, high) = (anchors[next - 1], anchors[next]);
                 let share = (i - low) as f64 / (high - low) as f64;
                 let right = self.right(effect, &grid[class[i]]);
-                Normal::between(&known[next - 1], &known[next], share, right).explained(fixed).gain
+                Normal::between(&known[next - 1], &known[next], share, right).guessed(fixed)
             })
             .collect();
         // Tops first: what is between two anchors is a guess, and the neighbours of a good guess would leave no room for another top.
         let top = |i: usize| (i == 0 || worth[i - 1] <= worth[i]) && (i == last || worth[i + 1] < worth[i]);
         let mut looked: Vec<usize> = (0..=last).filter(|i| !anchors.contains(i)).collect();
         looked.sort_by(|&a, &b| top(b).cmp(&top(a)).then(worth[b].total_cmp(&worth[a])));
-        looked.truncate(PROMISING);
+        looked.truncate(PROMISING + last / MORE);
         let promising: Vec<(usize, Normal)> =
             looked.par_iter().map(|&i| (i, self.normal(effect, &grid[class[i]]))).collect();
         let all = anchors.into_iter().zip(known).chain(promising).map(|(i, normal)| (i, normal.explained(fixed)));

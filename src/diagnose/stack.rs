@@ -235,6 +235,19 @@ impl Normal {
         Explained { gain: solved.dot(&scaled), strengths: (0..m).map(|i| solved[i] * unit(i)).collect(), concealed }
     }
 
+    /// What a fit would explain, these equations being interpolated: no more than if the basis concealed all columns alike. Where a wave's
+    /// sine is concealed and its cosine is not, the next wave's may be the other way round, and a mixture of both promises what neither has.
+    pub fn guessed(&self, fixed: bool) -> f64 {
+        let gain = self.explained(fixed).gain;
+        let (mut bare, mut left, mut count) = (0.0, 0.0, 0.0);
+        for (i, square) in self.squares.iter().enumerate().filter(|(_, s)| **s > 0.0) {
+            bare += self.right[i].powi(2) / square;
+            left += self.gram[(i, i)] / square;
+            count += 1.0;
+        }
+        if fixed || left <= 0.0 { gain } else { gain.min(bare * count / left) }
+    }
+
     /// The equations of a point between two others, `share` of the way from `a` to `b`, with its own right-hand side.
     pub fn between(a: &Normal, b: &Normal, share: f64, right: Vec<f64>) -> Normal {
         let mix = |x: f64, y: f64| (1.0 - share) * x + share * y;
