@@ -178,6 +178,9 @@ pub struct Explained {
     pub concealed: f64,
 }
 
+/// Ratio of the squares of columns from which they count as of one size.
+const ALIKE: f64 = 0.1;
+
 /// The normal equations of a fit by a few columns, basis taken out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Normal {
@@ -239,13 +242,14 @@ impl Normal {
     /// sine is concealed and its cosine is not, the next wave's may be the other way round, and a mixture of both promises what neither has.
     pub fn guessed(&self, fixed: bool) -> f64 {
         let gain = self.explained(fixed).gain;
-        let (mut bare, mut left, mut count) = (0.0, 0.0, 0.0);
-        for (i, square) in self.squares.iter().enumerate().filter(|(_, s)| **s > 0.0) {
-            bare += self.right[i].powi(2) / square;
-            left += self.gram[(i, i)] / square;
-            count += 1.0;
+        let trace = self.gram.trace();
+        let (least, most) =
+            self.squares.iter().fold((f64::INFINITY, 0.0), |(l, m): (f64, f64), s| (l.min(*s), m.max(*s)));
+        // Columns of one size only: of others the largest would speak for all.
+        if fixed || trace <= 0.0 || least < ALIKE * most {
+            return gain;
         }
-        if fixed || left <= 0.0 { gain } else { gain.min(bare * count / left) }
+        gain.min(self.right.len() as f64 * dot(&self.right, &self.right) / trace)
     }
 
     /// The equations of a point between two others, `share` of the way from `a` to `b`, with its own right-hand side.
