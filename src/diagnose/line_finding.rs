@@ -98,6 +98,18 @@ fn frequency(bench: &Bench, line: &Line) -> Estimate {
     Estimate { value: line.hz, low: line.hz - off, high: line.hz + off, unit: "Hz".into() }
 }
 
+/// Most multiples of the mains that hum, and how near to one a frequency counts as one (Hz).
+const MULTIPLES: f64 = 12.0;
+const MAINS_OFF_HZ: f64 = 0.2;
+
+/// Whether the mains may hum at a frequency: a single higher order of the spindle there may be either.
+pub(super) fn mains(hz: f64) -> bool {
+    [50.0, 60.0].iter().any(|base| {
+        let k = (hz / base).round();
+        (1.0..=MULTIPLES).contains(&k) && (hz - k * base).abs() < MAINS_OFF_HZ
+    })
+}
+
 /// One finding for all orders of the spindle, one for each other line; and the frequencies (Hz) of those that are none, but narrow
 /// bands of noise or something that rings.
 pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Finding>, Vec<f64>) {
@@ -138,7 +150,9 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Findin
             parameters.insert(name, estimate(&phasors.amplitudes(), 1.0, &given.position_unit));
         }
         let lines: Vec<&Line> = orders.iter().map(|o| o.0).collect();
-        out.push(make("repeatable_runout", &["repeatable_runout"], &lines, parameters));
+        let alone = orders.len() == 1 && first.order.is_some_and(|o| o > 1) && mains(first.hz);
+        let family: &[&str] = if alone { &["repeatable_runout", "line_disturbance"] } else { &["repeatable_runout"] };
+        out.push(make("repeatable_runout", family, &lines, parameters));
     }
     let sampled = Sampled::of(&selection.model.refitted.plant, bench.scene.sample_time_s);
     for (l, phasors) in hums.iter().filter(|l| l.0.order.is_none()) {

@@ -4,6 +4,7 @@ use super::bench::Bench;
 use super::columns::position_columns;
 use super::finding::{Estimate, Finding, Where};
 use super::hygiene::{Grid, quantum};
+use super::line_finding::mains;
 use super::linear::Sampled;
 use super::place::place;
 use super::refit::Chosen;
@@ -68,8 +69,8 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
     let step = &selection.steps[chosen.step];
     let c = &step.candidates[step.tried[step.taken?].0];
     let gain = selection.gain(at);
-    let spindle =
-        |hz: f64| bench.scene.spindle_hz.is_some_and(|s| ((hz / s).round() - hz / s).abs() < 0.004 && hz > 0.9 * s);
+    let spindle_hz = bench.scene.spindle_hz;
+    let spindle = |hz: f64| spindle_hz.is_some_and(|s| ((hz / s).round() - hz / s).abs() < 0.004 && hz > 0.9 * s);
     let own = chosen.effect.facts().name;
     // A line at a multiple of the spindle is run-out, whichever law carried it.
     let inner = &chosen.setting.inner;
@@ -85,10 +86,15 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
             && !family.iter().any(|f| f == rival)
             && *rival != own
             && !same_drag(rival, name)
-            && !(name == "repeatable_runout" && *rival == "line_disturbance" && bench.scene.spindle_hz.is_some())
+            && !(name == "repeatable_runout" && *rival == "line_disturbance" && spindle_hz.is_some())
         {
             family.push((*rival).to_owned());
         }
+    }
+    if own == "repeatable_runout"
+        && spindle_hz.is_some_and(|s| single_order(&chosen.setting).is_some_and(|k| mains(k * s)))
+    {
+        family.push("line_disturbance".to_owned());
     }
     // Where the refit leaves next to nothing, a slight curve in the spectrum may be what its own straightness falls short of.
     let line = own == "line_disturbance";
@@ -136,6 +142,14 @@ fn effect_signal(bench: &Bench, selection: &Selection, at: usize) -> Vec<f64> {
     // What a record's own start and a constant torque imitate is no evidence of place.
     bench.fit(vec![]).local_basis().project(&mut signal);
     signal
+}
+
+/// The order of the spindle, above the first, that carries a run-out nearly alone.
+fn single_order(setting: &Setting) -> Option<f64> {
+    let sizes: Vec<f64> = setting.strengths.chunks_exact(2).map(|s| s[0].hypot(s[1])).collect();
+    let (k, most) = sizes.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    let alone = sizes.iter().enumerate().all(|(i, s)| i == k || *s < BESIDE_ORDER * most);
+    (k > 0 && alone).then_some((k + 1) as f64)
 }
 
 /// Parameters of the chosen effect `at` with 95 % intervals: its numbers moved together along each direction that errs independently,
@@ -205,6 +219,8 @@ pub(super) fn unexplained(bench: &Bench, selection: &Selection, explained: f64) 
     }
 }
 
+/// Share of a single order's size below which the others do not count.
+const BESIDE_ORDER: f64 = 0.2;
 /// Share of its step to which a scale is graduated.
 const GRADUATION: f64 = 1e-4;
 
