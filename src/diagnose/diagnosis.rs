@@ -8,7 +8,7 @@ use super::fit_report::fit_report;
 use super::fitted::refit;
 use super::held_out::{contradicts, held_out, mean};
 use super::judge::{Judged, rms};
-use super::line_finding::line_findings;
+use super::line_finding::{line_findings, same_line};
 use super::linear_story::linear_story;
 use super::logs::check;
 use super::name::{finding, same_drag};
@@ -340,7 +340,7 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
             if d.findings.is_empty() {
                 d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
             }
-            if d.verdict != Verdict::LocatedUnexplained {
+            if d.verdict != Verdict::LocatedUnexplained && !d.findings.iter().any(|g| same_line(g, &f)) {
                 d.findings.push(f);
             }
         }

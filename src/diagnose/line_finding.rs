@@ -174,6 +174,13 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Findin
     (out, others.iter().map(|(l, _)| l.hz).collect())
 }
 
+/// Whether two findings are of one hum: their frequencies lie within their intervals of each other.
+pub(super) fn same_line(a: &Finding, b: &Finding) -> bool {
+    let of = |f: &Finding| f.parameters.get("frequency_hz").map(|e| [e.low, e.high]);
+    let hum = |f: &Finding| f.effect == "line_disturbance";
+    hum(a) && hum(b) && of(a).zip(of(b)).is_some_and(|(a, b)| a[0] <= b[1] && b[0] <= a[1])
+}
+
 /// What shows at some frequencies (Hz) in every repeat differently, and is no hum.
 pub(super) fn unsteady(bench: &Bench, frequencies_hz: &[f64]) -> Finding {
     let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();

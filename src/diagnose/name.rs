@@ -182,7 +182,9 @@ fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String
         .enumerate()
         .map(|(k, p)| {
             let off = moved.iter().map(|m| m.get(k).map_or(0.0, |q| (q.value - p.value).powi(2))).sum::<f64>();
-            let off = off.sqrt().hypot(effect.form(&chosen.setting, p.name) * p.value);
+            // A number that no direction moves tells which form or which mode: it is exact.
+            let form = if off > 0.0 { effect.form(&chosen.setting, p.name) * p.value } else { 0.0 };
+            let off = off.sqrt().hypot(form);
             let e = Estimate {
                 value: p.value,
                 low: p.value - off,
