@@ -162,7 +162,7 @@ fn page(classes: &[Case], nine: &[Case]) -> Result<String, StudyError> {
          have no noise and are judged on one move: a loop of some hundred taps can then cancel the window's bins nearly one by one, which no PID with notches can, so \
          that their bound is true and far away. It speaks of loops whose gain crossings all lie inside the spec's range. The bound of the structure is true and not tight: seven numbers \
          in {boxes} boxes are a few pieces a number, and what a wide box could do at one frequency and what at another need not go together. Without noise only small boxes have a \
-         bound at all, and thirteen numbers do not come down to such: there it is 0, and what remains is the bound of all loops and the searches from many starts.\n",
+         bound at all, and thirteen numbers hardly come down to such: where it is 0, what remains is the bound of all loops and the searches from many starts.\n",
         table("Four machine classes", classes)?.text(),
         table("HDD benchmark plant, nine cases", nine)?.text(),
         worst(classes),
