@@ -12,8 +12,7 @@ use std::path::Path;
 
 /// A plant, its physics entries not looked at yet.
 pub(super) fn plant(file: &Path) -> Result<Plant, Failure> {
-    let read: PlantFile = parse_toml(file, &read_text(file)?)
-        .map_err(|e| e.expecting("a plant model, as `servotune identify SWEEP --out` writes it"))?;
+    let read: PlantFile = parse_toml(file, &read_text(file)?).map_err(|e| e.expecting(PlantFile::EXPECTED))?;
     Plant::try_from(read).map_err(|source| Failure::Plant { file: file.into(), source })
 }
 

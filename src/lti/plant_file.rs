@@ -85,6 +85,11 @@ impl TryFrom<PlantFile> for Plant {
     }
 }
 
+impl PlantFile {
+    /// What a file should be that is read as one.
+    pub const EXPECTED: &str = "a plant model, as `servotune identify SWEEP --out` writes it";
+}
+
 impl From<&Plant> for PlantFile {
     fn from(p: &Plant) -> PlantFile {
         let (dc_gain, damping_ratio, acceleration_gain, viscous_rate_per_s, natural_frequency_rad_s) = match p.body {

@@ -275,10 +275,12 @@ impl GainTable {
         GainTable::parse(file, &read_text(file)?)
     }
 
+    /// What a file should be that is read as one.
+    pub const EXPECTED: &str = "a gain table, as `servotune tune --out` writes it";
+
     /// The table in `text`; `file` only names it in an error.
     pub fn parse(file: &Path, text: &str) -> Result<GainTable, GainTableError> {
-        let table: GainTable =
-            parse_toml(file, text).map_err(|e| e.expecting("a gain table, as `servotune tune --out` writes it"))?;
+        let table: GainTable = parse_toml(file, text).map_err(|e| e.expecting(GainTable::EXPECTED))?;
         let expected = table.controller().sections()?.chain;
         if expected.len() != table.section.len() {
             return Err(GainTableError::Count { found: table.section.len(), expected: expected.len() });

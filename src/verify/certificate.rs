@@ -154,7 +154,7 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
         }
     }
     // The table's own reader would refuse what is to be reported here.
-    let table: GainTable = parse_toml(&i.gains.file, &i.gains.text)?;
+    let table: GainTable = parse_toml(&i.gains.file, &i.gains.text).map_err(|e| e.expecting(GainTable::EXPECTED))?;
     let c = table.controller();
     c.check().map_err(crate::tune::GainTableError::from)?;
     let spec = Spec::parse(&i.spec.text, &i.profile.text)?;
@@ -170,8 +170,9 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
     let plain = i.word == Word::Double && !i.uncertainty.any();
     for source in i.plants {
         let file = &source.file;
-        let plant = Plant::try_from(parse_toml::<PlantFile>(file, &source.text)?)
-            .map_err(|source| VerifyError::PlantFile { file: file.clone(), source })?;
+        let plant =
+            Plant::try_from(parse_toml::<PlantFile>(file, &source.text).map_err(|e| e.expecting(PlantFile::EXPECTED))?)
+                .map_err(|source| VerifyError::PlantFile { file: file.clone(), source })?;
         if let Some(p) = plant.physics.first() {
             return Err(VerifyError::Physics { file: file.clone(), effect: p.effect.clone() });
         }
