@@ -4,6 +4,7 @@
 //! x'' + c x' + k x = b (u + w), the error of the model without w is the plant's answer to w alone.
 
 use super::linear::Sampled;
+use super::run::Run;
 use super::trajectory::Trajectory;
 use super::whiten::Whitener;
 use crate::physics::{COLUMNS, Effect, Entry, Sample, Scene};
@@ -40,6 +41,39 @@ pub fn drive(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectories: &[
         apart: if facts.per_record { facts.columns } else { 0 },
         segments: trajectories.iter().map(|t| raw_columns(effect, inner, scene, t)).collect(),
     }
+}
+
+/// What enters a machine along one run.
+pub(super) struct Entering {
+    /// The command less the one that stood before, with command effects.
+    pub command: Vec<f64>,
+    /// Torques on the arm, where there are any.
+    pub torque: Option<Vec<f64>>,
+    /// What is added to the position.
+    pub position: Vec<f64>,
+}
+
+/// What enters along a run: its command and the effects with their strengths, beside a torque that acts already.
+pub(super) fn entering(
+    effects: &[(&Drive, &[f64])],
+    run: &Run,
+    segment: usize,
+    mut torque: Option<Vec<f64>>,
+) -> Entering {
+    // From rest under the command that stood before: the body's answer to that constant is a free motion.
+    let mut command: Vec<f64> = run.input.iter().map(|u| u - run.before).collect();
+    let mut position = vec![0.0; run.len()];
+    for (drive, strengths) in effects {
+        for (column, s) in drive.segments[segment].iter().zip(drive.own(strengths, segment)) {
+            let into = match drive.entry {
+                Entry::Command => &mut command,
+                Entry::Torque => torque.get_or_insert_with(|| vec![0.0; run.len()]),
+                Entry::Position => &mut position,
+            };
+            into.iter_mut().zip(column).for_each(|(o, v)| *o += s * v);
+        }
+    }
+    Entering { command, torque, position }
 }
 
 /// The columns of an effect along one trajectory, at their place of entry.

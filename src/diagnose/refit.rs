@@ -1,7 +1,7 @@
 //! All linear parameters fitted to all fit records at once, with the strengths and inner parameters of the effects that
 //! were chosen so far; by the whitened simulation error.
 
-use super::columns::{Drive, drive};
+use super::columns::{Drive, Entering, drive, entering};
 use super::linear::{Carrier, LinearForm, Sampled, free_motions};
 use super::lines::Line;
 use super::run::Run;
@@ -11,7 +11,7 @@ use super::trajectory::Trajectory;
 use super::whiten::Whitener;
 use crate::lti::Plant;
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
-use crate::physics::{Effect, Entry, Scene, Setting};
+use crate::physics::{Effect, Scene, Setting};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -186,21 +186,9 @@ pub fn simulation_error(
     trajectory: &Trajectory,
     segment: usize,
 ) -> Vec<f64> {
-    // From rest under the command that stood before: the body's answer to that constant is a free motion.
-    let mut command: Vec<f64> = run.input.iter().map(|u| u - run.before).collect();
     let sprung = carrier.spring != 0.0 || carrier.damper != 0.0;
-    let mut torque: Option<Vec<f64>> = sprung.then(|| carrier.torque(&trajectory.samples));
-    let mut y = vec![0.0; run.len()];
-    for (drive, strengths) in effects {
-        for (column, s) in drive.segments[segment].iter().zip(drive.own(strengths, segment)) {
-            let into = match drive.entry {
-                Entry::Command => &mut command,
-                Entry::Torque => torque.get_or_insert_with(|| vec![0.0; run.len()]),
-                Entry::Position => &mut y,
-            };
-            into.iter_mut().zip(column).for_each(|(o, v)| *o += s * v);
-        }
-    }
+    let torque = sprung.then(|| carrier.torque(&trajectory.samples));
+    let Entering { command, torque, position: mut y } = entering(effects, run, segment, torque);
     sampled.delayed.add_response(&command, &mut y);
     if let Some(w) = torque {
         sampled.direct.add_response(&w, &mut y);

@@ -4,7 +4,7 @@
 //! whitened. A linear parameter moves few terms of the plant: the answers are kept term by term. Spring, damper and strengths enter
 //! linearly: their slope is one answer.
 
-use super::columns::Drive;
+use super::columns::{Drive, Entering, entering};
 use super::linear::{Carrier, Knob, Sampled};
 use super::refit::Fit;
 use crate::lti::TermAnswers;
@@ -35,18 +35,7 @@ struct Answers {
 impl Answers {
     fn of(fit: &Fit, carrier: &Carrier, sampled: &Sampled, drives: &[(&Drive, &[f64])], segment: usize) -> Answers {
         let run = &fit.means[segment];
-        let mut command: Vec<f64> = run.input.iter().map(|u| u - run.before).collect();
-        let mut torque: Option<Vec<f64>> = None;
-        for (drive, strengths) in drives {
-            for (column, s) in drive.segments[segment].iter().zip(drive.own(strengths, segment)) {
-                let into = match drive.entry {
-                    Entry::Command => &mut command,
-                    Entry::Torque => torque.get_or_insert_with(|| vec![0.0; run.len()]),
-                    Entry::Position => continue,
-                };
-                into.iter_mut().zip(column).for_each(|(o, v)| *o += s * v);
-            }
-        }
+        let Entering { command, torque, .. } = entering(drives, run, segment, None);
         let body = (carrier.spring != 0.0 || carrier.damper != 0.0)
             .then(|| TermAnswers::of(&sampled.direct, &carrier.torque(&fit.trajectories[segment].samples)));
         let command = TermAnswers::of(&sampled.delayed, &command);

@@ -99,7 +99,7 @@ fn structure_sentence(s: &StructureBound) -> String {
         )
     } else {
         format!(
-            "Of the whole structure {} boxes gave no bound of its own; that of all loops holds there too.\n",
+            "Of the whole structure {} boxes gave no bound of its own; that of all loops holds for those of it that belong to the class.\n",
             s.boxes
         )
     }
