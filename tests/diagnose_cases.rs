@@ -177,6 +177,31 @@ fn a_position_before_its_command_is_a_log_that_slipped() {
 }
 
 #[test]
+fn samples_lost_inside_a_record_are_found_without_a_controller_too() {
+    for (lost, twice) in [(7, false), (7, true)] {
+        let mut broken = records(&GIVEN);
+        let record = &mut broken[4].1;
+        let y = &mut record.position;
+        y.drain(900..900 + lost);
+        if twice {
+            // Three samples doubled farther on: the log is late by four from there.
+            let again = y[1500..1503].to_vec();
+            y.splice(1503..1503, again);
+        }
+        let n = y.len();
+        record.command.truncate(n);
+        record.excitation.truncate(n);
+        let d = diagnosed_from(broken);
+        assert_eq!((d.verdict, d.findings[0].effect.as_str()), (Verdict::DataFault, "lost_samples"));
+        let found: Vec<(&str, f64)> = d.sample_faults.iter().map(|f| (&f.record[..], f.samples)).collect();
+        let truth: &[(&str, f64)] = &[("b1", 7.0), ("b1", -3.0)];
+        assert_eq!(found, truth[..1 + usize::from(twice)]);
+        // Noise hides the place by a few samples.
+        assert!((d.sample_faults[0].time_s / T - 903.0).abs() < 12.0, "{:?}", d.sample_faults);
+    }
+}
+
+#[test]
 fn a_position_in_other_units_or_signs_is_a_fault_without_a_controller_too() {
     for factor in [25.4, 1e-3, -1.0] {
         let mut scaled = records(&GIVEN);

@@ -1,12 +1,15 @@
 //! Logs against the given plant where no controller tells what they are worth: does the position follow the plant's answer to the
 //! recorded command, in its units, its sign and its time?
 
+use super::hygiene::SampleFault;
 use super::linear::{Sampled, free_motions};
 use super::logs::shifted;
 use super::run::Run;
+use super::slip::slips_of_answer;
 use super::stack::Basis;
 use crate::lti::{LtiError, Plant};
 use crate::numeric::least_squares::dot;
+use rayon::prelude::*;
 
 /// Factor of the gain beyond which no machine differs from its model, but its log does.
 const OTHER_UNIT: f64 = 8.0;
@@ -22,7 +25,7 @@ pub(super) struct Answers<'a> {
 }
 
 struct Answer<'a> {
-    position: &'a [f64],
+    run: &'a Run,
     /// The answer, what is each record's own start taken out.
     answer: Vec<f64>,
     start: Basis,
@@ -47,7 +50,7 @@ impl<'a> Answers<'a> {
             let mut answer = vec![0.0; run.len()];
             sampled.delayed.add_response(&input, &mut answer);
             start.project(&mut answer);
-            Answer { position: &run.position, answer, start }
+            Answer { run, answer, start }
         };
         Ok(Answers { records: runs.iter().map(record).collect() })
     }
@@ -56,7 +59,7 @@ impl<'a> Answers<'a> {
     fn follow(&self, early: usize) -> Follows {
         let (mut ss, mut sy, mut yy) = (0.0, 0.0, 0.0);
         for r in &self.records {
-            let mut y = shifted(r.position, -(early as f64));
+            let mut y = shifted(&r.run.position, -(early as f64));
             r.start.project(&mut y);
             (ss, sy, yy) = (ss + dot(&r.answer, &r.answer), sy + dot(&r.answer, &y), yy + dot(&y, &y));
         }
@@ -87,5 +90,22 @@ impl<'a> Answers<'a> {
         let by = best.1 as f64;
         // Up to the model's own delay it may be a machine that is faster than its model.
         (best.0 < MOVED_BACK * unmoved && by > own_delay + 0.5).then_some(by)
+    }
+
+    /// Places where a position slipped against the answer to its command. A sound log may differ by its start, its gain and its delay, these and
+    /// a clock that runs otherwise.
+    pub(super) fn slips(&self, given: &Plant, sample_time_s: f64) -> Vec<SampleFault> {
+        let of = |r: &Answer| {
+            let n = r.run.len();
+            let slope = |x: &[f64]| -> Vec<f64> {
+                (0..n).map(|k| 0.5 * (x[(k + 1).min(n - 1)] - x[k.saturating_sub(1)])).collect()
+            };
+            let late = slope(&r.answer);
+            let later_and_later = late.iter().enumerate().map(|(k, v)| k as f64 * v).collect();
+            let mut nuisances = free_motions(&given.body, sample_time_s, n).to_vec();
+            nuisances.extend([r.answer.clone(), slope(&late), late, later_and_later]);
+            slips_of_answer(r.run, &nuisances, sample_time_s)
+        };
+        self.records.par_iter().flat_map_iter(of).collect()
     }
 }

@@ -6,7 +6,7 @@
 //! Hinkley 1997, ch. 4). Spec: `specs/mismatch.md`.
 
 use super::bench::Bench;
-use super::fitted::refit;
+use super::fitted::refit_from;
 use super::select::{Model, strongest};
 use crate::numeric::random::Random;
 use crate::physics::Effect;
@@ -50,8 +50,9 @@ pub(super) fn bootstrap(
             bench.whitener.colour(&mut noise);
             mean.position.iter_mut().zip(error).zip(&noise).for_each(|((y, e), n)| *y += n - e);
         }
-        null.correct(&vec![0.0; bench.form.knobs.len()], &[]);
-        let model = refit(&mut null, iterations);
+        // From the machine that the draw is made of: the way to it from a given plant far off is no question of chance.
+        null.correct(&baseline.refitted.p, &[]);
+        let model = refit_from(&mut null, &baseline.refitted.p, iterations);
         strongest(&null, library, &model)
     };
     let mut null_log_p: Vec<f64> = (0..draws).into_par_iter().map(one).collect();

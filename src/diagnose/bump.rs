@@ -56,7 +56,7 @@ struct Answer {
 fn answer(bench: &Bench, sampled: &Sampled, n: usize, width_s: f64) -> Option<Answer> {
     let t = bench.scene.sample_time_s;
     let samples = (0..n).map(|k| Sample { t: k as f64 * t, ..Sample::default() }).collect();
-    let motion = Trajectory { samples, unexplained: Vec::new() };
+    let motion = Trajectory { samples, unexplained: Vec::new(), inputs: Vec::new() };
     let raw = raw_columns(effect("shock")?, &[0.0, width_s], &bench.scene, &motion);
     let mut y = vec![0.0; n];
     sampled.direct.add_response(&raw[0], &mut y);

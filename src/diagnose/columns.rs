@@ -77,13 +77,32 @@ pub(super) fn entering(
 }
 
 /// The columns of an effect along one trajectory, at their place of entry.
+///
+/// Commands of repeats differ by what the controller made of the noise, and what an amplifier does to each is not what it would do to their
+/// mean: the mean's peaks stay below a limit that every one of them meets.
 pub fn raw_columns(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectory: &Trajectory) -> Vec<Vec<f64>> {
+    let samples = &trajectory.samples;
+    if effect.facts().entry != Entry::Command || trajectory.inputs.is_empty() {
+        return columns_along(effect, inner, scene, samples);
+    }
+    let share = 1.0 / trajectory.inputs.len() as f64;
+    let mut mean = vec![vec![0.0; samples.len()]; effect.facts().columns];
+    for input in &trajectory.inputs {
+        let own: Vec<Sample> = samples.iter().zip(input).map(|(s, &u)| Sample { u, ..*s }).collect();
+        for (mean, column) in mean.iter_mut().zip(columns_along(effect, inner, scene, &own)) {
+            mean.iter_mut().zip(&column).for_each(|(m, c)| *m += share * c);
+        }
+    }
+    mean
+}
+
+/// The columns of an effect along a motion.
+fn columns_along(effect: &dyn Effect, inner: &[f64], scene: &Scene, samples: &[Sample]) -> Vec<Vec<f64>> {
     let facts = effect.facts();
-    let n = trajectory.samples.len();
+    let n = samples.len();
     let mut law = effect.law(inner, scene);
     let mut out = vec![vec![0.0; n]; facts.columns];
     let mut value = [0.0; COLUMNS];
-    let samples = &trajectory.samples;
     let by = if facts.entry == Entry::Torque { scene.arm_over_record() } else { 1.0 };
     let ahead = usize::from(facts.entry == Entry::Torque);
     for k in 0..n {

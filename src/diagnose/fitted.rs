@@ -125,11 +125,16 @@ fn to_its_end(bench: &Bench, mut model: Model, iterations: usize) -> Model {
     model
 }
 
+/// The linear refit from the given plant.
+pub fn refit(bench: &mut Bench, iterations: usize) -> Model {
+    let given = vec![0.0; bench.form.knobs.len()];
+    refit_from(bench, &given, iterations)
+}
+
 /// The linear refit. A refit moves the motion that it was made along: once more, from there. Without repeats it moves the noise
 /// too.
-pub fn refit(bench: &mut Bench, iterations: usize) -> Model {
-    let mut baseline =
-        to_its_end(bench, fitted(bench, vec![], &vec![0.0; bench.form.knobs.len()], iterations), iterations);
+pub(super) fn refit_from(bench: &mut Bench, start: &[f64], iterations: usize) -> Model {
+    let mut baseline = to_its_end(bench, fitted(bench, vec![], start, iterations), iterations);
     for knob in [Knob::Delay, Knob::Gain] {
         let Some(start) = Some(&baseline).filter(|b| b.excess_sigma() > FAR_OFF).and_then(|_| far(bench, knob)) else {
             continue;

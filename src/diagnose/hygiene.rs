@@ -46,7 +46,7 @@ pub struct SampleFault {
 }
 
 /// Position at a real-valued sample, by cubic interpolation.
-fn between(y: &[f64], at: f64) -> f64 {
+pub(super) fn between(y: &[f64], at: f64) -> f64 {
     let n = y.len() as f64;
     let at = at.clamp(0.0, n - 1.0);
     let k = at.floor();
@@ -216,66 +216,6 @@ pub fn sample_faults(run: &Run, gaps: &[ClockGap], sample_time_s: f64) -> Vec<Sa
         at += length;
     }
     all
-}
-
-/// Most samples that a log is taken to jump by.
-const SLIP: i32 = 40;
-
-/// Most slips that are looked for in one record.
-const SLIPS: usize = 8;
-
-/// Jumps of the position log against the command log inside a record: where the replay starts to fail, and the shift behind that
-/// place that makes it right again; the next one from there on.
-pub fn slips(law: &Law, run: &Run, sample_time_s: f64) -> Vec<SampleFault> {
-    let mut all: Vec<SampleFault> = Vec::new();
-    let (mut from, mut shift) = (0, 0.0);
-    while all.len() < SLIPS {
-        let Some((at, by)) = slip(law, run, from, shift) else { break };
-        let time_s = at as f64 * sample_time_s;
-        all.push(SampleFault { record: run.name.clone(), time_s, samples: -by, stuck: false });
-        (from, shift) = (at + SLIP as usize, shift + by);
-    }
-    all
-}
-
-/// The first jump behind sample `from`, the position being late by `shift` samples already: where, and by how much more.
-fn slip(law: &Law, run: &Run, from: usize, shift: f64) -> Option<(usize, f64)> {
-    let reference = &run.reference.as_deref()?[from..];
-    let command = &run.command[from..];
-    let n = reference.len();
-    // A start of its own, long enough to tell the law's memory and what its replay leaves.
-    let head = if from == 0 { n / 10 } else { 2 * SLIP as usize };
-    let tail_least = head.max(2 * SLIP as usize);
-    if n < head + tail_least + SLIP as usize {
-        return None;
-    }
-    let position = |k: usize, d: f64| between(&run.position, (from + k) as f64 + shift + d);
-    let error: Vec<f64> = reference.iter().enumerate().map(|(k, r)| r - position(k, 0.0)).collect();
-    // The memory from the start alone: behind a slip it would be made to fit what no memory explains.
-    let memory = law.memory(&reference[..head], &error[..head], &command[..head]);
-    let plain: Vec<f64> =
-        law.replay_from(memory, reference, &error).iter().zip(command).map(|(p, u)| (u - p).abs()).collect();
-    let mut start: Vec<f64> = plain[..head].to_vec();
-    start.sort_by(f64::total_cmp);
-    let size = (dot(&run.command, &run.command) / run.len() as f64).sqrt();
-    let quiet = start[head * 9 / 10].max(1e-6 * size);
-    let first = plain.iter().position(|e| *e > 20.0 * quiet && *e > 1e-3 * size)?;
-    // The start itself fails: not a slip inside the record. Too little behind it: no proof.
-    let tail = first + SLIP as usize;
-    if first < head || n < tail + tail_least {
-        return None;
-    }
-    // Behind the slip the law goes on from a memory of its own, until the next one perhaps.
-    let end = (tail + tail_least).min(n);
-    let rest = |d: f64| -> f64 {
-        let error: Vec<f64> = (tail..end).map(|k| reference[k] - position(k, d)).collect();
-        let replayed = law.replay(&reference[tail..end], &error, &command[tail..end]);
-        replayed.iter().zip(&command[tail..end]).map(|(p, u)| (u - p).powi(2)).sum()
-    };
-    let before = rest(0.0);
-    let all = (1 - SLIP..SLIP).filter(|d| *d != 0).map(|d| (f64::from(d), rest(f64::from(d))));
-    let (d, left) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (left < 0.05 * before).then_some((from + first, d))
 }
 
 /// A grid that positions stand on.

@@ -91,21 +91,20 @@ pub(super) fn controller_mismatch(r: &Replay, runs: &[&Run]) -> Finding {
 
 /// Samples are missing, doubled or stuck.
 pub(super) fn samples(faults: &[SampleFault]) -> Finding {
-    let (says, port) = text_of("lost_samples");
+    let (out_of_step, port) = text_of("lost_samples");
     let first = &faults[0];
+    let (says, what) = match (first.stuck, first.samples > 0.0) {
+        (true, _) => ("the position stands still in the log while the arm moves on", "samples"),
+        (false, true) => (out_of_step, "samples lost"),
+        (false, false) => (out_of_step, "samples too many"),
+    };
     let records: Vec<String> = faults.iter().map(|f| f.record.clone()).collect();
     Finding {
         effect: "lost_samples".into(),
         family: vec!["lost_samples".into()],
         port,
         p_value: 1e-300,
-        says: format!(
-            "{says}: record {} at {:.6} s, {} samples{}.",
-            first.record,
-            first.time_s,
-            first.samples,
-            if first.stuck { " stuck" } else { "" }
-        ),
+        says: format!("{says}: record {} at {:.6} s, {} {what}.", first.record, first.time_s, first.samples.abs()),
         parameters: BTreeMap::from([("samples".to_owned(), plain(first.samples, "samples"))]),
         place: Where {
             records,

@@ -3,9 +3,10 @@
 use super::answers::Answers;
 use super::bench::scene;
 use super::finding::Finding;
-use super::hygiene::{Replay, SampleFault, replay_records, sample_faults, slips};
+use super::hygiene::{Replay, SampleFault, replay_records, sample_faults};
 use super::judge::{Judged, error};
 use super::run::Run;
+use super::slip::breaks_of_replay;
 use crate::controller::Law;
 use crate::lti::{LtiError, Plant};
 use crate::recording::Case;
@@ -49,11 +50,12 @@ pub(super) fn check(
         && !r.failing.is_empty()
     {
         let failing: Vec<usize> = (0..runs.len()).filter(|&i| r.failing.contains(&runs[i].name)).collect();
-        let slips: Vec<SampleFault> = failing.iter().flat_map(|&i| slips(law, &runs[i], sample_time_s)).collect();
+        let breaks: Vec<SampleFault> =
+            failing.iter().flat_map(|&i| breaks_of_replay(law, &runs[i], sample_time_s)).collect();
         let named: Vec<&Run> = failing.iter().map(|&i| &runs[i]).collect();
         let helps = |e: f64| e < 0.3 * r.error;
-        if !slips.is_empty() {
-            faults.extend(slips);
+        if !breaks.is_empty() {
+            faults.extend(breaks);
             hygiene.closed = false;
         } else if faults.is_empty() {
             if helps(r.error_shifted) && r.shift_samples.abs() > 0.05 && r.error_shifted <= 1.1 * r.error_scaled {
@@ -77,6 +79,8 @@ pub(super) fn check(
         } else if let Some(early) = answers.early(given.delay_s / sample_time_s) {
             hygiene.finding = Some(super::log_finding::early(-early, sample_time_s, &all));
             runs.iter_mut().for_each(|r| shift(r, -early));
+        } else if faults.is_empty() {
+            faults = answers.slips(given, sample_time_s);
         }
     }
     if !faults.is_empty() {

@@ -36,6 +36,7 @@ mod scan;
 mod select;
 mod settle;
 mod simulated;
+mod slip;
 mod slopes;
 mod stack;
 mod swing;

@@ -18,6 +18,8 @@ pub struct Trajectory {
     pub samples: Vec<Sample>,
     /// Torque beyond the model (command_unit).
     pub unexplained: Vec<f64>,
+    /// What each of the repeats behind it put into the amplifier; empty where it is of one record (command_unit).
+    pub inputs: Vec<Vec<f64>>,
 }
 
 /// The mean command that acts on the arm from each sample to the next; `before` stood before the first.
@@ -138,7 +140,7 @@ impl Smoother {
                 temperature: run.temperature.as_ref().map_or(0.0, |c| c[k]),
             })
             .collect();
-        Trajectory { samples, unexplained: after.iter().map(|z| z[2]).collect() }
+        Trajectory { samples, unexplained: after.iter().map(|z| z[2]).collect(), inputs: Vec::new() }
     }
 }
 

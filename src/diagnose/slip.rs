@@ -1,0 +1,243 @@
+//! Places inside a record where its log breaks: samples of the position lost, doubled or stuck, whole rows gone.
+//!
+//! Behind a slip the position is late or early against the command by a whole number of samples. With a controller its replay
+//! starts to fail at the place, and no shift but the right one makes it right again; without one the plant's answer to the
+//! command does the same.
+
+use super::hygiene::{SampleFault, between};
+use super::run::Run;
+use super::stack::Basis;
+use crate::controller::Law;
+use crate::numeric::least_squares::dot;
+
+/// Most samples that a log is taken to jump by.
+const SLIP: i32 = 40;
+
+/// Most places that are looked for in one record.
+const MOST: usize = 8;
+
+/// A log that breaks at a place and goes on behind it.
+struct Break {
+    /// The first wrong sample.
+    at: usize,
+    /// By how many samples the position comes later behind it than before it; 0 where the log is right again.
+    later: f64,
+    /// Wrong samples over which the position stood still; 0 where it did not.
+    still: usize,
+}
+
+/// Places in a record where the replay starts to fail, each with the shift behind it that makes the replay right again; the next
+/// one from there on.
+pub fn breaks_of_replay(law: &Law, run: &Run, sample_time_s: f64) -> Vec<SampleFault> {
+    let mut all: Vec<SampleFault> = Vec::new();
+    let (mut from, mut shift) = (0, 0.0);
+    while all.len() < MOST {
+        let Some(b) = first_break(law, run, from, shift) else { break };
+        all.push(SampleFault {
+            record: run.name.clone(),
+            time_s: b.at as f64 * sample_time_s,
+            samples: if b.still > 0 { b.still as f64 } else { -b.later },
+            stuck: b.still > 0,
+        });
+        (from, shift) = (b.at + (SLIP as usize).max(b.still), shift + b.later);
+    }
+    all
+}
+
+/// Error of a replay, over the quiet ones before it and over the command, from which it fails.
+const FAILS: f64 = 20.0;
+const FAILS_OF_COMMAND: f64 = 1e-3;
+/// Fewest equal positions in a row that count as stuck where the replay fails with them.
+const STILL: usize = 4;
+/// Share of its squares that the right shift may leave of a failing replay.
+const LEFT: f64 = 0.05;
+
+/// The first break behind sample `from`, the position being late by `shift` samples already.
+fn first_break(law: &Law, run: &Run, from: usize, shift: f64) -> Option<Break> {
+    let reference = &run.reference.as_deref()?[from..];
+    let command = &run.command[from..];
+    let n = reference.len();
+    // A start of its own, long enough to tell the law's memory and what its replay leaves.
+    let head = if from == 0 { n / 10 } else { 2 * SLIP as usize };
+    let tail_least = head.max(2 * SLIP as usize);
+    if n < head + tail_least + SLIP as usize {
+        return None;
+    }
+    let position = |k: usize, d: f64| between(&run.position, (from + k) as f64 + shift + d);
+    let error: Vec<f64> = reference.iter().enumerate().map(|(k, r)| r - position(k, 0.0)).collect();
+    // The memory from the start alone: behind a break it would be made to fit what no memory explains.
+    let memory = law.memory(&reference[..head], &error[..head], &command[..head]);
+    let plain: Vec<f64> =
+        law.replay_from(memory, reference, &error).iter().zip(command).map(|(p, u)| (u - p).abs()).collect();
+    let mut start: Vec<f64> = plain[..head].to_vec();
+    start.sort_by(f64::total_cmp);
+    let size = (dot(&run.command, &run.command) / run.len() as f64).sqrt();
+    let quiet = start[head * 9 / 10].max(1e-6 * size);
+    let first = plain.iter().position(|e| *e > FAILS * quiet && *e > FAILS_OF_COMMAND * size)?;
+    // The start itself fails: not a break inside the record.
+    if first < head {
+        return None;
+    }
+    // Behind the break the law goes on from a memory of its own, until the next one perhaps.
+    let squares = |tail: usize, d: f64| -> f64 {
+        let end = (tail + tail_least).min(n);
+        let error: Vec<f64> = (tail..end).map(|k| reference[k] - position(k, d)).collect();
+        let replayed = law.replay(&reference[tail..end], &error, &command[tail..end]);
+        replayed.iter().zip(&command[tail..end]).map(|(p, u)| (u - p).powi(2)).sum()
+    };
+    let at = from + first;
+    let still = still_around(&run.position, at);
+    if still.len() >= STILL && from + n > still.end + tail_least {
+        let left = squares(still.end - from, 0.0) / tail_least as f64;
+        if left.sqrt() < FAILS * quiet {
+            return Some(Break { at: still.start + 1, later: 0.0, still: still.len() - 1 });
+        }
+    }
+    let tail = first + SLIP as usize;
+    // Too little behind it: no proof.
+    if n < tail + tail_least {
+        return None;
+    }
+    let before = squares(tail, 0.0);
+    let all = (1 - SLIP..SLIP).filter(|d| *d != 0).map(|d| (f64::from(d), squares(tail, f64::from(d))));
+    let (later, left) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (left < LEFT * before).then_some(Break { at, later, still: 0 })
+}
+
+/// The stretch of equal positions around a sample, or the one that ends before it where that is longer.
+fn still_around(y: &[f64], at: usize) -> std::ops::Range<usize> {
+    let stretch = |k: usize| {
+        let start = (0..k).rev().take_while(|&i| y[i] == y[k]).last().unwrap_or(k);
+        let end = (k..y.len()).take_while(|&i| y[i] == y[k]).last().unwrap_or(k) + 1;
+        start..end
+    };
+    let (here, before) = (stretch(at), stretch(at.saturating_sub(1)));
+    if here.len() >= before.len() { here } else { before }
+}
+
+/// Blocks of a record between which a slip is first looked for.
+const BLOCKS: usize = 64;
+/// Counts of lost samples whose place is looked for sample by sample.
+const CLOSE: usize = 5;
+/// Share of its squares that one slip may leave of the error, and all slips together of what was there at first.
+const TAKEN: f64 = 0.7;
+const ALL_LEFT: f64 = 0.1;
+
+/// Most rounds in which each slip is looked for again under the others.
+const ROUNDS: usize = 4;
+
+/// A slip: from which sample of the sound record on, and how many samples the log lacks there (negative: has too many).
+type Slip = (usize, i32);
+
+/// Slips of a position against the model's answer to its command; `nuisances` are what a sound log of another machine may differ by.
+///
+/// None unless they take nearly all of the error: what friction or another plant leaves is no step of the time.
+pub fn slips_of_answer(run: &Run, nuisances: &[Vec<f64>], sample_time_s: f64) -> Vec<SampleFault> {
+    let ends = SLIP as usize;
+    if run.len() < 10 * ends {
+        return Vec::new();
+    }
+    let n = run.len() - ends;
+    let mut basis = Basis::default();
+    nuisances.iter().for_each(|c| basis.add_local(0, c[..n].to_vec()));
+    let log = Log { y: &run.position, n, basis };
+    let first = log.squares(&[]);
+    let (mut slips, mut left): (Vec<Slip>, f64) = (Vec::new(), first);
+    while slips.len() < MOST {
+        let mut more = slips.clone();
+        more.push(log.slip(&slips));
+        // What the first one took for itself is the others' too.
+        for _ in 0..ROUNDS {
+            let before = more.clone();
+            for i in 0..more.len() {
+                let slip = more.remove(i);
+                let again = log.slip(&more);
+                let better = log.squares(&[&more[..], &[again]].concat()) < log.squares(&[&more[..], &[slip]].concat());
+                more.insert(i, if better { again } else { slip });
+            }
+            if more == before {
+                break;
+            }
+        }
+        let now = log.squares(&more);
+        if now >= TAKEN * left {
+            break;
+        }
+        (slips, left) = (more, now);
+    }
+    if left >= ALL_LEFT * first {
+        return Vec::new();
+    }
+    slips.sort_unstable();
+    let fault = |&(at, lost): &Slip| SampleFault {
+        record: run.name.clone(),
+        time_s: at as f64 * sample_time_s,
+        samples: f64::from(lost),
+        stuck: false,
+    };
+    slips.iter().map(fault).collect()
+}
+
+/// A position log, and what a sound one may differ by over its first `n` samples.
+struct Log<'a> {
+    y: &'a [f64],
+    n: usize,
+    basis: Basis,
+}
+
+impl Log<'_> {
+    /// The log as it reads at a sample of the sound record under these slips, and so many samples lost besides.
+    fn at(&self, k: usize, slips: &[Slip], besides: i32) -> f64 {
+        let lost: i32 = slips.iter().filter(|s| s.0 <= k).map(|s| s.1).sum();
+        self.y[(k as i64 - i64::from(lost + besides)).clamp(0, self.y.len() as i64 - 1) as usize]
+    }
+
+    /// Squares of what the nuisances leave under these slips.
+    fn squares(&self, slips: &[Slip]) -> f64 {
+        let mut left: Vec<f64> = (0..self.n).map(|k| self.at(k, slips, 0)).collect();
+        self.basis.project(&mut left);
+        dot(&left, &left)
+    }
+
+    /// The slip that leaves the least beside the others.
+    fn slip(&self, others: &[Slip]) -> Slip {
+        let block = self.n.div_ceil(BLOCKS);
+        let spans: Vec<[usize; 2]> = (0..self.n).step_by(block).map(|k| [k, (k + block).min(self.n)]).collect();
+        // Coordinates and squares of every block, so many samples besides being lost before it.
+        let parts = |lost: i32| -> Vec<(Vec<f64>, f64)> {
+            let columns: Vec<Vec<f64>> =
+                spans.iter().map(|s| (s[0]..s[1]).map(|k| self.at(k, others, lost)).collect()).collect();
+            let sizes: Vec<f64> = columns.iter().map(|c| dot(c, c)).collect();
+            self.basis.coordinates(&columns, &spans).into_iter().zip(sizes).collect()
+        };
+        let add = |sum: &mut (Vec<f64>, f64), part: &(Vec<f64>, f64), sign: f64| {
+            sum.0.iter_mut().zip(&part.0).for_each(|(s, p)| *s += sign * p);
+            sum.1 += sign * part.1;
+        };
+        let plain = parts(0);
+        let coarse = |lost: i32| -> (f64, usize) {
+            let moved = parts(lost);
+            let mut sum = (vec![0.0; self.basis.dimension()], 0.0);
+            moved.iter().for_each(|p| add(&mut sum, p, 1.0));
+            let mut best = (f64::INFINITY, 0);
+            for (i, s) in spans.iter().enumerate().skip(1) {
+                add(&mut sum, &moved[i - 1], -1.0);
+                add(&mut sum, &plain[i - 1], 1.0);
+                let left = sum.1 - dot(&sum.0, &sum.0);
+                if s[0] >= SLIP as usize && left < best.0 {
+                    best = (left, s[0]);
+                }
+            }
+            best
+        };
+        let mut each: Vec<((f64, usize), i32)> = (1 - SLIP..SLIP).filter(|d| *d != 0).map(|d| (coarse(d), d)).collect();
+        each.sort_by(|a, b| a.0.0.total_cmp(&b.0.0));
+        // Between blocks the place is off, and with it the count by a sample or two.
+        let close = each.iter().take(CLOSE).flat_map(|((_, near), lost)| {
+            let around = near.saturating_sub(block).max(SLIP as usize)..(near + block).min(self.n);
+            around.map(|k| (k, *lost))
+        });
+        let left = |slip: Slip| self.squares(&[others, &[slip]].concat());
+        close.map(|s| (left(s), s)).min_by(|a, b| a.0.total_cmp(&b.0)).map_or((self.n / 2, 0), |best| best.1)
+    }
+}
