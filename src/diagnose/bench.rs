@@ -43,7 +43,7 @@ pub struct Bench {
 }
 
 /// Series that hold noise only: each repeat less the mean of its group, scaled back to the noise of one record.
-fn noise_series(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<(usize, Vec<f64>)> {
+pub(super) fn noise_series(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<(usize, Vec<f64>)> {
     let mut out = Vec::new();
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, (r, e)) in errors.iter().enumerate() {
@@ -74,7 +74,7 @@ fn values(series: &[(usize, Vec<f64>)]) -> Vec<Vec<f64>> {
 }
 
 /// Series with each record's own start and constant torque taken out, all of it seen through a filter.
-fn without_start(
+pub(super) fn without_start(
     series: &[(usize, Vec<f64>)],
     free: &dyn Fn(usize) -> Vec<Vec<f64>>,
     filter: &dyn Fn(&mut Vec<f64>),

@@ -5,6 +5,7 @@
 
 use super::bench::Bench;
 use super::columns::raw_columns;
+use super::differing::Difference;
 use super::finding::{Estimate, Finding, Where};
 use super::judge::{Judged, error};
 use super::linear::Sampled;
@@ -13,7 +14,8 @@ use super::run::Run;
 use super::scan::log_tail;
 use super::trajectory::Trajectory;
 use crate::numeric::least_squares::dot;
-use crate::physics::{Sample, effect};
+use crate::physics::{Effect, Sample, effect};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A push that falls into one record.
@@ -27,6 +29,8 @@ pub struct Bump {
     pub width_s: f64,
     /// Its peak (command_unit) and the standard error of that.
     pub peak: [f64; 2],
+    /// What it takes of the sum of squares of what repeats differ by.
+    pub gain: f64,
     /// Logarithm of the chance that noise alone shows it somewhere.
     pub log_p: f64,
 }
@@ -128,6 +132,7 @@ pub fn bump(bench: &Bench) -> Option<Bump> {
                 time_s: from as f64 * t,
                 width_s: answer.samples as f64 * t,
                 peak: [strength / part, error],
+                gain,
                 log_p,
             };
             found = Some((gain, bump));
@@ -159,6 +164,19 @@ fn of_two(bench: &Bench, answers: &[Answer], bump: Bump) -> Bump {
     let run = if along(a) > along(b) { a } else { b };
     let sign = if run == bump.run { 1.0 } else { -1.0 };
     Bump { run, peak: [sign * bump.peak[0], bump.peak[1]], ..bump }
+}
+
+/// Share of the gain of a push from which an amplifier that bends the commands explains it as well.
+const AS_WELL: f64 = 0.7;
+
+/// Whether the repeats may differ by what an amplifier does to their commands: at a limit a peak more or less looks like a push.
+pub(super) fn bent(bench: &Bench, bump: &Bump, library: &[&'static dyn Effect]) -> bool {
+    let Ok(sampled) = Sampled::of(&bench.form.given, bench.scene.sample_time_s) else { return false };
+    let explains = |e: &dyn Effect| {
+        let gain = |inner: &Vec<f64>| Difference::of(bench, &sampled, e, inner).gain();
+        e.grid(&bench.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
+    };
+    library.iter().filter(|e| e.bends()).any(|e| explains(*e) > AS_WELL * bump.gain)
 }
 
 /// Share of what a push takes under the linear refit that it must still take under the final model.

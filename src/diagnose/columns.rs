@@ -97,7 +97,7 @@ pub fn raw_columns(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectory
 }
 
 /// The columns of an effect along a motion.
-fn columns_along(effect: &dyn Effect, inner: &[f64], scene: &Scene, samples: &[Sample]) -> Vec<Vec<f64>> {
+pub(super) fn columns_along(effect: &dyn Effect, inner: &[f64], scene: &Scene, samples: &[Sample]) -> Vec<Vec<f64>> {
     let facts = effect.facts();
     let n = samples.len();
     let mut law = effect.law(inner, scene);

@@ -1,7 +1,7 @@
 //! The diagnosis of a case, step by step: logs, noise, linear refit, search, judgement on hold-out records, verdict.
 
 use super::bench::Bench;
-use super::bump::{Bump, beyond, bump};
+use super::bump::{Bump, bent, beyond, bump};
 use super::corrected::{Corrected, corrected};
 use super::finding::*;
 use super::fit_report::fit_report;
@@ -195,7 +195,7 @@ fn set_aside(
     let mut cleaner = Bench::new(&plant, bench.runs.clone(), sample_time_s, spindle_hz)?;
     let mut found = Vec::new();
     while let Some(b) = bump(&cleaner) {
-        if found.len() == most {
+        if found.len() == most || bent(&cleaner, &b, library()) {
             return Ok(Vec::new());
         }
         let mut runs = cleaner.runs.clone();

@@ -3,6 +3,7 @@
 //! In: a bench, effects, where to begin. Out: the model with its cost, likelihood and freedom.
 
 use super::bench::Bench;
+use super::differing::differing;
 use super::linear::Knob;
 use super::refit::Chosen;
 use super::select::{Model, begun};
@@ -24,7 +25,7 @@ pub(super) fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64], iterations: 
     let known = bench.repeats.iter().map(|r| r.1.len()).sum::<usize>() as f64 - bench.stack.total as f64;
     let level = if bench.repeats.is_empty() { 0.0 } else { freedom * freedom / known.max(1.0) };
     let noise = if bench.levels.from_repeats { 0.0 } else { bench.whitener.evidence(bench.stack.total) };
-    let evidence = refitted.cost + noise;
+    let evidence = refitted.cost + noise - differing(bench, &chosen, &refitted.p);
     Model { cost: refitted.cost, evidence, freedom, sigma: (2.0 * (freedom + level)).sqrt(), chosen, refitted }
 }
 

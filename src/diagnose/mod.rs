@@ -12,6 +12,7 @@ mod clock;
 mod columns;
 mod corrected;
 mod diagnosis;
+mod differing;
 mod experiment;
 mod finding;
 mod fit_report;

@@ -4,7 +4,9 @@
 //! The columns' own energy changes slowly along a grid. So every tenth point is worked out in full, the others take their
 //! energy from these, and what then looks best is worked out in full too.
 
+use super::bench::Bench;
 use super::columns::{raw_columns, white_columns};
+use super::differing::Difference;
 use super::linear::Sampled;
 use super::refit::Fit;
 use super::stack::{Basis, Explained, Normal};
@@ -112,6 +114,8 @@ pub struct Ground<'a, 'f> {
     basis: Basis,
     /// The error seen from where columns enter: command, torque, position.
     seen: [Vec<f64>; 3],
+    /// Where the repeats are, whose differences count too.
+    repeats: Option<&'a Bench>,
 }
 
 /// Points of a grid from one that is worked out in full to the next.
@@ -150,7 +154,17 @@ impl<'a, 'f> Ground<'a, 'f> {
             out
         };
         let seen = [Entry::Command, Entry::Torque, Entry::Position].map(back);
-        Some(Ground { fit, sampled, error, basis, seen })
+        Some(Ground { fit, sampled, error, basis, seen, repeats: None })
+    }
+
+    /// With what repeats differ by as further evidence.
+    pub fn beside(self, repeats: &'a Bench) -> Ground<'a, 'f> {
+        Ground { repeats: Some(repeats), ..self }
+    }
+
+    /// What an effect shows in what repeats differ by.
+    fn difference(&self, effect: &dyn Effect, inner: &[f64]) -> Option<Difference> {
+        self.repeats.filter(|_| effect.bends()).map(|bench| Difference::of(bench, &self.sampled, effect, inner))
     }
 
     /// The normal equations of an effect at one point.
@@ -179,7 +193,11 @@ impl<'a, 'f> Ground<'a, 'f> {
             }
             spans = vec![[0, fit.stack.total]; facts.columns];
         }
-        Normal::of(&self.basis, &self.error, &columns, &spans)
+        let mut normal = Normal::of(&self.basis, &self.error, &columns, &spans);
+        if let Some(difference) = self.difference(effect, inner) {
+            normal.add(&difference);
+        }
+        normal
     }
 
     /// Its right-hand side alone.
@@ -200,6 +218,9 @@ impl<'a, 'f> Ground<'a, 'f> {
             } else {
                 out.iter_mut().zip(each).for_each(|(o, v)| *o += v);
             }
+        }
+        if let Some(difference) = self.difference(effect, inner) {
+            out[0] += difference.along;
         }
         out
     }

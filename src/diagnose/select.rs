@@ -373,7 +373,7 @@ fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Model, p: &[f
     let plant = bench.form.carrier(p).plant;
     let ahead = model.cost - error.iter().map(|e| e * e).sum::<f64>();
     let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
-    let mut candidates = ground.best(library);
+    let mut candidates = ground.beside(bench).best(library);
     candidates.iter_mut().for_each(|c| c.gain += ahead.min(0.0));
     candidates
 }

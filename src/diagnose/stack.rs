@@ -3,6 +3,7 @@
 //! Repeats enter once, as their mean times the root of their number: under white noise nothing is lost, and the work falls
 //! by that number.
 
+use super::differing::Difference;
 use super::run::Run;
 use crate::numeric::least_squares::dot;
 use crate::numeric::wide::wide;
@@ -216,6 +217,13 @@ impl Normal {
             }
         }
         Normal { right, gram, squares: (0..m).map(|i| own(i, i)).collect() }
+    }
+
+    /// Adds what the only column shows in what repeats differ by.
+    pub fn add(&mut self, difference: &Difference) {
+        self.right[0] += difference.along;
+        self.gram[(0, 0)] += difference.square;
+        self.squares[0] += difference.square;
     }
 
     /// The fit; strengths are 1 where `fixed`.

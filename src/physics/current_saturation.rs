@@ -46,6 +46,10 @@ impl Effect for CurrentSaturation {
         Box::new(Clip { limit: inner[0] })
     }
 
+    fn bends(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         vec![Parameter::new("limit", setting.inner[0], Unit::Command)]
     }

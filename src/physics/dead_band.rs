@@ -45,6 +45,10 @@ impl Effect for DeadBand {
         Box::new(Zone { half: inner[0].abs() })
     }
 
+    fn bends(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         vec![
             Parameter::new("half_width", setting.inner[0], Unit::Command),

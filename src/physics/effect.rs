@@ -276,6 +276,11 @@ pub trait Effect: Sync {
         true
     }
 
+    /// Whether it answers a command out of proportion: repeats then differ by more than the linear answer to their commands.
+    fn bends(&self) -> bool {
+        false
+    }
+
     /// Share by which a number may be off because no machine follows a law to the letter; long records make intervals narrower than that.
     fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
         FORM

@@ -75,6 +75,10 @@ impl Effect for SlewLimit {
         Box::new(Limiter { step: inner[0] * scene.sample_time_s, ramps: inner[1] != 0.0, current: None })
     }
 
+    fn bends(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         vec![
             Parameter::new("max_slope", setting.inner[0], Unit::CommandPerSecond),
