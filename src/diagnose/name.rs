@@ -12,7 +12,7 @@ use super::rival::Rival;
 use super::run::Run;
 use super::scan::log_tail;
 use super::select::Selection;
-use crate::physics::{Parameter, Setting, facts, library};
+use crate::physics::{Effect, Entry, Facts, Parameter, Setting, Share, facts, library};
 use std::collections::BTreeMap;
 
 /// Difference of the fit (twice the log-likelihood) below which two names are one family.
@@ -33,6 +33,8 @@ const SLIGHT_SHARE: f64 = 0.01;
 const CURVED: f64 = 0.3;
 const NEXT_TO_NOTHING: f64 = 4.0;
 
+/// Difference of two linear answers below which they are one.
+const ALIKE: f64 = 1e-6;
 /// Sliding length over the sensor's noise below which friction counts as dry.
 const DRY: f64 = 12.0;
 
@@ -91,6 +93,12 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
             family.push((*rival).to_owned());
         }
     }
+    let nothing_between = selection.model.chosen.iter().all(|c| c.effect.facts().entry != Entry::Torque);
+    for twin in twins(bench, chosen).filter(|_| nothing_between) {
+        if !family.iter().any(|f| f == twin) {
+            family.push(twin.to_owned());
+        }
+    }
     if own == "repeatable_runout"
         && spindle_hz.is_some_and(|s| single_order(&chosen.setting).is_some_and(|k| mains(k * s)))
     {
@@ -121,6 +129,25 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
         parameters,
         place,
     })
+}
+
+/// Effects that do the same to the recorded position from another place of a linear machine: where a lag sits, before the plant or behind
+/// it, no record of the two ends tells.
+fn twins<'a>(bench: &'a Bench, chosen: &'a Chosen) -> impl Iterator<Item = &'static str> + 'a {
+    let ratio = |e: &dyn Effect, w: f64| match e.share(&chosen.setting, &bench.scene, w) {
+        Share::Ratio(r) => Some(r),
+        _ => None,
+    };
+    let same = move |e: &dyn Effect| {
+        let share = [0.1, 1.0, 2.5].map(|a| a / bench.scene.sample_time_s);
+        share.iter().all(|&w| {
+            let own = ratio(chosen.effect, w);
+            own.is_some_and(|a| ratio(e, w).is_some_and(|b| (a - b).norm() < ALIKE * a.norm()))
+        })
+    };
+    let facts = chosen.effect.facts();
+    let like = |f: &Facts| f.fixed && facts.fixed && facts.confused_with.contains(&f.name);
+    library().iter().filter(move |e| like(e.facts()) && same(**e)).map(|e| e.facts().name)
 }
 
 /// What the effect adds, whitened and stacked.

@@ -162,7 +162,7 @@ const LEADS: f64 = 0.8;
 const CONCEALED: f64 = 0.9995;
 /// The same where the linear parameters have come to their end within so many standard deviations of the noise: what is still seen is not
 /// theirs.
-const NEARLY_ALL: f64 = 0.999_99;
+const NEARLY_ALL: f64 = 0.999_999;
 const SETTLED: f64 = 5.0;
 /// Share of its gain by which an effect of each record's own must beat one of the machine.
 pub(super) const OWN: f64 = 0.05;
