@@ -7,7 +7,7 @@ use super::refit::{Chosen, Fit, simulation_error};
 use super::run::{Run, mean_run};
 use super::select::Model;
 use super::stack::{Basis, Stack};
-use super::trajectory::{Smoother, Trajectory, acting};
+use super::trajectory::{Smoother, Trajectory, acting, apart};
 use super::whiten::{NoiseLevels, Whitener};
 use crate::lti::{Body, LtiError, Plant};
 use crate::numeric::least_squares::Qr;
@@ -171,7 +171,7 @@ impl Bench {
         let sampled = Sampled::of(&carrier.plant, sample_time_s)?;
         // Repeats differ by noise only, so that the linear answer to the difference of their commands is all that counts.
         let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
-        let still = Trajectory { samples: Vec::new(), unexplained: Vec::new(), inputs: Vec::new() };
+        let still = Trajectory { samples: Vec::new(), unexplained: Vec::new(), repeats: Vec::new() };
         let free = |n: usize| free_motions(&given.body, sample_time_s, n).to_vec();
         let mut errors: Vec<(usize, Vec<f64>)> =
             (fit_runs.iter()).map(|&r| (r, simulation_error(&sampled, &plain, &[], &runs[r], &still, 0))).collect();
@@ -235,7 +235,7 @@ impl Bench {
         self.trajectories =
             means.iter().zip(known).map(|(r, w)| smoother.smooth(r, w, &sampled.delayed, spindle_hz)).collect();
         for (t, s) in self.trajectories.iter_mut().zip(&self.stack.segments).filter(|(_, s)| s.runs.len() > 1) {
-            t.inputs = s.runs.iter().map(|&r| self.runs[r].input.clone()).collect();
+            t.repeats = s.runs.iter().map(|&r| apart(&t.samples, &self.runs[r].input, &sampled.delayed)).collect();
         }
     }
 

@@ -7,14 +7,16 @@ use super::bench::Bench;
 use super::columns::raw_columns;
 use super::differing::Difference;
 use super::finding::{Estimate, Finding, Where};
+use super::fitted::refit;
 use super::judge::{Judged, error};
 use super::linear::Sampled;
 use super::name::text_of;
 use super::run::Run;
 use super::scan::log_tail;
 use super::trajectory::Trajectory;
+use crate::lti::{LtiError, Plant};
 use crate::numeric::least_squares::dot;
-use crate::physics::{Effect, Sample, effect};
+use crate::physics::{Effect, Sample, effect, library};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -60,7 +62,7 @@ struct Answer {
 fn answer(bench: &Bench, sampled: &Sampled, n: usize, width_s: f64) -> Option<Answer> {
     let t = bench.scene.sample_time_s;
     let samples = (0..n).map(|k| Sample { t: k as f64 * t, ..Sample::default() }).collect();
-    let motion = Trajectory { samples, unexplained: Vec::new(), inputs: Vec::new() };
+    let motion = Trajectory { samples, unexplained: Vec::new(), repeats: Vec::new() };
     let raw = raw_columns(effect("shock")?, &[0.0, width_s], &bench.scene, &motion);
     let mut y = vec![0.0; n];
     sampled.direct.add_response(&raw[0], &mut y);
@@ -166,17 +168,53 @@ fn of_two(bench: &Bench, answers: &[Answer], bump: Bump) -> Bump {
     Bump { run, peak: [sign * bump.peak[0], bump.peak[1]], ..bump }
 }
 
+/// Share of the fit records into which pushes may fall; where there are more, they are no bumps but how the machine is.
+const BUMPED: f64 = 0.25;
+
+/// Finds records into which a push from outside falls, and makes the bench again without them.
+///
+/// Looked for under the refitted plant: in a loop repeats differ in their commands too, and a wrong plant's answer to that difference
+/// looks like a push.
+pub(super) fn set_aside(
+    bench: &mut Bench,
+    given: &Plant,
+    spindle_hz: Option<f64>,
+    iterations: usize,
+) -> Result<Vec<Bump>, LtiError> {
+    if bench.repeats.is_empty() || bump(bench).is_none() {
+        return Ok(Vec::new());
+    }
+    let sample_time_s = bench.scene.sample_time_s;
+    let most = (BUMPED * bench.fit_runs.len() as f64).floor().max(1.0) as usize;
+    let plant = refit(&mut bench.clone(), iterations).refitted.plant;
+    let mut cleaner = Bench::new(&plant, bench.runs.clone(), sample_time_s, spindle_hz)?;
+    let mut found = Vec::new();
+    while let Some(b) = bump(&cleaner) {
+        if found.len() == most || bent(&cleaner, &b) {
+            return Ok(Vec::new());
+        }
+        let mut runs = cleaner.runs.clone();
+        runs[b.run].bumped = true;
+        found.push(b);
+        cleaner = Bench::new(&plant, runs, sample_time_s, spindle_hz)?;
+    }
+    if !found.is_empty() {
+        *bench = Bench::new(given, cleaner.runs, sample_time_s, spindle_hz)?;
+    }
+    Ok(found)
+}
+
 /// Share of the gain of a push from which an amplifier that bends the commands explains it as well.
 const AS_WELL: f64 = 0.7;
 
 /// Whether the repeats may differ by what an amplifier does to their commands: at a limit a peak more or less looks like a push.
-pub(super) fn bent(bench: &Bench, bump: &Bump, library: &[&'static dyn Effect]) -> bool {
+fn bent(bench: &Bench, bump: &Bump) -> bool {
     let Ok(sampled) = Sampled::of(&bench.form.given, bench.scene.sample_time_s) else { return false };
     let explains = |e: &dyn Effect| {
         let gain = |inner: &Vec<f64>| Difference::of(bench, &sampled, e, inner).gain();
         e.grid(&bench.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
     };
-    library.iter().filter(|e| e.bends()).any(|e| explains(*e) > AS_WELL * bump.gain)
+    library().iter().filter(|e| e.bends()).any(|e| explains(*e) > AS_WELL * bump.gain)
 }
 
 /// Share of what a push takes under the linear refit that it must still take under the final model.

@@ -78,18 +78,17 @@ pub(super) fn entering(
 
 /// The columns of an effect along one trajectory, at their place of entry.
 ///
-/// Commands of repeats differ by what the controller made of the noise, and what an amplifier does to each is not what it would do to their
-/// mean: the mean's peaks stay below a limit that every one of them meets.
+/// Repeats differ by what the controller made of the noise, and what a bent law does to each is not what it would do to their mean: the mean's
+/// peaks stay below a limit that every one of them meets, the mean turns round once where each turns at a time of its own.
 pub fn raw_columns(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectory: &Trajectory) -> Vec<Vec<f64>> {
     let samples = &trajectory.samples;
-    if effect.facts().entry != Entry::Command || trajectory.inputs.is_empty() {
+    if !effect.bends() || trajectory.repeats.is_empty() {
         return columns_along(effect, inner, scene, samples);
     }
-    let share = 1.0 / trajectory.inputs.len() as f64;
+    let share = 1.0 / trajectory.repeats.len() as f64;
     let mut mean = vec![vec![0.0; samples.len()]; effect.facts().columns];
-    for input in &trajectory.inputs {
-        let own: Vec<Sample> = samples.iter().zip(input).map(|(s, &u)| Sample { u, ..*s }).collect();
-        for (mean, column) in mean.iter_mut().zip(columns_along(effect, inner, scene, &own)) {
+    for own in &trajectory.repeats {
+        for (mean, column) in mean.iter_mut().zip(columns_along(effect, inner, scene, own)) {
             mean.iter_mut().zip(&column).for_each(|(m, c)| *m += share * c);
         }
     }

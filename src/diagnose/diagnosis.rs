@@ -1,7 +1,7 @@
 //! The diagnosis of a case, step by step: logs, noise, linear refit, search, judgement on hold-out records, verdict.
 
 use super::bench::Bench;
-use super::bump::{Bump, bent, beyond, bump};
+use super::bump::{beyond, set_aside};
 use super::corrected::{Corrected, corrected};
 use super::finding::*;
 use super::fit_report::fit_report;
@@ -82,6 +82,8 @@ const CLEAN: f64 = 3.0;
 const RESTLESS: [f64; 2] = [6.0, 1.06];
 /// Share of an error clearly beyond noise that a model which counts as clean must have explained.
 const MOSTLY: f64 = 0.6;
+/// Part of that, where no other law sees anything in what is left and records held out lose as large a part of their own excess.
+const HALF: f64 = 0.5;
 /// Share of what the findings took that another law may still see beside them: no law is a machine's own to the last part.
 const BESIDE: f64 = 0.05;
 
@@ -173,42 +175,6 @@ pub fn diagnose(
     Ok(Diagnosed { diagnosis, bench, selection, corrected: fixed, refitted: refitted.plant, errors })
 }
 
-/// Share of the fit records into which pushes may fall; where there are more, they are no bumps but how the machine is.
-const BUMPED: f64 = 0.25;
-
-/// Finds records into which a push from outside falls, and makes the bench again without them.
-///
-/// Looked for under the refitted plant: in a loop repeats differ in their commands too, and a wrong plant's answer to that difference
-/// looks like a push.
-fn set_aside(
-    bench: &mut Bench,
-    given: &Plant,
-    spindle_hz: Option<f64>,
-    iterations: usize,
-) -> Result<Vec<Bump>, LtiError> {
-    if bench.repeats.is_empty() || bump(bench).is_none() {
-        return Ok(Vec::new());
-    }
-    let sample_time_s = bench.scene.sample_time_s;
-    let most = (BUMPED * bench.fit_runs.len() as f64).floor().max(1.0) as usize;
-    let plant = refit(&mut bench.clone(), iterations).refitted.plant;
-    let mut cleaner = Bench::new(&plant, bench.runs.clone(), sample_time_s, spindle_hz)?;
-    let mut found = Vec::new();
-    while let Some(b) = bump(&cleaner) {
-        if found.len() == most || bent(&cleaner, &b, library()) {
-            return Ok(Vec::new());
-        }
-        let mut runs = cleaner.runs.clone();
-        runs[b.run].bumped = true;
-        found.push(b);
-        cleaner = Bench::new(&plant, runs, sample_time_s, spindle_hz)?;
-    }
-    if !found.is_empty() {
-        *bench = Bench::new(given, cleaner.runs, sample_time_s, spindle_hz)?;
-    }
-    Ok(found)
-}
-
 fn search(selection: &Selection) -> Vec<Tried> {
     let mut all = Vec::new();
     for (i, step) in selection.steps.iter().enumerate() {
@@ -233,8 +199,11 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
     let explained = if base.excess() > 0.0 { 1.0 - model.excess().max(0.0) / base.excess() } else { 1.0 };
     // Down to the noise, and not only because there was little above it; or as near as its level may err, no law seeing anything more.
     let spent = selection.leftover.is_none() && model.cost / model.freedom < RESTLESS[1];
+    // The level of the noise errs in the records that it is taken from; those that were held out tell on their own how much is explained.
+    let held = d.holdout_whitened.is_some_and(|[refit, after]| after - 1.0 < HALF * (refit - 1.0));
     let clean = (model.excess_sigma() < CLEAN && base.excess_sigma() < CLEAN)
-        || (explained >= MOSTLY && (model.excess_sigma() < CLEAN || spent));
+        || (explained >= MOSTLY && (model.excess_sigma() < CLEAN || spent))
+        || (explained >= HALF * MOSTLY && spent && held);
     // Where no law was found, much more is asked of the excess: noise may differ a little from what its repeats say.
     let restless = model.excess_sigma() > RESTLESS[0] && model.cost / model.freedom > RESTLESS[1];
     // Along the recorded motion, and simulated: in closed loop limits and noise play into each other, in open loop a free body

@@ -32,14 +32,13 @@ impl Difference {
         let t = bench.scene.sample_time_s;
         let free = |n: usize| free_motions(&bench.form.given.body, t, n).to_vec();
         for (s, motion) in bench.stack.segments.iter().zip(&bench.trajectories).filter(|(s, _)| s.runs.len() > 1) {
-            let answer = |&run: &usize| {
-                let own = motion.samples.iter().zip(&bench.runs[run].input).map(|(s, &u)| Sample { u, ..*s });
-                let column = columns_along(effect, inner, &bench.scene, &own.collect::<Vec<_>>()).swap_remove(0);
+            let answer = |(&run, own): (&usize, &Vec<Sample>)| {
+                let column = columns_along(effect, inner, &bench.scene, own).swap_remove(0);
                 let mut y = vec![0.0; s.len];
                 sampled.delayed.add_response(&column, &mut y);
                 (run, y)
             };
-            let answers: Vec<(usize, Vec<f64>)> = s.runs.iter().map(answer).collect();
+            let answers: Vec<(usize, Vec<f64>)> = s.runs.iter().zip(&motion.repeats).map(answer).collect();
             if answers.iter().all(|(_, y)| y.iter().all(|v| *v == 0.0)) {
                 continue;
             }

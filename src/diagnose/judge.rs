@@ -78,7 +78,7 @@ impl Judged<'_> {
                 ..Sample::default()
             })
             .collect();
-        let motion = Trajectory { samples, unexplained: Vec::new(), inputs: Vec::new() };
+        let motion = Trajectory { samples, unexplained: Vec::new(), repeats: Vec::new() };
         for (effect, inner) in &self.own {
             for column in raw_columns(*effect, inner, self.scene, &motion) {
                 let mut y = vec![0.0; column.len()];

@@ -18,8 +18,8 @@ pub struct Trajectory {
     pub samples: Vec<Sample>,
     /// Torque beyond the model (command_unit).
     pub unexplained: Vec<f64>,
-    /// What each of the repeats behind it put into the amplifier; empty where it is of one record (command_unit).
-    pub inputs: Vec<Vec<f64>>,
+    /// Motion of each of the repeats behind it; empty where it is of one record.
+    pub repeats: Vec<Vec<Sample>>,
 }
 
 /// The mean command that acts on the arm from each sample to the next; `before` stood before the first.
@@ -34,6 +34,23 @@ fn pushed(sampled: &DiscretePlant, run: &Run, known: &[f64]) -> Vec<f64> {
     let mut i = acting(sampled, &run.input, run.before);
     i.iter_mut().zip(known).for_each(|(i, w)| *i += w);
     i
+}
+
+/// The motion of one repeat: that of the mean, moved by the plant's answer to what the repeat's command has beside the mean's. It holds none of
+/// the sensor's noise, but what the controller made of it.
+pub fn apart(mean: &[Sample], input: &[f64], plant: &DiscretePlant) -> Vec<Sample> {
+    let (n, t) = (mean.len(), plant.sample_time_s());
+    let beside: Vec<f64> = mean.iter().zip(input).map(|(s, u)| u - s.u).collect();
+    let mut x = vec![0.0; n];
+    plant.add_response(&beside, &mut x);
+    let acts = acting(plant, &beside, 0.0);
+    let sample = |k: usize| {
+        let (back, next) = (k.saturating_sub(1), (k + 1).min(n - 1));
+        let v = (x[next] - x[back]) / ((next - back).max(1) as f64 * t);
+        let s = mean[k];
+        Sample { x: s.x + x[k], v: s.v + v, u: input[k], i: s.i + acts[k], ..s }
+    };
+    (0..n).map(sample).collect()
 }
 
 /// The smoother of one machine.
@@ -140,7 +157,7 @@ impl Smoother {
                 temperature: run.temperature.as_ref().map_or(0.0, |c| c[k]),
             })
             .collect();
-        Trajectory { samples, unexplained: after.iter().map(|z| z[2]).collect(), inputs: Vec::new() }
+        Trajectory { samples, unexplained: after.iter().map(|z| z[2]).collect(), repeats: Vec::new() }
     }
 }
 

@@ -79,6 +79,10 @@ impl Effect for CoulombFriction {
         Box::new(Slider { length: inner[0], speed: inner[1], rise: inner[2], z: 0.0 })
     }
 
+    fn bends(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         let mut all = vec![
             Parameter::new("level_command", setting.strengths[0], Unit::Command),

@@ -276,7 +276,8 @@ pub trait Effect: Sync {
         true
     }
 
-    /// Whether it answers a command out of proportion: repeats then differ by more than the linear answer to their commands.
+    /// Whether it answers small differences of a command or a motion out of proportion, by a limit or a turn: repeats then differ by more than
+    /// the linear answer to their commands, and their mean is not what it does to their mean.
     fn bends(&self) -> bool {
         false
     }

@@ -147,6 +147,10 @@ impl Effect for PivotFriction {
         }
     }
 
+    fn bends(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         vec![
             Parameter::new("sliding_length", setting.inner[0], Unit::Position),
