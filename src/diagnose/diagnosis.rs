@@ -257,7 +257,8 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
             ));
         }
         // Of several laws together more is asked while yet another sees something: each further one is nearer to anything.
-        let several = selection.leftover.is_some() && model.chosen.len() > 1 && !clean && explained < SEVERAL;
+        let laws = model.chosen.len();
+        let several = selection.leftover.is_some() && (laws > 2 || laws > 1 && !clean && explained < SEVERAL);
         let told = (explained >= NAMED_SHARE || clean || decisive) && !several && beside.is_none() && !mixture;
         if told && holds && against.is_none() {
             if !clean && explained < NAMED_SHARE {
