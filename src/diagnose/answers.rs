@@ -92,8 +92,8 @@ impl<'a> Answers<'a> {
         (best.0 < MOVED_BACK * unmoved && by > own_delay + 0.5).then_some(by)
     }
 
-    /// Places where a position slipped against the answer to its command. A sound log may differ by its start, its gain and its delay, these and
-    /// a clock that runs otherwise.
+    /// Places where a position slipped against the answer to its command. A sound log may differ by its start, its gain, its delay and the
+    /// pace of its clock.
     pub(super) fn slips(&self, given: &Plant, sample_time_s: f64) -> Vec<SampleFault> {
         let of = |r: &Answer| {
             let n = r.run.len();
@@ -101,10 +101,10 @@ impl<'a> Answers<'a> {
                 (0..n).map(|k| 0.5 * (x[(k + 1).min(n - 1)] - x[k.saturating_sub(1)])).collect()
             };
             let late = slope(&r.answer);
-            let later_and_later = late.iter().enumerate().map(|(k, v)| k as f64 * v).collect();
+            let clock: Vec<f64> = late.iter().enumerate().map(|(k, v)| k as f64 * v).collect();
             let mut nuisances = free_motions(&given.body, sample_time_s, n).to_vec();
-            nuisances.extend([r.answer.clone(), slope(&late), late, later_and_later]);
-            slips_of_answer(r.run, &nuisances, sample_time_s)
+            nuisances.extend([r.answer.clone(), slope(&late), late]);
+            slips_of_answer(r.run, &nuisances, &clock, sample_time_s)
         };
         self.records.par_iter().flat_map_iter(of).collect()
     }

@@ -129,10 +129,11 @@ const ROUNDS: usize = 4;
 /// A slip: from which sample of the sound record on, and how many samples the log lacks there (negative: has too many).
 type Slip = (usize, i32);
 
-/// Slips of a position against the model's answer to its command; `nuisances` are what a sound log of another machine may differ by.
+/// Slips of a position against the model's answer to its command; `nuisances` are what a sound log of another machine may differ by,
+/// `clock` what a clock that runs otherwise does to it.
 ///
-/// None unless they take nearly all of the error: what friction or another plant leaves is no step of the time.
-pub fn slips_of_answer(run: &Run, nuisances: &[Vec<f64>], sample_time_s: f64) -> Vec<SampleFault> {
+/// None unless they take nearly all of the error that machine and clock together leave: what friction leaves is no step of the time.
+pub fn slips_of_answer(run: &Run, nuisances: &[Vec<f64>], clock: &[f64], sample_time_s: f64) -> Vec<SampleFault> {
     let ends = SLIP as usize;
     if run.len() < 10 * ends {
         return Vec::new();
@@ -140,9 +141,11 @@ pub fn slips_of_answer(run: &Run, nuisances: &[Vec<f64>], sample_time_s: f64) ->
     let n = run.len() - ends;
     let mut basis = Basis::default();
     nuisances.iter().for_each(|c| basis.add_local(0, c[..n].to_vec()));
+    let mut drifting = basis.clone();
+    drifting.add_local(0, clock[..n].to_vec());
+    let first = Log { y: &run.position, n, basis: drifting }.squares(&[]);
     let log = Log { y: &run.position, n, basis };
-    let first = log.squares(&[]);
-    let (mut slips, mut left): (Vec<Slip>, f64) = (Vec::new(), first);
+    let (mut slips, mut left): (Vec<Slip>, f64) = (Vec::new(), log.squares(&[]));
     while slips.len() < MOST {
         let mut more = slips.clone();
         more.push(log.slip(&slips));
