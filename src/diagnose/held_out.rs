@@ -82,8 +82,7 @@ const BEYOND: f64 = 0.5;
 ///
 /// None where a law goes by a clock of its own, which each record starts anew.
 pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) -> Option<&'a HeldOut> {
-    let clocked = |name: &str| ["gain_drift", "parametric_gain"].contains(&name);
-    if model.chosen.iter().any(|c| c.effect.facts().per_record || clocked(c.effect.facts().name)) {
+    if model.chosen.iter().any(|c| c.effect.facts().per_record || c.effect.clocked()) {
         return None;
     }
     // Where some of the fit's records are noisier than the filter says, so may this one be.

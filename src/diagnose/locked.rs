@@ -20,7 +20,7 @@ const REPEATS: usize = 4;
 pub(super) fn follows_motion(bench: &Bench, model: &Model, at: usize) -> bool {
     let chosen = &model.chosen[at];
     let facts = chosen.effect.facts();
-    if !facts.per_record || facts.name != "offset_drift" {
+    if !facts.per_record || !chosen.effect.strays() {
         return false;
     }
     let carrier = bench.form.carrier(&model.refitted.p).plant;

@@ -12,7 +12,7 @@ use super::rival::Rival;
 use super::run::Run;
 use super::scan::log_tail;
 use super::select::Selection;
-use crate::physics::{Effect, Entry, Facts, Parameter, Setting, Share, facts, library};
+use crate::physics::{Effect, Entry, Facts, Parameter, Setting, Share, effect, facts, library};
 use std::collections::BTreeMap;
 
 /// Difference of the fit (twice the log-likelihood) below which two names are one family.
@@ -43,14 +43,9 @@ const GRID: f64 = 0.01;
 /// Growth of the noise's power from rest to the highest speed that is worth a word.
 const FASTER: f64 = 0.2;
 
-/// Whether a name is one of the drags: the two ends of one law, told apart by the sliding length alone.
-pub(super) fn is_drag(name: &str) -> bool {
-    ["pivot_friction", "coulomb_friction"].contains(&name)
-}
-
 /// Whether two names are both drags.
 pub(super) fn same_drag(a: &str, b: &str) -> bool {
-    is_drag(a) && is_drag(b)
+    [a, b].into_iter().all(|name| effect(name).is_some_and(|e| e.drag()))
 }
 
 pub(super) fn text_of(name: &str) -> (&'static str, crate::physics::Port) {

@@ -5,7 +5,7 @@ use super::bootstrap::{Bootstrap, bootstrap};
 use super::fitted::{fitted, fitted_from_both, refit, settled, taken_by_last};
 use super::leftover::{Leftover, leftover};
 use super::locked::follows_motion;
-use super::name::{is_drag, same_drag};
+use super::name::same_drag;
 use super::refit::{Chosen, Refitted};
 use super::rival::{Rival, by_simulation};
 use super::scan::{Candidate, Ground, log_tail};
@@ -197,7 +197,7 @@ pub fn select(
             let leads = worth.first().is_none_or(|&j| step.candidates[j].effect.facts().name == name);
             let new = model.chosen.iter().all(|m| {
                 let other = m.effect.facts().name;
-                !same_drag(name, other) && (other != name || again(name, &m.setting, &c.setting))
+                !same_drag(name, other) && (other != name || again(c, &m.setting))
             });
             // A push falls into one record; what every repeat shows at the same time is none.
             let new = new && (name != "shock" || bench.stack.segments.iter().any(|s| s.runs.len() == 1));
@@ -253,7 +253,7 @@ pub fn select(
             let log_p = log_tail(gain, free) + (c.points.max(1) as f64).ln() + (library.len() as f64).ln();
             let log_p = log_p.max(hums(bench, c, gain, library.len()));
             let explained = (baseline.evidence - model.evidence).max(0.0);
-            let dragged = model.chosen.iter().any(|c| is_drag(c.effect.facts().name));
+            let dragged = model.chosen.iter().any(|c| c.effect.drag());
             let share = if dragged && gain < BESIDE_DRAG * explained { REST } else { settings.share };
             let asked = share * (model.excess() - 2.0 * model.sigma).max(0.0);
             let minor = MINOR.get(model.chosen.len()).copied().unwrap_or(0.0) * explained;
@@ -337,10 +337,9 @@ pub(super) fn hums(bench: &Bench, c: &Candidate, gain: f64, effects: usize) -> f
     fair.log_p_value(effects)
 }
 
-/// Whether a second one of the same effect can be another thing: another line, another mode, another grating.
-fn again(name: &str, a: &Setting, b: &Setting) -> bool {
-    let many = ["repeatable_runout", "line_disturbance", "unmodelled_resonance", "shock"];
-    many.contains(&name) && (a.inner[0] - b.inner[0]).abs() > 0.02 * a.inner[0].abs()
+/// Whether a second one of the same effect can be another thing: another line, another mode.
+fn again(c: &Candidate, first: &Setting) -> bool {
+    c.effect.several() && (first.inner[0] - c.setting.inner[0]).abs() > 0.02 * first.inner[0].abs()
 }
 
 /// Logarithm of the closed-form bound of the strongest candidate beside a model.

@@ -2,7 +2,6 @@
 
 use super::bench::Bench;
 use super::fitted::{fitted, fitted_from_both};
-use super::name::is_drag;
 use super::refit::Chosen;
 use super::rival::{BETTER, Rival};
 use super::select::{MINOR, Model, OWN, Step, begun, gain_of};
@@ -42,7 +41,7 @@ pub(super) fn spare(
     before: f64,
     iterations: usize,
 ) {
-    let drag = |c: &Chosen| is_drag(c.effect.facts().name);
+    let drag = |c: &Chosen| c.effect.drag();
     let most = model.chosen.iter().map(|c| gain_of(steps, c)).fold(0.0, f64::max);
     let small = |c: &Chosen| gain_of(steps, c) < SMALL * most;
     let price = (bench.stack.total as f64).ln();

@@ -79,6 +79,10 @@ impl Effect for CoulombFriction {
         Box::new(Slider { length: inner[0], speed: inner[1], rise: inner[2], z: 0.0 })
     }
 
+    fn drag(&self) -> bool {
+        true
+    }
+
     fn bends(&self) -> bool {
         true
     }

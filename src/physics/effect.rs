@@ -276,6 +276,26 @@ pub trait Effect: Sync {
         true
     }
 
+    /// Whether it is a drag. Any two of them are ends of one law, told apart by a length alone.
+    fn drag(&self) -> bool {
+        false
+    }
+
+    /// Whether it goes by a clock of its own, so that records which were not fitted may find it elsewhere.
+    fn clocked(&self) -> bool {
+        false
+    }
+
+    /// Whether strengths of each record's own must not follow the motion: what comes anew with every repeat of one move is made by the move.
+    fn strays(&self) -> bool {
+        false
+    }
+
+    /// Whether a machine may have several that differ in their first inner number: lines, modes, pushes.
+    fn several(&self) -> bool {
+        false
+    }
+
     /// Whether it answers small differences of a command or a motion out of proportion, by a limit or a turn: repeats then differ by more than
     /// the linear answer to their commands, and their mean is not what it does to their mean.
     fn bends(&self) -> bool {

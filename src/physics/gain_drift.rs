@@ -70,6 +70,10 @@ impl Effect for GainDrift {
         Box::new(Warming { tau: inner[0], session: inner[1] != 0.0, mean: -(-ratio).exp_m1() / ratio })
     }
 
+    fn clocked(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         if setting.inner[0] > 0.0 {
             vec![

@@ -68,6 +68,10 @@ impl Effect for LineDisturbance {
         Box::new(Line { w: TAU * inner[0], mean: if y == 0.0 { 1.0 } else { y.sin() / y } })
     }
 
+    fn several(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         let [a, b] = [setting.strengths[0], setting.strengths[1]];
         vec![

@@ -45,6 +45,10 @@ impl Effect for OffsetDrift {
         Box::new(Drift)
     }
 
+    fn strays(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         vec![
             Parameter::new("slope", setting.strengths[0], Unit::CommandPerSecond),

@@ -72,6 +72,10 @@ impl Effect for ParametricGain {
         Box::new(Swing { w: TAU * hz, order, mean: if y == 0.0 { 1.0 } else { y.sin() / y } })
     }
 
+    fn clocked(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         let [a, b] = [setting.strengths[0], setting.strengths[1]];
         vec![

@@ -147,6 +147,10 @@ impl Effect for PivotFriction {
         }
     }
 
+    fn drag(&self) -> bool {
+        true
+    }
+
     fn bends(&self) -> bool {
         true
     }

@@ -61,6 +61,10 @@ impl Effect for RepeatableRunout {
         Box::new(Runout { order, hz: inner[0] })
     }
 
+    fn several(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         let mut all = vec![Parameter::new("base_hz", setting.inner[0], Unit::Hertz)];
         for (h, pair) in setting.strengths.chunks_exact(2).take(3).enumerate() {

@@ -65,6 +65,10 @@ impl Effect for Shock {
         Box::new(Pulse { start: inner[0], width: inner[1].abs() })
     }
 
+    fn several(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         vec![
             Parameter::new("peak_command", setting.strengths[0], Unit::Command),

@@ -84,6 +84,10 @@ impl Effect for UnmodelledResonance {
         Box::new(Ringing::at_rest(inner[0], inner[1], scene.sample_time_s, 2))
     }
 
+    fn several(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         let [a, b] = [setting.strengths[0], setting.strengths[1]];
         vec![
