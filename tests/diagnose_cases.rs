@@ -1,140 +1,13 @@
-//! Whole diagnoses of machines simulated here by another integrator (classical Runge-Kutta, 32 steps a sample) that shares no
-//! code with the program: verdicts, names and numbers.
+//! Whole diagnoses of machines simulated by another integrator: verdicts, names and numbers.
 #![allow(clippy::unwrap_used)]
 
-use servotune::diagnose::{DiagnoseSettings, Diagnosis, Verdict, diagnose};
-use servotune::lti::{Body, Plant};
+mod diagnose_common;
+
+use diagnose_common::*;
+use servotune::diagnose::{DiagnoseSettings, Verdict, diagnose};
 use servotune::numeric::random::Random;
-use servotune::recording::{Case, Record, RecordEntry, Role};
+use servotune::recording::{Case, Role};
 use std::path::PathBuf;
-
-const T: f64 = 1e-4;
-const N: usize = 2000;
-const STEPS: usize = 32;
-const NOISE: f64 = 2e-3;
-/// Delays are whole steps of the integrator, so that its commands switch where the truth says.
-const MORE: f64 = 20.0 * T / STEPS as f64;
-
-/// Gain, stiffness, viscous rate, delay (s), dry friction (command), clip of the command.
-#[derive(Clone, Copy)]
-struct Truth {
-    b: f64,
-    k: f64,
-    c: f64,
-    delay: f64,
-    coulomb: f64,
-    clip: f64,
-}
-
-const GIVEN: Truth =
-    Truth { b: 8e6, k: 1.4e5, c: 160.0, delay: 42.0 * T / STEPS as f64, coulomb: 0.0, clip: f64::INFINITY };
-
-fn plant() -> Plant {
-    let w = GIVEN.k.sqrt();
-    Plant {
-        position_unit: "um".into(),
-        command_unit: "A".into(),
-        body: Body::SecondOrder {
-            dc_gain: GIVEN.b / GIVEN.k,
-            natural_frequency_rad_s: w,
-            damping_ratio: GIVEN.c / (2.0 * w),
-        },
-        delay_s: GIVEN.delay,
-        resonance_gain: 1.0,
-        modes: vec![],
-        physics: vec![],
-    }
-}
-
-/// A multisine held over each sample, of this size, with phases of this seed.
-fn excitation(size: f64, seed: u64) -> Vec<f64> {
-    let mut r = Random::new(seed);
-    let lines: Vec<(f64, f64)> = (1..60).map(|h| (f64::from(h) * 5.0, r.between(0.0, std::f64::consts::TAU))).collect();
-    (0..N)
-        .map(|k| {
-            size * lines.iter().map(|(hz, p)| (std::f64::consts::TAU * hz * k as f64 * T + p).cos()).sum::<f64>() / 7.7
-        })
-        .collect()
-}
-
-/// The answer to a command that is held over each sample.
-fn respond(truth: &Truth, u: &[f64], seed: u64) -> Vec<f64> {
-    let held = |t: f64| {
-        let at = (t / T).floor();
-        if at < 0.0 { 0.0 } else { u[at as usize].clamp(-truth.clip, truth.clip) }
-    };
-    respond_to(truth, &held, seed)
-}
-
-/// The answer to a command over time.
-fn respond_to(truth: &Truth, command: &dyn Fn(f64) -> f64, seed: u64) -> Vec<f64> {
-    let mut noise = Random::new(seed);
-    let (mut x, mut v) = (0.0, 0.0);
-    let h = T / STEPS as f64;
-    let push = |t: f64| command(t - truth.delay);
-    // A steep tanh stands for dry friction; its slope is far above what the record's speeds resolve.
-    let slope = |x: f64, v: f64, w: f64| truth.b * (w - truth.coulomb * (v / 2.0).tanh()) - truth.k * x - truth.c * v;
-    (0..N)
-        .map(|k| {
-            let y = x + NOISE * noise.normal();
-            for s in 0..STEPS {
-                let w = push((k as f64 + (s as f64 + 0.5) / STEPS as f64) * T);
-                let (k1x, k1v) = (v, slope(x, v, w));
-                let (k2x, k2v) = (v + 0.5 * h * k1v, slope(x + 0.5 * h * k1x, v + 0.5 * h * k1v, w));
-                let (k3x, k3v) = (v + 0.5 * h * k2v, slope(x + 0.5 * h * k2x, v + 0.5 * h * k2v, w));
-                let (k4x, k4v) = (v + h * k3v, slope(x + h * k3x, v + h * k3v, w));
-                x += h / 6.0 * (k1x + 2.0 * k2x + 2.0 * k3x + k4x);
-                v += h / 6.0 * (k1v + 2.0 * k2v + 2.0 * k3v + k4v);
-            }
-            y
-        })
-        .collect()
-}
-
-fn record(name: &str, role: Role, group: &str, command: &[f64], position: Vec<f64>) -> (RecordEntry, Record) {
-    let entry = RecordEntry { file: PathBuf::from(name), role, repeat_group: Some(group.into()) };
-    let record = Record {
-        file: PathBuf::from(name),
-        sample_time_s: T,
-        gaps: vec![],
-        reference: None,
-        excitation: vec![0.0; N],
-        command: command.to_vec(),
-        position,
-        pes: None,
-        spindle_rad: None,
-        temperature_c: None,
-    };
-    (entry, record)
-}
-
-fn diagnosed(truth: &Truth) -> Diagnosis {
-    diagnosed_from(records(truth))
-}
-
-fn diagnosed_from(records: Vec<(RecordEntry, Record)>) -> Diagnosis {
-    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
-    diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
-}
-
-fn records(truth: &Truth) -> Vec<(RecordEntry, Record)> {
-    let mut records = Vec::new();
-    for (g, size) in [("a", 0.02), ("b", 0.06)] {
-        let u = excitation(size, 5 + records.len() as u64);
-        for i in 0..3 {
-            records.push(record(
-                &format!("{g}{i}.csv"),
-                Role::Fit,
-                g,
-                &u,
-                respond(truth, &u, 100 + records.len() as u64),
-            ));
-        }
-    }
-    let u = excitation(0.04, 77);
-    records.push(record("held.csv", Role::Holdout, "h", &u, respond(truth, &u, 999)));
-    records
-}
 
 #[test]
 fn a_sound_model_draws_no_name() {
@@ -159,61 +32,6 @@ fn more_delay_is_named_and_measured() {
     assert_eq!(d.findings[0].effect, "extra_delay", "{:?}", d.verdict);
     let e = &d.findings[0].parameters["delay_s"];
     assert!((e.value / MORE - 1.0).abs() < 0.05 && e.low < MORE && MORE < e.high, "{e:?}");
-}
-
-#[test]
-fn a_position_before_its_command_is_a_log_that_slipped() {
-    // Four samples early under a delay of 1.3: no machine answers before it is asked.
-    let mut slipped = records(&GIVEN);
-    for (_, r) in &mut slipped {
-        r.position.rotate_left(4);
-        let last = r.position[N - 5];
-        r.position[N - 4..].fill(last);
-    }
-    let d = diagnosed_from(slipped);
-    assert_eq!((d.verdict, d.findings[0].effect.as_str()), (Verdict::DataFault, "misalignment"));
-    let samples = &d.findings[0].parameters["samples"];
-    assert!(samples.low < -4.0 && -4.0 < samples.high, "{samples:?}");
-}
-
-#[test]
-fn samples_lost_inside_a_record_are_found_without_a_controller_too() {
-    for (lost, twice) in [(7, false), (7, true)] {
-        let mut broken = records(&GIVEN);
-        let record = &mut broken[4].1;
-        let y = &mut record.position;
-        y.drain(900..900 + lost);
-        if twice {
-            // Three samples doubled farther on: the log is late by four from there.
-            let again = y[1500..1503].to_vec();
-            y.splice(1503..1503, again);
-        }
-        let n = y.len();
-        record.command.truncate(n);
-        record.excitation.truncate(n);
-        let d = diagnosed_from(broken);
-        assert_eq!((d.verdict, d.findings[0].effect.as_str()), (Verdict::DataFault, "lost_samples"));
-        let found: Vec<(&str, f64)> = d.sample_faults.iter().map(|f| (&f.record[..], f.samples)).collect();
-        let truth: &[(&str, f64)] = &[("b1", 7.0), ("b1", -3.0)];
-        assert_eq!(found, truth[..1 + usize::from(twice)]);
-        // Noise hides the place by a few samples.
-        assert!((d.sample_faults[0].time_s / T - 903.0).abs() < 12.0, "{:?}", d.sample_faults);
-    }
-}
-
-#[test]
-fn a_position_in_other_units_or_signs_is_a_fault_without_a_controller_too() {
-    for factor in [25.4, 1e-3, -1.0] {
-        let mut scaled = records(&GIVEN);
-        scaled.iter_mut().flat_map(|(_, r)| &mut r.position).for_each(|y| *y *= factor);
-        let d = diagnosed_from(scaled);
-        assert_eq!(d.verdict, Verdict::DataFault, "{factor}");
-        let found = d.findings[0].parameters["position_factor"].value;
-        // The sensor's noise is a thousandth of the motion.
-        assert!((found / factor - 1.0).abs() < 0.01, "{found} for {factor}");
-    }
-    // A machine with four times the gain of its model is a refit, not a fault of the log.
-    assert_eq!(diagnosed(&Truth { b: 4.0 * GIVEN.b, ..GIVEN }).verdict, Verdict::Refit);
 }
 
 #[test]
@@ -336,58 +154,6 @@ fn the_bootstrap_believes_friction_and_sees_nothing_in_noise() {
 }
 
 #[test]
-fn laps_of_one_drive_stand_for_repeats() {
-    // The excitation's lines are multiples of 5 Hz: it repeats every 2000 samples, so one of 10 Hz steps repeats inside.
-    let u: Vec<f64> = excitation(0.04, 3).iter().take(N / 2).copied().cycle().take(N).collect();
-    let mut one = record("laps.csv", Role::Fit, "only", &u, respond(&GIVEN, &u, 8));
-    one.0.repeat_group = None;
-    let case =
-        Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records: vec![one] };
-    let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
-    assert!(d.noise.from_repeats);
-    // 1000 independent differences: 2.2 % standard error, times three.
-    assert!((d.noise.sensor_rms / NOISE - 1.0).abs() < 0.07, "{}", d.noise.sensor_rms);
-}
-
-#[test]
-fn a_command_that_was_measured_and_not_held_is_seen() {
-    let prompt = Truth { delay: 0.0, ..GIVEN };
-    let lines: Vec<(f64, f64)> = (1..60).map(|h| (f64::from(h) * 5.0, f64::from(h * h) * 0.7)).collect();
-    let command =
-        |t: f64| 0.05 * lines.iter().map(|(hz, p)| (std::f64::consts::TAU * hz * t + p).cos()).sum::<f64>() / 7.7;
-    let u: Vec<f64> = (0..N).map(|k| command(k as f64 * T)).collect();
-    let records = (0..3)
-        .map(|i| record(&format!("m{i}.csv"), Role::Fit, "m", &u, respond_to(&prompt, &command, 40 + i)))
-        .collect();
-    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
-    let given = Plant { delay_s: 0.0, ..plant() };
-    let d = diagnose(&case, &given, None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
-    assert!(d.remarks.iter().any(|r| r.contains("as measured")), "{:?}", d.remarks);
-    assert!(d.fit.fit.rms_after < 1.05 * NOISE, "{:?}", d.fit.fit);
-}
-
-#[test]
-fn a_clock_that_runs_wrong_is_a_fault_of_the_log() {
-    // Every frequency 1/41 higher; the delay, 42 of the integrator's steps, is 41 then.
-    let e: f64 = 1.0 / 41.0;
-    let truth = Truth {
-        b: GIVEN.b * (1.0 + e).powi(2),
-        k: GIVEN.k * (1.0 + e).powi(2),
-        c: GIVEN.c * (1.0 + e),
-        delay: GIVEN.delay / (1.0 + e),
-        ..GIVEN
-    };
-    let d = diagnosed(&truth);
-    assert_eq!(d.verdict, Verdict::DataFault);
-    assert_eq!(d.findings[0].effect, "time_base_drift");
-    let relative = &d.findings[0].parameters["relative"];
-    assert!(relative.low < e && e < relative.high && relative.high - relative.low < 0.2 * e, "{relative:?}");
-    // The same body with another gain is another machine, and no clock.
-    let other = diagnosed(&Truth { b: GIVEN.b * 1.1, ..truth });
-    assert_eq!(other.verdict, Verdict::Refit, "{:?}", other.findings);
-}
-
-#[test]
 fn a_gain_that_swings_in_a_phase_of_its_own_in_every_record_is_named() {
     let (depth, hz) = (0.02, 73.0);
     let mut phases = Random::new(77);
@@ -407,4 +173,29 @@ fn a_gain_that_swings_in_a_phase_of_its_own_in_every_record_is_named() {
     let p = &d.findings[0].parameters;
     assert!((p["depth"].value - depth).abs() < 0.1 * depth, "{:?}", p["depth"]);
     assert!((p["frequency_hz"].value - hz).abs() < 0.5, "{:?}", p["frequency_hz"]);
+}
+
+#[test]
+fn a_limit_that_every_repeat_meets_is_found_though_their_mean_does_not() {
+    // What a controller makes of the sensor's noise: every repeat has a command of its own, and peaks above the mean's.
+    let own = |u: &[f64], seed: u64| -> Vec<f64> {
+        let mut r = Random::new(seed);
+        u.iter().map(|v| v + 0.006 * r.normal()).collect()
+    };
+    let mean = excitation(0.06, 5);
+    let clip = 1.03 * mean.iter().fold(0.0f64, |m, u| m.max(u.abs()));
+    let truth = Truth { clip, ..GIVEN };
+    let mut records = Vec::new();
+    for (g, u, repeats) in [("a", excitation(0.02, 11), 3), ("b", mean, 4)] {
+        for i in 0..repeats {
+            let seed = 300 + records.len() as u64;
+            let u = own(&u, seed);
+            records.push(record(&format!("{g}{i}.csv"), Role::Fit, g, &u, respond(&truth, &u, 2 * seed)));
+        }
+    }
+    let d = diagnosed_from(records);
+    assert_eq!((d.verdict, d.findings[0].effect.as_str()), (Verdict::Named, "current_saturation"));
+    let limit = &d.findings[0].parameters["limit"];
+    // Each sample above it tells the limit to the noise over the gain of a pulse; some ten do.
+    assert!((limit.value / clip - 1.0).abs() < 0.01, "{limit:?} for {clip}");
 }

@@ -1,0 +1,117 @@
+//! Logs that are wrong, of machines simulated by another integrator: shifted, cut, in other units, on another clock, measured and not held.
+#![allow(clippy::unwrap_used)]
+
+mod diagnose_common;
+
+use diagnose_common::*;
+use servotune::diagnose::{DiagnoseSettings, Verdict, diagnose};
+use servotune::lti::Plant;
+use servotune::recording::{Case, Role};
+use std::path::PathBuf;
+
+#[test]
+fn a_position_before_its_command_is_a_log_that_slipped() {
+    // Four samples early under a delay of 1.3: no machine answers before it is asked.
+    let mut slipped = records(&GIVEN);
+    for (_, r) in &mut slipped {
+        r.position.rotate_left(4);
+        let last = r.position[N - 5];
+        r.position[N - 4..].fill(last);
+    }
+    let d = diagnosed_from(slipped);
+    assert_eq!((d.verdict, d.findings[0].effect.as_str()), (Verdict::DataFault, "misalignment"));
+    let samples = &d.findings[0].parameters["samples"];
+    assert!(samples.low < -4.0 && -4.0 < samples.high, "{samples:?}");
+}
+
+#[test]
+fn samples_lost_inside_a_record_are_found_without_a_controller_too() {
+    for (lost, twice) in [(7, false), (7, true)] {
+        let mut broken = records(&GIVEN);
+        let record = &mut broken[4].1;
+        let y = &mut record.position;
+        y.drain(900..900 + lost);
+        if twice {
+            // Three samples doubled farther on: the log is late by four from there.
+            let again = y[1500..1503].to_vec();
+            y.splice(1503..1503, again);
+        }
+        let n = y.len();
+        record.command.truncate(n);
+        record.excitation.truncate(n);
+        let d = diagnosed_from(broken);
+        assert_eq!((d.verdict, d.findings[0].effect.as_str()), (Verdict::DataFault, "lost_samples"));
+        let found: Vec<(&str, f64)> = d.sample_faults.iter().map(|f| (&f.record[..], f.samples)).collect();
+        let truth: &[(&str, f64)] = &[("b1", 7.0), ("b1", -3.0)];
+        assert_eq!(found, truth[..1 + usize::from(twice)]);
+        // Noise hides the place by a few samples.
+        assert!((d.sample_faults[0].time_s / T - 903.0).abs() < 12.0, "{:?}", d.sample_faults);
+    }
+}
+
+#[test]
+fn a_position_in_other_units_or_signs_is_a_fault_without_a_controller_too() {
+    for factor in [25.4, 1e-3, -1.0] {
+        let mut scaled = records(&GIVEN);
+        scaled.iter_mut().flat_map(|(_, r)| &mut r.position).for_each(|y| *y *= factor);
+        let d = diagnosed_from(scaled);
+        assert_eq!(d.verdict, Verdict::DataFault, "{factor}");
+        let found = d.findings[0].parameters["position_factor"].value;
+        // The sensor's noise is a thousandth of the motion.
+        assert!((found / factor - 1.0).abs() < 0.01, "{found} for {factor}");
+    }
+    // A machine with four times the gain of its model is a refit, not a fault of the log.
+    assert_eq!(diagnosed(&Truth { b: 4.0 * GIVEN.b, ..GIVEN }).verdict, Verdict::Refit);
+}
+
+#[test]
+fn laps_of_one_drive_stand_for_repeats() {
+    // The excitation's lines are multiples of 5 Hz: it repeats every 2000 samples, so one of 10 Hz steps repeats inside.
+    let u: Vec<f64> = excitation(0.04, 3).iter().take(N / 2).copied().cycle().take(N).collect();
+    let mut one = record("laps.csv", Role::Fit, "only", &u, respond(&GIVEN, &u, 8));
+    one.0.repeat_group = None;
+    let case =
+        Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records: vec![one] };
+    let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
+    assert!(d.noise.from_repeats);
+    // 1000 independent differences: 2.2 % standard error, times three.
+    assert!((d.noise.sensor_rms / NOISE - 1.0).abs() < 0.07, "{}", d.noise.sensor_rms);
+}
+
+#[test]
+fn a_command_that_was_measured_and_not_held_is_seen() {
+    let prompt = Truth { delay: 0.0, ..GIVEN };
+    let lines: Vec<(f64, f64)> = (1..60).map(|h| (f64::from(h) * 5.0, f64::from(h * h) * 0.7)).collect();
+    let command =
+        |t: f64| 0.05 * lines.iter().map(|(hz, p)| (std::f64::consts::TAU * hz * t + p).cos()).sum::<f64>() / 7.7;
+    let u: Vec<f64> = (0..N).map(|k| command(k as f64 * T)).collect();
+    let records = (0..3)
+        .map(|i| record(&format!("m{i}.csv"), Role::Fit, "m", &u, respond_to(&prompt, &command, 40 + i)))
+        .collect();
+    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
+    let given = Plant { delay_s: 0.0, ..plant() };
+    let d = diagnose(&case, &given, None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
+    assert!(d.remarks.iter().any(|r| r.contains("as measured")), "{:?}", d.remarks);
+    assert!(d.fit.fit.rms_after < 1.05 * NOISE, "{:?}", d.fit.fit);
+}
+
+#[test]
+fn a_clock_that_runs_wrong_is_a_fault_of_the_log() {
+    // Every frequency 1/41 higher; the delay, 42 of the integrator's steps, is 41 then.
+    let e: f64 = 1.0 / 41.0;
+    let truth = Truth {
+        b: GIVEN.b * (1.0 + e).powi(2),
+        k: GIVEN.k * (1.0 + e).powi(2),
+        c: GIVEN.c * (1.0 + e),
+        delay: GIVEN.delay / (1.0 + e),
+        ..GIVEN
+    };
+    let d = diagnosed(&truth);
+    assert_eq!(d.verdict, Verdict::DataFault);
+    assert_eq!(d.findings[0].effect, "time_base_drift");
+    let relative = &d.findings[0].parameters["relative"];
+    assert!(relative.low < e && e < relative.high && relative.high - relative.low < 0.2 * e, "{relative:?}");
+    // The same body with another gain is another machine, and no clock.
+    let other = diagnosed(&Truth { b: GIVEN.b * 1.1, ..truth });
+    assert_eq!(other.verdict, Verdict::Refit, "{:?}", other.findings);
+}
