@@ -16,7 +16,7 @@ const LARGEST: f64 = 0.1;
 const FINEST: f64 = 1e-6;
 
 /// Fall of the sum of squares from which one number in the place of all others is no chance.
-const SURE: f64 = 250.0;
+pub(super) const SURE: f64 = 250.0;
 
 /// A scale of all times.
 pub(super) struct Clock {

@@ -77,6 +77,10 @@ const INSIDE: f64 = 0.5;
 const FAR_BEYOND: f64 = 10.0;
 const BEYOND: f64 = 0.5;
 
+/// The same for all records within the range together, each of which may say too little alone.
+const TOGETHER: f64 = 3.75;
+const UNMOVED: f64 = 0.6;
+
 /// The record that contradicts the final model most: it still misses it by far more than noise, and the laws that were found elsewhere
 /// take too little of what the linear refit leaves there.
 ///
@@ -94,5 +98,14 @@ pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) 
         let noise = loudest * (2.0 / h.samples as f64).sqrt();
         left(h) > f64::max(far * noise, CLEAR) && left(h) > share * excess(h)
     };
-    all.iter().filter(far).max_by(|a, b| left(a).total_cmp(&left(b)))
+    let most = |a: &&HeldOut, b: &&HeldOut| left(a).total_cmp(&left(b));
+    if let Some(worst) = all.iter().filter(far).max_by(most) {
+        return Some(worst);
+    }
+    let inside: Vec<&HeldOut> = all.iter().filter(|h| h.inside).collect();
+    let samples: f64 = inside.iter().map(|h| h.samples as f64).sum();
+    let mean = |of: &dyn Fn(&HeldOut) -> f64| inside.iter().map(|h| of(h) * h.samples as f64).sum::<f64>() / samples;
+    let (refit, after) = (mean(&excess), mean(&left));
+    let unmoved = after > TOGETHER * loudest * (2.0 / samples).sqrt() && after > UNMOVED * refit;
+    inside.into_iter().filter(|_| unmoved).max_by(most)
 }

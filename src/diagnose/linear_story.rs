@@ -1,7 +1,7 @@
 //! What happened to the linear parameters beside the findings: nothing, the delay alone, the log's clock, or a refit.
 
 use super::bench::Bench;
-use super::clock::Clock;
+use super::clock::{Clock, SURE};
 use super::finding::{Diagnosis, Estimate, Finding, Verdict};
 use super::linear::{Knob, LinearForm, body_numbers};
 use super::name::{FAMILY, everywhere, text_of};
@@ -62,19 +62,80 @@ impl Way<'_> {
 
 /// Lags that fit as well as a delay of `delay_s` does, beside linear parameters as given: a lag far above the band is a delay.
 fn lags_like(bench: &Bench, way: Way, delay_s: f64, cost: f64) -> Vec<String> {
-    let as_good = |name: &&str| {
-        let Some(lag) = effect(name) else { return false };
-        let setting = Setting { inner: vec![delay_s], strengths: vec![1.0] };
-        let more = Chosen {
-            effect: lag,
-            setting,
-            continuous: vec![true],
-            range: vec![[0.1 * delay_s, 10.0 * delay_s]],
-            step: 0,
+    let as_good =
+        |name: &&str| lag(name, delay_s).is_some_and(|l| way.restricted(bench, |_| false, Some(l)).0 < cost + FAMILY);
+    LAGS.into_iter().filter(as_good).map(str::to_owned).collect()
+}
+
+/// The lags of the library, and the iterations in which one of them alone is fitted.
+const LAGS: [&str; 2] = ["amplifier_lag", "sensor_lag"];
+const ITERATIONS: usize = 16;
+
+/// A lag whose time constant is looked for near a delay.
+fn lag(name: &str, near_s: f64) -> Option<Chosen> {
+    Some(Chosen {
+        effect: effect(name)?,
+        setting: Setting { inner: vec![near_s], strengths: vec![1.0] },
+        continuous: vec![true],
+        range: vec![[0.1 * near_s, 10.0 * near_s]],
+        step: 0,
+    })
+}
+
+/// A lag in the place of every change of the linear parameters.
+struct Lag {
+    chosen: Chosen,
+    /// Standard error of the logarithm of its time constant.
+    spread: f64,
+    cost: f64,
+}
+
+impl Lag {
+    /// The lags of the library, each fitted beside linear parameters as given, the best first; `near_s` is a delay that does something
+    /// like it.
+    fn alone(bench: &Bench, near_s: f64) -> Vec<Lag> {
+        let form = LinearForm { knobs: Vec::new(), ..bench.form.clone() };
+        let fitted = |name: &str| {
+            let chosen = lag(name, near_s)?;
+            let mut fit = Fit { form: &form, ..bench.fit(vec![chosen]) };
+            let r = fit.refit(&[], ITERATIONS);
+            Some(Lag { spread: r.spread(0), cost: r.cost, chosen: fit.chosen.swap_remove(0) })
         };
-        way.restricted(bench, |_| false, Some(more)).0 < cost + FAMILY
-    };
-    ["amplifier_lag", "sensor_lag"].into_iter().filter(as_good).map(str::to_owned).collect()
+        let mut all: Vec<Lag> = LAGS.into_iter().filter_map(fitted).collect();
+        all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        all
+    }
+
+    fn name(&self) -> &'static str {
+        self.chosen.effect.facts().name
+    }
+
+    /// The finding; `before` is the sum of squares of the given plant.
+    fn finding(&self, bench: &Bench, family: Vec<String>, before: f64) -> Finding {
+        let (says, port) = text_of(self.name());
+        let given = &bench.form.given;
+        let parameters = |by: f64| {
+            let setting = Setting { inner: vec![self.chosen.setting.inner[0] * by.exp()], strengths: vec![1.0] };
+            self.chosen.effect.parameters(&setting, &bench.scene)
+        };
+        let off = 1.96 * self.spread;
+        let ends = parameters(-off).into_iter().zip(parameters(off));
+        let estimate =
+            |(p, (a, b)): (crate::physics::Parameter, (crate::physics::Parameter, crate::physics::Parameter))| {
+                let unit = p.unit.text(&given.position_unit, &given.command_unit);
+                let e = Estimate { value: p.value, low: a.value.min(b.value), high: a.value.max(b.value), unit };
+                (p.name.to_owned(), e)
+            };
+        Finding {
+            effect: self.name().into(),
+            family,
+            port,
+            p_value: log_tail(before - self.cost, 1).min(0.0).exp().max(1e-300),
+            says: format!("{says}; with it alone the model fits as well as with all of its numbers fitted."),
+            parameters: parameters(0.0).into_iter().zip(ends).map(estimate).collect(),
+            place: everywhere(&bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect::<Vec<_>>()),
+        }
+    }
 }
 
 /// What happened to the linear parameters: nothing, the delay alone, one mode alone, or a refit.
@@ -88,7 +149,7 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
         let n = all - free as f64;
         n + 5.0 * (2.0 * n).sqrt() + 10.0
     };
-    let mut fixed = Vec::new();
+    let (mut fixed, mut later_s) = (Vec::new(), 0.0);
     for way in Way::all(selection) {
         let cost = way.restricted(bench, |_| false, None).0;
         if cost - way.full() < allowed(0) {
@@ -99,11 +160,12 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
     }
     for (way, &fixed) in Way::all(selection).zip(&fixed) {
         let (delay, p) = way.restricted(bench, |k| k == Knob::Delay, None);
-        if delay - way.full() >= allowed(1) {
-            continue;
-        }
         let t = bench.scene.sample_time_s;
         let value = p[0] * t;
+        if delay - way.full() >= allowed(1) {
+            later_s = value;
+            continue;
+        }
         let sigma =
             bench.form.knobs.iter().position(|k| *k == Knob::Delay).map_or(0.0, |i| selection.model.refitted.spread(i))
                 * t;
@@ -133,6 +195,17 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
         }
         d.findings.push(f);
         return;
+    }
+    if d.findings.is_empty() && selection.model.chosen.is_empty() && later_s > 0.0 {
+        let lags = Lag::alone(bench, later_s);
+        let like: Vec<String> =
+            lags.iter().filter(|l| l.cost < lags[0].cost + FAMILY).map(|l| l.name().to_owned()).collect();
+        let sure = |l: &&Lag| fixed[0] - l.cost > SURE && l.cost - selection.model.cost < allowed(1);
+        if let Some(lag) = lags.first().filter(sure) {
+            d.verdict = if like.len() > 1 { Verdict::Family } else { Verdict::Named };
+            d.findings.push(lag.finding(bench, like, fixed[0]));
+            return;
+        }
     }
     if d.findings.is_empty() && selection.model.chosen.is_empty() {
         let clock = Clock::of(bench, fixed[0]);

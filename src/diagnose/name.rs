@@ -35,6 +35,8 @@ const NEXT_TO_NOTHING: f64 = 4.0;
 
 /// Difference of two linear answers below which they are one.
 const ALIKE: f64 = 1e-6;
+/// How many times the spindle's frequency a single order must have to be mistaken for the mains.
+const HIGHER: f64 = 1.5;
 /// Sliding length over the sensor's noise below which friction counts as dry.
 const DRY: f64 = 12.0;
 
@@ -95,7 +97,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
         }
     }
     if own == "repeatable_runout"
-        && spindle_hz.is_some_and(|s| single_order(&chosen.setting).is_some_and(|k| mains(k * s)))
+        && spindle_hz.is_some_and(|s| single_order(&chosen.setting).is_some_and(|hz| hz > HIGHER * s && mains(hz)))
     {
         family.push("line_disturbance".to_owned());
     }
@@ -166,12 +168,12 @@ fn effect_signal(bench: &Bench, selection: &Selection, at: usize) -> Vec<f64> {
     signal
 }
 
-/// The order of the spindle, above the first, that carries a run-out nearly alone.
+/// The frequency that carries a run-out nearly alone (Hz).
 fn single_order(setting: &Setting) -> Option<f64> {
     let sizes: Vec<f64> = setting.strengths.chunks_exact(2).map(|s| s[0].hypot(s[1])).collect();
     let (k, most) = sizes.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
     let alone = sizes.iter().enumerate().all(|(i, s)| i == k || *s < BESIDE_ORDER * most);
-    (k > 0 && alone).then_some((k + 1) as f64)
+    alone.then_some((k + 1) as f64 * setting.inner[0])
 }
 
 /// Parameters of the chosen effect `at` with 95 % intervals: its numbers moved together along each direction that errs independently,

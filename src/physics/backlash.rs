@@ -50,8 +50,9 @@ impl Effect for Backlash {
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        let low = (2.0 * scene.noise).max(1e-4 * scene.travel);
-        logarithmic(low, scene.travel, 16).into_iter().map(|g| vec![g]).collect()
+        // A gap below the sensor's noise still shows: thousands of reversals tell of it.
+        let low = (0.1 * scene.noise).max(1e-5 * scene.travel);
+        logarithmic(low, scene.travel, 24).into_iter().map(|g| vec![g]).collect()
     }
 
     fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
