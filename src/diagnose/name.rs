@@ -37,6 +37,8 @@ const NEXT_TO_NOTHING: f64 = 4.0;
 const ALIKE: f64 = 1e-6;
 /// How many times the spindle's frequency a single order must have to be mistaken for the mains.
 const HIGHER: f64 = 1.5;
+/// By how much free numbers are moved to see what they enter.
+const NUDGE: f64 = 1.01;
 /// Sliding length over the sensor's noise below which friction counts as dry.
 const DRY: f64 = 12.0;
 
@@ -200,14 +202,19 @@ fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String
         effect.parameters(&s, scene)
     };
     let moved: Vec<Vec<Parameter>> = model.refitted.directions.iter().map(moved).collect();
+    // A number that nothing free enters tells which form or which mode: it is exact.
+    let mut nudged = chosen.setting.clone();
+    nudged.strengths.iter_mut().take(strengths_of(chosen)).for_each(|s| *s *= NUDGE);
+    nudged.inner.iter_mut().zip(&chosen.continuous).filter(|(_, free)| **free).for_each(|(v, _)| *v *= NUDGE);
+    let nudged = effect.parameters(&nudged, scene);
     let (position, command) = (&bench.form.given.position_unit, &bench.form.given.command_unit);
     let out: BTreeMap<String, Estimate> = base
         .iter()
         .enumerate()
         .map(|(k, p)| {
             let off = moved.iter().map(|m| m.get(k).map_or(0.0, |q| (q.value - p.value).powi(2))).sum::<f64>();
-            // A number that no direction moves tells which form or which mode: it is exact.
-            let form = if off > 0.0 { effect.form(&chosen.setting, p.name) * p.value } else { 0.0 };
+            let exact = nudged.get(k).is_none_or(|q| q.value == p.value);
+            let form = if exact { 0.0 } else { effect.form(&chosen.setting, p.name) * p.value };
             let off = off.sqrt().hypot(form);
             let e = Estimate {
                 value: p.value,
