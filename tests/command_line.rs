@@ -192,9 +192,23 @@ fn refusals_name_file_place_found_and_expected() {
         &std::fs::read_to_string(root(NOMINAL)).unwrap().replace("frequency_hz = 7000.0", "frequency_hz = 17000.0"),
     );
     let words = write("words.bod", "10 20 -10\n20 oops -20\n30 10 -30\n");
+    let bytes = dir.join("bytes.toml").to_str().unwrap().to_owned();
+    std::fs::write(&bytes, b"[plant]\xff\n").unwrap();
+    let simulate =
+        |profile: &str| servotune(&["simulate", "--plant", HEALTHY, "--controller", NOMINAL, "--profile", profile]);
+    // Where nothing can be written is said before anything is searched.
+    let (below, here) = (format!("{typo}/gains.toml"), dir.to_str().unwrap());
+    let tune_into = |out: &str| servotune(&["tune", "--plant", HEALTHY, "--spec", "nowhere.toml", "--out", out]);
     let margins = |plant: &str, controller: &str| servotune(&["margins", "--plant", plant, "--controller", controller]);
     for (ran, said) in [
-        (margins("nothing.toml", NOMINAL), vec!["nothing.toml", "cannot read"]),
+        (margins("nothing.toml", NOMINAL), vec!["nothing.toml", "cannot read", "check the name"]),
+        (margins("specs", NOMINAL), vec!["specs", "expected a file, not a folder"]),
+        (margins(&bytes, NOMINAL), vec!["bytes.toml", "byte 7", "UTF-8"]),
+        (simulate(HEALTHY), vec!["healthy.toml", "command_unit", "[spiral]"]),
+        (servotune(&["fleet", "run", HEALTHY, "--out", "unused"]), vec!["healthy.toml", "command_unit", "FLEET.toml"]),
+        (tune_into(&below), vec!["typo.toml", "cannot write", "a part of this path is a file"]),
+        (tune_into(here), vec!["refusals", "cannot write", "not a folder"]),
+        (servotune(&["diagnose", "nowhere", "--out", &typo]), vec!["typo.toml", "cannot write", "is a file"]),
         (margins(&typo, NOMINAL), vec!["typo.toml:", "dealy_s", "delay_s"]),
         (margins(&negative, NOMINAL), vec!["negative.toml", "plant.damping_ratio = -0.22", "above 0"]),
         (margins(&physics, NOMINAL), vec!["physics.toml", "pivot_friction"]),

@@ -63,6 +63,10 @@ fn record(role: Role, group: Option<&str>, phase: f64, seed: u64, limit: f64) ->
 }
 
 fn made(limit: f64) -> Diagnosed {
+    made_of(&plant(), limit)
+}
+
+fn made_of(given: &Plant, limit: f64) -> Diagnosed {
     let case = Case {
         id: "bench & <1>".into(),
         plant: PathBuf::new(),
@@ -74,7 +78,7 @@ fn made(limit: f64) -> Diagnosed {
             record(Role::Holdout, None, 2.9, 3, limit),
         ],
     };
-    diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap()
+    diagnose(&case, given, None, &DiagnoseSettings::default(), |_| {}).unwrap()
 }
 
 fn html(made: &Diagnosed) -> String {
@@ -118,6 +122,42 @@ fn a_machine_as_modelled_has_a_page_without_findings() {
     let page = html(&made);
     assert!(page.contains("nothing is missing") && !page.contains(">Findings</h2>"));
     assert!(page.contains("Noise floor rms") && page.contains("Spectrum of the error"));
+}
+
+/// The values of a curve, from the data that the page carries for its pictures.
+fn curve(page: &str, name: &str) -> Vec<f64> {
+    let tag = "type=\"application/json\">";
+    let figures = page.match_indices(tag).map(|(at, _)| {
+        let json = &page[at + tag.len()..];
+        serde_json::from_str::<serde_json::Value>(&json[..json.find("</script>").unwrap()]).unwrap()
+    });
+    let panels: Vec<serde_json::Value> = figures.flat_map(|f| f["panels"].as_array().unwrap().clone()).collect();
+    let series = panels.iter().flat_map(|p| p["series"].as_array().unwrap());
+    let found = series.into_iter().find(|s| s["name"] == name).expect("the page holds the curve");
+    found["y"].as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect()
+}
+
+#[test]
+fn a_stiffness_that_was_refitted_is_no_torque_that_nobody_explains() {
+    // The same inertia on a softer spring: the given model leaves the torque (k - k0) x/b, the refitted one nothing.
+    let softer = TAU * 30.0;
+    let (dc_gain, stiff) = (12.0, TAU * 35.0);
+    let given = Plant {
+        body: Body::SecondOrder {
+            dc_gain: dc_gain * (stiff / softer).powi(2),
+            natural_frequency_rad_s: softer,
+            damping_ratio: 0.3 * stiff / softer,
+        },
+        ..plant()
+    };
+    let made = made_of(&given, f64::INFINITY);
+    assert_eq!(made.diagnosis.verdict, Verdict::Refit);
+    let largest = record(Role::Fit, None, 1.7, 1, f64::INFINITY).1.position.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let torque = (1.0 - (softer / stiff).powi(2)) * largest / dc_gain;
+    let drawn = curve(&html(&made), "torque beyond the linear plant");
+    let most = drawn.iter().fold(0.0f64, |m, t| m.max(t.abs()));
+    // What stays is the sensor's noise through a smoother.
+    assert!(most < 0.1 * torque, "{most} of {torque} A");
 }
 
 #[test]

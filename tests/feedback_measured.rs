@@ -1,7 +1,7 @@
 //! Margins of a noisy sweep against those of the machine it was taken from.
 #![allow(clippy::unwrap_used)]
 
-use servotune::feedback::{MeasuredLoop, ModelLoop, margins, measured_margins};
+use servotune::feedback::{FeedbackError, MeasuredLoop, ModelLoop, margins, measured_margins};
 use servotune::lti::DiscretePlant;
 use servotune::numeric::random::Random;
 use servotune::twin::plants::{log_grid, measure, random_plant};
@@ -17,7 +17,7 @@ fn intervals_cover_the_truth_and_are_narrow() {
     let (mut covered, mut width) = ([0; 4], 0.0);
     for seed in 0..seeds {
         let frf = measure(&plant, &log_grid(40.0, 5000.0, 400), 0.01, &mut Random::new(seed)).unwrap();
-        let found = measured_margins(&MeasuredLoop::new(&frf, &sections, false).unwrap());
+        let found = measured_margins(&MeasuredLoop::new(&frf, &sections, false).unwrap()).unwrap();
         assert!(found.margins.stable);
         let i = found.intervals;
         let inside = |i: servotune::feedback::Interval, x: f64| i.low <= x && x <= i.high;
@@ -45,7 +45,7 @@ fn a_dense_exact_sweep_gives_the_models_own_margins() {
         let sampled = DiscretePlant::of(&plant, sections.sample_time_s).unwrap();
         let truth = margins(&ModelLoop::new(&sampled, &sections).unwrap());
         let frf = measure(&plant, &log_grid(20.0, 11_000.0, 6000), 0.0, &mut Random::new(1)).unwrap();
-        let found = measured_margins(&MeasuredLoop::new(&frf, &sections, false).unwrap()).margins;
+        let found = measured_margins(&MeasuredLoop::new(&frf, &sections, false).unwrap()).unwrap().margins;
         assert_eq!(found.stable, truth.stable);
         if truth.stable {
             stable += 1
@@ -60,4 +60,27 @@ fn a_dense_exact_sweep_gives_the_models_own_margins() {
         }
     }
     assert!(stable > 5 && unstable > 5, "{stable} stable, {unstable} unstable: both kinds must be tried");
+}
+
+#[test]
+fn a_sweep_that_ends_too_early_or_holds_too_little_is_no_stable_loop() {
+    let plant = paper_machine(MachineClass::Healthy).unwrap();
+    let sections = nominal_controller().unwrap().sections().unwrap();
+    let swept = |from: f64, to: f64, count: usize| {
+        measure(&plant, &log_grid(from, to, count), 0.0, &mut Random::new(1)).unwrap()
+    };
+    // The loop crosses 1 at some 600 Hz: at 200 Hz all that decides is still to come.
+    let early = swept(40.0, 200.0, 50);
+    let l = MeasuredLoop::new(&early, &sections, false).unwrap();
+    match measured_margins(&l).unwrap_err() {
+        FeedbackError::OpenEnd { end_hz, gain } => assert!((end_hz - 200.0).abs() < 1e-6 && gain > 1.0, "{gain}"),
+        other => panic!("{other}"),
+    }
+    assert!(!margins(&l).stable);
+    let half = 0.5 / sections.sample_time_s;
+    let few = MeasuredLoop::new(&swept(40.0, 5000.0, 3), &sections, false).unwrap_err();
+    assert_eq!(few, FeedbackError::FewPoints { found: 3, half_rate_hz: half, expected: 4 });
+    let beyond = swept(2.0 * half, 3.0 * half, 9);
+    let none = MeasuredLoop::new(&beyond, &sections, false).unwrap_err();
+    assert!(matches!(none, FeedbackError::Band { half_rate_hz, .. } if half_rate_hz == half), "{none}");
 }

@@ -128,10 +128,16 @@ fn a_table_tuned_on_a_sweep_says_what_the_sweep_does_not_prove() {
         .collect();
     std::fs::write(dir.join("sweep.csv"), rows.join("\n") + "\n").unwrap();
     let words = ["tune", "--frf", "sweep.csv", "--phase", "response", "--spec", "spec.toml", "--starts", "4", "--json"];
-    let (_, text, said) = run(&dir, &[&words[..], &["--out", "mine.toml", "--keep-infeasible"]].concat());
+    let (_, text, said) =
+        run(&dir, &[&words[..], &["--out", "mine.toml", "--report", "slot.html", "--keep-infeasible"]].concat());
     let document: serde_json::Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{said}"));
+    // The page's curves are the model's: what the table of limits was judged on is said beside it.
+    let page = std::fs::read_to_string(dir.join("slot.html")).unwrap();
+    assert!(page.contains("judged on the measured response"));
     let proof = &document["certificate"];
     let says = proof["says"].as_str().unwrap();
     assert!(proof["proved"] == false && says.contains("a sweep alone does not prove it"), "{says}");
+    // The unit in words, not the name of a field.
+    assert!(says.contains("position units") && !says.contains("position_unit"), "{says}");
     std::fs::remove_dir_all(dir).unwrap();
 }

@@ -3,7 +3,7 @@
 use super::diagnose_arguments::DiagnoseArguments;
 use super::{Ending, Failure, Screen, load};
 use crate::diagnose::{DiagnoseSettings, Diagnosis, Verdict, diagnose};
-use crate::document::write_text;
+use crate::document::{check_target, write_text};
 use crate::lti::PlantFile;
 use crate::recording::{Case, Record, RecordEntry, Role};
 use crate::report::diagnosis::diagnosis_page;
@@ -71,6 +71,7 @@ pub(super) fn run(a: &DiagnoseArguments, screen: &mut Screen) -> Result<Ending, 
 
 /// Diagnoses and writes every file; gives the diagnosis and what a person reads of it.
 pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagnosis, String), Failure> {
+    check_target(&a.out.join(CORRECTED))?;
     let case = case(a)?;
     let plant = load::plant(&case.plant)?;
     let controller = case.controller.as_ref().map(|f| load::controller(f)).transpose()?;
@@ -126,6 +127,12 @@ pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagno
         let _ = writeln!(text, "  {r}");
     }
     let next = &diagnosis.next_experiment;
-    let _ = writeln!(text, "  next: {} (expected separation {:.1})", next.what, next.expected_separation);
+    // Without a rival there is nothing to separate.
+    let gain = if next.expected_separation > 0.0 {
+        format!(" (expected separation {:.1})", next.expected_separation)
+    } else {
+        String::new()
+    };
+    let _ = writeln!(text, "  next: {}{gain}", next.what);
     Ok((diagnosis, text))
 }

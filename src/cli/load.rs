@@ -31,7 +31,8 @@ pub(super) fn controller(file: &Path) -> Result<Controller, Failure> {
 
 /// A profile.
 pub(super) fn profile(file: &Path) -> Result<Profile, Failure> {
-    let profile: Profile = parse_toml(file, &read_text(file)?)?;
+    let profile: Profile = parse_toml(file, &read_text(file)?)
+        .map_err(|e| e.expecting("a profile of the write: [spiral], [pes] and [noise]"))?;
     profile.check().map_err(|source| Failure::Profile { file: file.into(), source })?;
     Ok(profile)
 }

@@ -34,7 +34,7 @@ pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, F
         }
         (None, Some(file)) => {
             let sweep = load::sweep(file, &a.reading, screen)?;
-            let judged = measured_margins(&MeasuredLoop::new(&sweep.frf, &sections, a.hold_included)?);
+            let judged = measured_margins(&MeasuredLoop::new(&sweep.frf, &sections, a.hold_included)?)?;
             screen.result(&judged, &measured_text(&judged)?)?;
             judged.margins.stable
         }

@@ -4,7 +4,7 @@ use super::arguments::{ModelArguments, TuneArguments};
 use super::proof::{self, On, Proof};
 use super::slot::{self, Slot};
 use super::{Ending, Failure, Screen, limit, load, physics, tune_machines};
-use crate::document::{read_text, sha256_hex, write_text};
+use crate::document::{check_target, read_text, sha256_hex, write_text};
 use crate::feedback::Amplitudes;
 use crate::frf::Sweep;
 use crate::identify::{self, Identified, IdentifySettings, identify};
@@ -92,6 +92,10 @@ impl Given {
 pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     if let (Some(machines), Some(gate)) = (&a.machines, &a.gate) {
         return tune_machines::run(a, machines, gate, screen);
+    }
+    // A search takes minutes: where its result cannot be put is said before it.
+    for target in [Some(&a.out), a.report.as_ref()].into_iter().flatten() {
+        check_target(target)?;
     }
     let spec = Spec::read(&a.spec).map_err(crate::tune::TuneError::from)?;
     let spec_sha256 = sha256_hex(read_text(&a.spec)?.as_bytes());

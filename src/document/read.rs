@@ -1,6 +1,7 @@
 //! Reading a TOML document: the error says file, line, column, what was found and what was expected.
 
 use serde::de::DeserializeOwned;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -9,10 +10,10 @@ use thiserror::Error;
 #[allow(missing_docs, reason = "each field is named in the message")]
 pub enum DocumentError {
     /// The file system refused.
-    #[error("{}: cannot {action}: {source}", file.display())]
-    Io { file: PathBuf, action: &'static str, source: std::io::Error },
+    #[error("{}: cannot {action}: {source}{}", file.display(), way_on(source))]
+    Io { file: PathBuf, action: &'static str, source: io::Error },
     /// The bytes are not UTF-8 text.
-    #[error("{}: byte {offset} is not UTF-8 text; expected a TOML document", file.display())]
+    #[error("{}: byte {offset} is not UTF-8 text; expected a text file, saved as UTF-8", file.display())]
     NotText { file: PathBuf, offset: usize },
     /// The text is not the document expected: a syntax error, a wrong type, a missing or an unknown key.
     #[error("{}:{line}:{column}: {found}", file.display())]
@@ -28,6 +29,19 @@ impl DocumentError {
             }
             other => other,
         }
+    }
+}
+
+/// What a person can do about a refusal of the file system, to stand behind it; nothing where its own words are enough.
+pub fn way_on(refusal: &io::Error) -> &'static str {
+    match refusal.kind() {
+        ErrorKind::NotFound => "; check the name and the folder it is looked for in",
+        ErrorKind::IsADirectory => "; expected a file, not a folder",
+        ErrorKind::NotADirectory | ErrorKind::AlreadyExists => {
+            "; a part of this path is a file, not a folder: name another"
+        }
+        ErrorKind::PermissionDenied => "; check its permissions",
+        _ => "",
     }
 }
 

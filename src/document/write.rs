@@ -1,7 +1,7 @@
 //! Writing whole files: a temporary name beside the target, flushed to disk, then renamed over it.
 
 use super::DocumentError;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -15,6 +15,21 @@ pub fn temporary_beside(file: &Path) -> PathBuf {
     file.with_file_name(format!(".{name}.{process}.{count}.part"))
 }
 
+/// Refuses a place where no file can be written: a folder stands there, or the way to it leads through a file. A long command asks
+/// before it starts.
+pub fn check_target(file: &Path) -> Result<(), DocumentError> {
+    let refused = |kind: ErrorKind| {
+        Err(DocumentError::Io { file: file.into(), action: "write", source: std::io::Error::from(kind) })
+    };
+    if file.is_dir() {
+        return refused(ErrorKind::IsADirectory);
+    }
+    match file.ancestors().skip(1).find(|p| p.exists()) {
+        Some(there) if !there.is_dir() => refused(ErrorKind::NotADirectory),
+        _ => Ok(()),
+    }
+}
+
 /// Writes `bytes` so that the file is either the old one or the new one, never a part of either.
 pub fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), DocumentError> {
     let fail = |action| move |source| DocumentError::Io { file: file.into(), action, source };
@@ -22,7 +37,8 @@ pub fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), DocumentError> {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),
     };
-    std::fs::create_dir_all(folder).map_err(fail("make the folder of"))?;
+    check_target(file)?;
+    std::fs::create_dir_all(folder).map_err(fail("make its folder"))?;
     let temporary = temporary_beside(file);
     let written = std::fs::File::create(&temporary)
         .and_then(|mut f| f.write_all(bytes).and_then(|()| f.sync_all()))

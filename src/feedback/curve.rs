@@ -27,14 +27,20 @@ pub struct ResponseCurve {
 /// Octaves at the start of the sweep from which the slope below it is taken.
 const SLOPE_OCTAVES: f64 = 1.0;
 
+/// Points that a curve is drawn through at least: noise shows in third differences.
+const FEWEST: usize = 4;
+
 impl ResponseCurve {
     /// The points of `frf` below half the sample rate, times `hold` at each frequency.
     pub fn of(frf: &Frf, sample_time_s: f64, hold: impl Fn(f64) -> Complex<f64>) -> Result<Self, FeedbackError> {
         let end = PI / sample_time_s;
         let n = frf.w_rad_s().partition_point(|w| *w < end);
-        if n < 2 {
-            let from_hz = frf.w_rad_s()[0] / TAU;
-            return Err(FeedbackError::Band { from_hz, half_rate_hz: end / TAU });
+        let half_rate_hz = 0.5 / sample_time_s;
+        if n == 0 {
+            return Err(FeedbackError::Band { from_hz: frf.w_rad_s()[0] / TAU, half_rate_hz });
+        }
+        if n < FEWEST {
+            return Err(FeedbackError::FewPoints { found: n, half_rate_hz, expected: FEWEST });
         }
         let w: Vec<f64> = frf.w_rad_s()[..n].to_vec();
         let ln_w: Vec<f64> = w.iter().map(|w| w.ln()).collect();

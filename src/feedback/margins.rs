@@ -12,7 +12,8 @@ use std::f64::consts::TAU;
 /// Of several crossings the one smallest in absolute value is named; all are listed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Margins {
-    /// No closed-loop pole on or outside the unit circle (Nyquist count).
+    /// No closed-loop pole on or outside the unit circle (Nyquist count). A measured loop that ends with |L| of 1 or more is not
+    /// called stable.
     pub stable: bool,
     /// Angle from -180 deg to L where |L| = 1 (deg).
     pub phase_margin_deg: Option<f64>,
@@ -48,7 +49,9 @@ pub fn margins(l: &impl OpenLoop) -> Margins {
     let gain = gain_crossings(l, &trace);
     let phase = phase_crossings(l, &trace);
     let count = nyquist_count(l, &trace);
-    let stable = count.unstable_closed_loop_poles == 0;
+    // A loop that is known up to a frequency where |L| is not below 1 may still go round -1 behind it.
+    let closes = l.ends_at_half_rate() || l.at(l.end_rad_s()).norm() < 1.0;
+    let stable = closes && count.unstable_closed_loop_poles == 0;
     let one = Complex::new(1.0, 0.0);
     let (sensitivity_w, distance) = minimum(l, &trace, |v| (one + v).norm());
     // |(1 + L)/(1 - L)| is half the disk margin at one frequency; at L = 1 the disk is unbounded there.

@@ -74,10 +74,6 @@ impl<'a> MeasuredLoop<'a> {
         let curve = ResponseCurve::of(frf, t, |w| if hold_included { Complex::new(1.0, 0.0) } else { hold(w * t) })?;
         let (ln_w, ln_p) = (curve.ln_w(), curve.ln_p());
         let n = ln_w.len();
-        if n < 4 {
-            let from_hz = frf.w_rad_s()[0] / TAU;
-            return Err(FeedbackError::Band { from_hz, half_rate_hz: 0.5 / t });
-        }
         let (ln_size, phase): (Vec<f64>, Vec<f64>) = ln_p.iter().map(|p| (p.re, p.im)).unzip();
         let deviation: Vec<f64> = match frf.relative_std() {
             Some(s) => s[..n].to_vec(),
@@ -210,8 +206,13 @@ impl OpenLoop for MeasuredLoop<'_> {
     }
 }
 
-/// Margins of a measured loop with their intervals.
-pub fn measured_margins(l: &MeasuredLoop<'_>) -> MeasuredMargins {
+/// Margins of a measured loop with their intervals; refused where the loop gain at the end of the sweep is not below 1.
+pub fn measured_margins(l: &MeasuredLoop<'_>) -> Result<MeasuredMargins, FeedbackError> {
+    let (first, last) = l.ends();
+    let end_gain = l.at(last).norm();
+    if end_gain >= 1.0 {
+        return Err(FeedbackError::OpenEnd { end_hz: last / TAU, gain: end_gain });
+    }
     let m = margins(l);
     let hz = |i: Interval| Interval { low: i.low / TAU, high: i.high / TAU };
     let gain_reach = m.gain_crossover_hz.map(|f| l.reach(f * TAU, |w| l.at(w).norm().ln()));
@@ -226,8 +227,7 @@ pub fn measured_margins(l: &MeasuredLoop<'_>) -> MeasuredMargins {
         closest = closest.min((distance - radius).max(0.0));
         farthest = farthest.min(distance + radius);
     }
-    let (first, last) = l.ends();
-    MeasuredMargins {
+    Ok(MeasuredMargins {
         intervals: MarginIntervals {
             phase_margin_deg: gain_reach.map(|r| l.range(r, degrees, 1f64.to_degrees())),
             gain_crossover_hz: gain_reach.map(hz),
@@ -237,6 +237,6 @@ pub fn measured_margins(l: &MeasuredLoop<'_>) -> MeasuredMargins {
         },
         margins: m,
         band_hz: hz(Interval { low: first, high: last }),
-        end_gain: l.at(last).norm(),
-    }
+        end_gain,
+    })
 }

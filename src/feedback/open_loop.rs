@@ -35,6 +35,16 @@ pub enum FeedbackError {
     /// The sweep and half the sample rate leave no band to judge.
     #[error("the sweep starts at {from_hz} Hz, at or above half the sample rate, {half_rate_hz} Hz")]
     Band { from_hz: f64, half_rate_hz: f64 },
+    /// Noise and interpolation cannot be told from so few points.
+    #[error(
+        "{found} points of the sweep lie below half the sample rate, {half_rate_hz} Hz; expected at least {expected}"
+    )]
+    FewPoints { found: usize, half_rate_hz: f64, expected: usize },
+    /// The loop gain has not fallen below 1 where the sweep ends: what comes after it decides on stability.
+    #[error(
+        "the sweep ends at {end_hz:.4} Hz, where |L| is still {gain:.4}; expected an end below 1, or stability cannot be judged: sweep to higher frequencies"
+    )]
+    OpenEnd { end_hz: f64, gain: f64 },
 }
 
 /// The loop of a sampled plant and the firmware's sections.

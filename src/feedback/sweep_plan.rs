@@ -84,7 +84,7 @@ const SAME_POINT: f64 = 2e-3;
 /// Plans the next tones.
 pub fn sweep_plan(frf: &Frf, sections: &Sections, settings: &PlanSettings) -> Result<SweepPlan, FeedbackError> {
     let judge = |f: &Frf| -> Result<MeasuredMargins, FeedbackError> {
-        Ok(measured_margins(&MeasuredLoop::new(f, sections, settings.hold_included)?))
+        measured_margins(&MeasuredLoop::new(f, sections, settings.hold_included)?)
     };
     let before = judge(frf)?;
     let seconds = |hz: f64| settings.settle_s + settings.periods / hz;
@@ -111,7 +111,8 @@ pub fn sweep_plan(frf: &Frf, sections: &Sections, settings: &PlanSettings) -> Re
         (left, now, expected) = (width, next, found);
         tones.push(tone);
     }
-    let spent = tones.iter().map(|t| t.seconds).sum();
+    // A sum of nothing is -0.
+    let spent = tones.iter().map(|t| t.seconds).sum::<f64>() + 0.0;
     Ok(SweepPlan { tones, before, expected, seconds: spent, full_seconds })
 }
 

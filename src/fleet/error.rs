@@ -17,7 +17,7 @@ pub enum FleetError {
     Inputs { file: PathBuf, found: usize },
     #[error("{}: {key} = {found}: expected {expected}", file.display())]
     Range { file: PathBuf, key: &'static str, found: f64, expected: &'static str },
-    #[error("{}: cannot list the folder: {source}", folder.display())]
+    #[error("{}: cannot list the folder: {source}{}", folder.display(), crate::document::way_on(source))]
     Folder { folder: PathBuf, source: std::io::Error },
     #[error("{}: cannot make the folder of the store: {source}; name another --out, or a `store` elsewhere in FLEET.toml", folder.display())]
     NoPlace { folder: PathBuf, source: std::io::Error },

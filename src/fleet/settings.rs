@@ -167,7 +167,9 @@ impl Fleet {
 
     /// The document in `text`; `path` names it in errors and is what its paths are relative to.
     pub fn parse(path: &Path, text: &str) -> Result<Fleet, FleetError> {
-        let mut file: FleetFile = parse_toml(path, text)?;
+        let mut file: FleetFile = parse_toml(path, text).map_err(|e| {
+            e.expecting("a FLEET.toml: [input] and the keys of specs/fleet.md; `servotune twin fleet` writes one")
+        })?;
         let base = path.parent().unwrap_or(Path::new("."));
         let place = |p: &mut PathBuf| *p = base.join(&*p);
         [&mut file.input.tree, &mut file.input.table, &mut file.gate, &mut file.store]

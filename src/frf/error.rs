@@ -4,6 +4,7 @@
 
 use super::causality::Evidence;
 use super::response::FrfShapeError;
+use crate::document::way_on;
 use std::fmt;
 use thiserror::Error;
 
@@ -117,7 +118,7 @@ fn list(names: &[String]) -> String {
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "each field is named in the message")]
 pub enum FrfError {
-    #[error("{file}: cannot read it: {source}")]
+    #[error("{file}: cannot read it: {source}{}", way_on(source))]
     Io { file: String, source: std::io::Error },
     #[error("{file}: found {found_bytes} bytes; expected at most {limit_bytes}")]
     FileTooLarge { file: String, found_bytes: u64, limit_bytes: usize },
@@ -129,7 +130,7 @@ pub enum FrfError {
     NotText { file: String, found: NotText },
     #[error("{file}, line {line}: byte {byte:#04x} is neither UTF-8 nor a sign that may stand in a header")]
     Encoding { file: String, line: u64, byte: u8 },
-    #[error("{file}: found no row of numbers in {lines} lines; expected rows of frequency, magnitude and phase")]
+    #[error("{file}: found no row of numbers (lines read: {lines}); expected rows of frequency, magnitude and phase")]
     NoRows { file: String, lines: u64 },
     #[error("{file}, line {line}: a quotation mark is opened and never closed")]
     OpenQuote { file: String, line: u64 },

@@ -1,5 +1,6 @@
 //! Why a record cannot be read.
 
+use crate::document::way_on;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -8,10 +9,10 @@ use thiserror::Error;
 #[allow(missing_docs, reason = "each field is named in the message")]
 pub enum RecordingError {
     /// The file system or the decompressor refused.
-    #[error("{}: cannot read: {source}", file.display())]
+    #[error("{}: cannot read: {source}{}", file.display(), way_on(source))]
     Io { file: PathBuf, source: std::io::Error },
     /// The rows are no table.
-    #[error("{}: {source}", file.display())]
+    #[error("{}: {source}; expected a table of comma-separated numbers under a header line, saved as UTF-8", file.display())]
     Table { file: PathBuf, source: csv::Error },
     /// A column is missing.
     #[error("{}: no column `{wanted}`; the header has: {}", file.display(), found.join(", "))]

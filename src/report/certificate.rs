@@ -115,7 +115,13 @@ pub fn certificate_sentence(c: &Certificate) -> String {
                 None if case.write.is_none() && l.proven.high.is_none() => "a sweep alone does not prove it".into(),
                 None => "no bound is proved".into(),
             };
-            parts.push(format!("{of}{} {side} {} {} ({proven})", l.name, l.required, l.unit));
+            // A certificate keeps the field of the plant file in which the unit stands; a sentence says what it means.
+            let unit = match l.unit.as_str() {
+                "position_unit" => "position units",
+                "command_unit" => "command units",
+                unit => unit,
+            };
+            parts.push(format!("{of}{} {side} {} {unit} ({proven})", l.name, l.required));
         }
         parts.extend(case.sweep_again.iter().map(|s| {
             format!(

@@ -238,7 +238,7 @@ fn findings_section(s: &Shown) -> Result<Section, ReportError> {
             let end = |v: f64| Cell::from(known.then_some(v));
             let unit = if e.unit == "1" { "" } else { &e.unit };
             numbers.push(vec![
-                words(name).as_str().into(),
+                words(name.strip_suffix("_deg").unwrap_or(name)).as_str().into(),
                 e.value.into(),
                 end(e.low),
                 end(e.high),

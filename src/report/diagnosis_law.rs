@@ -283,34 +283,46 @@ fn centred(mut x: Vec<f64>) -> Vec<f64> {
     x
 }
 
+/// Share of a record at its start that is not drawn: the smoother guesses where the motion starts, and the torque of that guess is
+/// no torque of the machine.
+const START: f64 = 0.03;
+
 /// Torque beyond the linear part of the corrected model over time, beside the torque of its effects, on the record with most.
 pub(super) fn unexplained_figure(s: &Shown) -> Result<Option<Figure>, ReportError> {
     let bench = &s.made.bench;
-    // The smoother worked with the scene's plant; the same motion under the corrected plant asks for another torque.
-    let ([b0, k0, c0], [b, k, c]) = (numbers(&bench.scene.plant), numbers(&s.made.corrected.plant));
+    // What the corrected plant carries, and what belongs to the record alone. A command acts as a torque one delay later.
+    let drives = |e: Entry| matches!(e, Entry::Torque | Entry::Command);
+    let settled = |mut x: Vec<f64>| x.split_off((START * x.len() as f64) as usize);
+    let found = |i: usize| {
+        let lasting = s.made.corrected.effects.iter().map(|(e, x)| (*e as &dyn Effect, &x.inner, &x.strengths[..]));
+        let passing = s.made.selection.model.chosen.iter().filter(|c| c.effect.facts().per_record);
+        let passing = passing.map(|c| (c.effect as &dyn Effect, &c.setting.inner, own(c, i)));
+        let mut sum: Option<Vec<f64>> = None;
+        for (effect, inner, strengths) in lasting.chain(passing).filter(|p| drives(p.0.facts().entry)) {
+            let part = added(effect, inner, strengths, &bench.scene, &bench.trajectories[i]);
+            match &mut sum {
+                Some(sum) => sum.iter_mut().zip(part).for_each(|(f, p)| *f += p),
+                None => sum = Some(part),
+            }
+        }
+        sum
+    };
+    // The last smoothing was told the torque of the refitted body and of the laws: what it left is beyond both, so that the laws'
+    // own torque comes on top.
     let beyond = |i: usize| {
-        let motion = &bench.trajectories[i];
-        let torque = |(m, w): (&Sample, &f64)| (b0 * (m.i + w) - (k0 - k) * m.x - (c0 - c) * m.v) / b - m.i;
-        centred(motion.samples.iter().zip(&motion.unexplained).map(torque).collect())
+        let mut torque = bench.trajectories[i].unexplained.clone();
+        if let Some(found) = found(i) {
+            torque.iter_mut().zip(found).for_each(|(t, f)| *t += f);
+        }
+        centred(settled(torque))
     };
     let every: Vec<Vec<f64>> = (0..bench.trajectories.len()).map(beyond).collect();
     let energy = |i: usize| every[i].iter().map(|v| v * v).sum::<f64>();
     let Some(i) = (0..every.len()).max_by(|&a, &b| energy(a).total_cmp(&energy(b))) else {
         return Ok(None);
     };
-    let motion = &bench.trajectories[i];
-    let at: Vec<f64> = motion.samples.iter().map(|m| m.t).collect();
-    // What the corrected plant carries, and what belongs to the record alone.
-    let lasting = s.made.corrected.effects.iter().map(|(e, x)| (*e, &x.inner, &x.strengths[..]));
-    let passing = s.made.selection.model.chosen.iter().filter(|c| c.effect.facts().per_record);
-    let passing = passing.map(|c| (c.effect, &c.setting.inner, own(c, i)));
-    let mut found: Option<Vec<f64>> = None;
-    for (effect, inner, strengths) in lasting.chain(passing).filter(|p| p.0.facts().entry == Entry::Torque) {
-        let part = added(effect, inner, strengths, &bench.scene, motion);
-        let sum = found.get_or_insert_with(|| vec![0.0; at.len()]);
-        sum.iter_mut().zip(part).for_each(|(f, p)| *f += p);
-    }
-    let found = found.map(centred);
+    let at = settled(bench.trajectories[i].samples.iter().map(|m| m.t).collect());
+    let found = found(i).map(|f| centred(settled(f)));
     let line = |name, value, ink| TimeCurve { name, time_s: &at, value, ink, kind: CurveKind::Line };
     let mut curves = vec![line("torque beyond the linear plant", &every[i], Ink::Muted)];
     curves.extend(found.as_ref().map(|f| line("torque of the laws in the model", f, Ink::Data(0))));
@@ -319,8 +331,12 @@ pub(super) fn unexplained_figure(s: &Shown) -> Result<Option<Figure>, ReportErro
     let limits: &[(f64, &str)] = if noise > 0.0 { &limits } else { &[] };
     let panel = TimePanel { quantity: "Torque", unit: s.command, curves: &curves, limits };
     let run = &bench.runs[bench.stack.segments[i].runs[0]].name;
-    let caption = "Estimated from the recorded motion by a smoother, in command units, each curve less its mean; the linear \
-                   plant is the corrected one. Where both curves agree, nothing is left to explain.";
+    let how = "Estimated from the recorded motion by a smoother, in command units, less its mean and without the first 3 % of the \
+               record, where the smoother finds its start; the linear plant is the corrected one.";
+    let caption = match found {
+        Some(_) => format!("{how} Where both curves agree, nothing is left to explain."),
+        None => format!("{how} No torque of a law is in the model: what stands here is noise, or is not explained."),
+    };
     let title = format!("Torque that the linear plant does not explain, {run}");
-    time(&title, caption, &[panel], None).map(Some)
+    time(&title, &caption, &[panel], None).map(Some)
 }

@@ -95,7 +95,7 @@ pub(super) fn time_map(s: &Shown, map: &Map) -> Result<Figure, ReportError> {
         let width = error.len().div_ceil(WINDOWS).max(1);
         let at: Vec<f64> = (0..error.len().div_ceil(width)).map(|w| (w * width) as f64 * t * scale).collect();
         let height: Vec<f64> = error.chunks(width).map(rms).collect();
-        let mut panel = Panel::new(Axis::linear("Time", unit), Axis::linear("Error", "noise rms"));
+        let mut panel = Panel::new(Axis::linear("Time", unit), Axis::linear("Error / noise", ""));
         panel.height = 0.55;
         panel.x.range = Some((0.0, longest * scale));
         for (f, _) in s.made.diagnosis.findings.iter().zip(&home).filter(|(_, h)| **h == Some(g)) {
@@ -141,7 +141,7 @@ pub(super) fn zone_map(s: &Shown, map: &Map) -> Result<Figure, ReportError> {
             *sum = (sum.0 + e * e, sum.1 + 1.0);
         }
     }
-    let mut panel = Panel::new(Axis::linear("Position", s.position), Axis::linear("Error", "noise rms"));
+    let mut panel = Panel::new(Axis::linear("Position", s.position), Axis::linear("Error / noise", ""));
     for f in &s.made.diagnosis.findings {
         for [from, to] in &f.place.position {
             panel.marks.push(Region::of_x(*from, *to, &words(&f.effect), Ink::Data(4)));

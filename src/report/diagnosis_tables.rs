@@ -65,7 +65,7 @@ pub(super) fn records_table(s: &Shown) -> Result<Table, ReportError> {
             number("Largest motion"),
             number("Model as given"),
             number("Linear refit"),
-            number(s.models()[2]),
+            number(if s.named() { "With findings" } else { "Best model tried" }),
         ],
     );
     let floor = s.floor();

@@ -213,7 +213,7 @@ fn distributions(v: &FleetView) -> Result<Vec<Block>, ReportError> {
             }
             Ok(())
         };
-    draw("PES", ("DFT norms, low and high band together", &v.position_unit), &|s| s.dft)?;
+    draw("PES", ("DFT norm, both bands", &v.position_unit), &|s| s.dft)?;
     draw("Phase margin", ("Phase margin", "deg"), &|s| s.phase_margin_deg)?;
     draw("Gain margin", ("Gain margin", "dB"), &|s| s.gain_margin_db)?;
     draw("Sensitivity", ("Largest sensitivity", ""), &|s| s.max_sensitivity)?;

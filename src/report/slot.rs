@@ -63,17 +63,11 @@ pub struct SlotView<'a> {
 
 /// The page of one slot.
 pub fn slot_page(view: &SlotView<'_>) -> Result<Page, ReportError> {
-    let mut sections = vec![Section {
-        heading: "Verdict".into(),
-        blocks: vec![
-            Block::Notice(view.verdict.0, view.verdict.1.clone()),
-            Block::Table(limits_table(
-                view.before.and_then(|b| b.judged.as_ref()),
-                view.after.judged.as_ref(),
-                view.units,
-            )?),
-        ],
-    }];
+    let limits = limits_table(view.before.and_then(|b| b.judged.as_ref()), view.after.judged.as_ref(), view.units)?;
+    let mut verdict = vec![Block::Notice(view.verdict.0, view.verdict.1.clone()), Block::Table(limits)];
+    // Without it, the table's figures would seem to contradict the cards and the curves.
+    verdict.extend(view.judged_on.map(|said| Block::Prose(said.to_owned())));
+    let mut sections = vec![Section { heading: "Verdict".into(), blocks: verdict }];
     sections.extend(view.plant.iter().cloned());
     sections.push(loop_section(view)?);
     sections.push(pes_section(view)?);

@@ -169,13 +169,17 @@ fn draw_panel(svg: &mut String, layout: &Layout, placed: &Placed, index: usize, 
 fn draw_ticks(svg: &mut String, placed: &Placed) {
     let area = placed.area;
     let mut words = String::new();
+    // A line at a named place would run through the middle of its cells and their letters.
+    let numbers = |axis: &Axis| axis.names.is_empty();
     svg.push_str(r#"<g class="grid">"#);
     // Words that would touch the words before them are left out.
     let mut free = f64::NEG_INFINITY;
     for tick in &placed.x_ticks {
         let at = placed.px(tick.value);
         let fine = if tick.label.is_none() { r#" class="fine""# } else { "" };
-        let _ = write!(svg, r#"<path{fine} d="M{} {}v{}"/>"#, px(at), px(area.y), px(area.h));
+        if numbers(&placed.panel.x) {
+            let _ = write!(svg, r#"<path{fine} d="M{} {}v{}"/>"#, px(at), px(area.y), px(area.h));
+        }
         if let (true, Some(label)) = (placed.x_labelled, &tick.label) {
             let half = 0.5 * text_width(label, 11.5);
             if at - half > free {
@@ -189,7 +193,9 @@ fn draw_ticks(svg: &mut String, placed: &Placed) {
     for tick in &placed.y_ticks {
         let at = placed.py(tick.value);
         let fine = if tick.label.is_none() { r#" class="fine""# } else { "" };
-        let _ = write!(svg, r#"<path{fine} d="M{} {}h{}"/>"#, px(area.x), px(at), px(area.w));
+        if numbers(&placed.panel.y) {
+            let _ = write!(svg, r#"<path{fine} d="M{} {}h{}"/>"#, px(area.x), px(at), px(area.w));
+        }
         if let Some(label) = &tick.label {
             let (x, y) = (px(area.x - 6.0), px(at + 4.0));
             let label = escape(label);

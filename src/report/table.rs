@@ -203,7 +203,8 @@ impl Table {
         html! {
             div.scroll tabindex="0" role="region" aria-label=(self.caption) {
                 table {
-                    caption { (self.caption) }
+                    // Its own box: on a narrow screen it stays in view and wraps while the table scrolls under it.
+                    caption { span.said { (self.caption) } }
                     thead {
                         tr {
                             @for column in &self.columns {

@@ -26,12 +26,16 @@ pub(super) fn ticks(view: &View, policy: Ticks, length: f64, spacing: f64) -> Ve
     }
 }
 
-/// Ticks of an axis: its names where it has any, each cut to `room` pixels, numbers otherwise.
+/// Ticks of an axis: its names where it has any, each cut to `room` pixels, numbers otherwise. A name that is a number stays
+/// whole, since the start of a number is another number; what then does not fit is left out when drawn.
 pub(super) fn axis_ticks(axis: &Axis, view: &View, length: f64, spacing: f64, room: f64) -> Vec<Tick> {
     if axis.names.is_empty() {
         return ticks(view, axis.ticks, length, spacing);
     }
-    let tick = |(i, name): (usize, &String)| Tick { value: i as f64, label: Some(fitted(name, 11.5, room)) };
+    let tick = |(i, name): (usize, &String)| {
+        let number = name.parse::<f64>().is_ok();
+        Tick { value: i as f64, label: Some(if number { name.clone() } else { fitted(name, 11.5, room) }) }
+    };
     axis.names.iter().enumerate().map(tick).filter(|t| view.holds(t.value)).collect()
 }
 

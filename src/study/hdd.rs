@@ -199,7 +199,7 @@ fn margin_table(caption: &str, cases: &[Case], c: &Controller) -> Result<(Table,
     let sections = c.sections()?;
     let mut missed = 0;
     for case in cases {
-        let m = measured_margins(&MeasuredLoop::new(&case.frf, &sections, true)?).margins;
+        let m = measured_margins(&MeasuredLoop::new(&case.frf, &sections, true)?)?.margins;
         let short = |found: Option<f64>, limit: Option<f64>| found.zip(limit).is_some_and(|(f, l)| f < l);
         let over = wanted.max_sensitivity.is_some_and(|l| m.max_sensitivity > l);
         if !m.stable

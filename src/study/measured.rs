@@ -54,7 +54,7 @@ pub(super) fn tune_axis(axis: &Axis, spec: &str, profile: &str, sample_time_s: f
     let machine = Machine::Response { frf: &frf, hold: Hold::Included, continuation: Some(&model) };
     let outcome = tune(&machine, &spec, None, &TuneSettings { sample_time_s, ..TuneSettings::default() })?;
     let sections = outcome.controller().sections()?;
-    let margins = measured_margins(&MeasuredLoop::new(&frf, &sections, true)?);
+    let margins = measured_margins(&MeasuredLoop::new(&frf, &sections, true)?)?;
     let (name, frf, identified) = (axis.name.clone(), axis.frf.clone(), axis.identified.clone());
     Ok(Tuned { name, frf, identified, turned, outcome, margins })
 }

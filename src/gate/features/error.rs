@@ -13,7 +13,7 @@ use thiserror::Error;
 #[allow(missing_docs, reason = "each field is named in the message")]
 pub enum FeatureError {
     /// The folder cannot be listed.
-    #[error("{}: cannot list the folder: {source}", folder.display())]
+    #[error("{}: cannot list the folder: {source}{}", folder.display(), crate::document::way_on(source))]
     Folder { folder: PathBuf, source: std::io::Error },
     /// There is no machine in it.
     #[error(

@@ -100,7 +100,7 @@ Plot.prototype.draw = function (p) {
   var free = -Infinity, self = this;
   marksOf(p.ax, p.w, 62).forEach(function (t) {
     var at = self.column(p, bend(p.ax, t.value)), half = t.label ? t.label.length * 3.5 : 0;
-    make(p.grid, "path", { d: "M" + at + " " + p.y + "v" + p.h, "class": t.label ? "" : "fine" });
+    if (!p.ax.names) make(p.grid, "path", { d: "M" + at + " " + p.y + "v" + p.h, "class": t.label ? "" : "fine" });
     if (p.labelled && t.label && at - half > free) {
       free = at + half + 2;
       make(p.tick, "text", { x: at, y: p.y + p.h + 16, "text-anchor": "middle" }, t.label);
@@ -108,7 +108,7 @@ Plot.prototype.draw = function (p) {
   });
   marksOf(p.ay, p.h, 28).forEach(function (t) {
     var at = self.row(p, bend(p.ay, t.value));
-    make(p.grid, "path", { d: "M" + p.x + " " + at + "h" + p.w, "class": t.label ? "" : "fine" });
+    if (!p.ay.names) make(p.grid, "path", { d: "M" + p.x + " " + at + "h" + p.w, "class": t.label ? "" : "fine" });
     if (t.label) make(p.tick, "text", { x: p.x - 6, y: at + 4, "text-anchor": "end" }, t.label);
   });
   Array.prototype.forEach.call(p.words, function (e) { self.moveWord(p, e, [sx, tx, sy, ty]); });

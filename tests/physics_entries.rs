@@ -1,0 +1,116 @@
+//! The entries of the library of effects: every name of the contract, parameters there and back, columns pure and at rest zero.
+#![allow(clippy::unwrap_used)]
+
+mod physics_common;
+
+use physics_common::{along, run, scene};
+use servotune::lti::Body;
+use servotune::physics::{COLUMNS, Entry, Given, Sample, Setting, facts, library};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+const CONTRACT: &str = "pivot_friction, coulomb_friction, bearing_bias, cable_spring, nonlinear_spring, \
+    torque_factor_rolloff, torque_ripple, current_saturation, slew_limit, dead_band, amplifier_lag, extra_delay, \
+    sensor_lag, gain_drift, parametric_gain, encoder_cyclic_error, encoder_scale_error, quantisation, encoder_noise, \
+    jitter, time_base_drift, misalignment, lost_samples, unmodelled_resonance, mode_shift, aliased_mode, backlash, \
+    base_mode, modal_damping, repeatable_runout, line_disturbance, broadband_disturbance, shock, offset_drift, \
+    aerodynamic_drag, controller_mismatch, linear_parameters, unexplained";
+
+#[test]
+fn every_name_of_the_contract_is_known_and_no_other() {
+    let names: Vec<&str> = CONTRACT.split(", ").collect();
+    for &name in &names {
+        let known = facts(name).unwrap_or_else(|| panic!("{name} is not known"));
+        assert_eq!(known.name, name);
+        assert!(known.columns <= COLUMNS && known.band_hz[0] < known.band_hz[1]);
+        for other in known.confused_with {
+            assert!(names.contains(other) && *other != name, "{name} is confused with {other}");
+        }
+    }
+    assert_eq!(library().len() + servotune::physics::data_facts().len(), names.len());
+}
+
+#[test]
+fn parameters_and_restore_are_inverse_at_every_point_of_every_grid() {
+    let mut scene = scene();
+    for free in [false, true] {
+        if free {
+            scene.plant.body = Body::FreeInertia { acceleration_gain: 1e7, viscous_rate_per_s: 2.0 };
+        }
+        for e in library() {
+            let facts = e.facts();
+            let grid = e.grid(&scene);
+            assert!(!grid.is_empty(), "{}", facts.name);
+            for inner in grid {
+                let strengths: Vec<f64> =
+                    (0..facts.columns).map(|c| if facts.fixed { 1.0 } else { 0.03 * (c as f64 - 1.4) }).collect();
+                let mut setting = Setting { inner, strengths };
+                // What a simpler form of a law leaves out has no strength.
+                let unused = |name: &str, c: usize| match name {
+                    "encoder_cyclic_error" => setting.inner[1] < 1.5 && c >= 2,
+                    "torque_factor_rolloff" => setting.inner[0] < 1.5 && c != 1,
+                    _ => false,
+                };
+                let gone: Vec<usize> = (0..facts.columns).filter(|c| unused(facts.name, *c)).collect();
+                gone.into_iter().for_each(|c| setting.strengths[c] = 0.0);
+                let named: BTreeMap<String, f64> =
+                    e.parameters(&setting, &scene).iter().map(|p| (p.name.to_string(), p.value)).collect();
+                let back = e.restore(&Given::new(facts.name, &named), &scene).unwrap();
+                for (a, b) in [(&setting.inner, &back.inner), (&setting.strengths, &back.strengths)] {
+                    assert_eq!(a.len(), b.len(), "{}", facts.name);
+                    for (x, y) in a.iter().zip(b) {
+                        // Polar form and back, or a sum and its difference: a few roundings.
+                        assert!((x - y).abs() <= 1e-12 * (1.0 + x.abs()), "{}: {setting:?} {back:?}", facts.name);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn columns_are_finite_pure_and_zero_at_rest() {
+    let scene = scene();
+    // These push or read wrong at rest too: they are waves of position or time.
+    let restless =
+        ["torque_ripple", "encoder_cyclic_error", "repeatable_runout", "line_disturbance", "offset_drift", "shock"];
+    let moving = along(300, |t| {
+        let (w, u) = (TAU * 300.0, (TAU * 900.0 * t).sin());
+        Sample {
+            x: 12.0 * (w * t).sin(),
+            v: 12.0 * w * (w * t).cos(),
+            u,
+            i: u,
+            spindle_rad: 754.0 * t,
+            ..Sample::default()
+        }
+    });
+    for e in library() {
+        let facts = e.facts();
+        for inner in e.grid(&scene) {
+            let mut moved = e.law(&inner, &scene);
+            for pair in moving.windows(2) {
+                let (mut first, mut second) = ([0.0; COLUMNS], [0.0; COLUMNS]);
+                moved.columns(&pair[0], &pair[1], &mut first[..facts.columns]);
+                moved.columns(&pair[0], &pair[1], &mut second[..facts.columns]);
+                assert!(first == second && first.iter().all(|c| c.is_finite()), "{} {inner:?}", facts.name);
+                moved.commit(&pair[0], &pair[1]);
+            }
+            if !restless.contains(&facts.name) {
+                let resting = if inner.contains(&scene.centre) { scene.centre } else { 0.0 };
+                let rest = along(20, |_| Sample { x: resting, ..Sample::default() });
+                let all = run(e.law(&inner, &scene).as_mut(), &rest);
+                assert!(all.iter().flatten().all(|c| *c == 0.0), "{} {inner:?}", facts.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn entries_say_what_the_laws_do() {
+    for e in library() {
+        let f = e.facts();
+        assert!(!f.fixed || (f.columns == 1 && f.entry != Entry::Torque), "{}", f.name);
+        assert!(f.says.len() > 20 && f.equation.len() > 5 && f.experiment.len() > 20, "{}", f.name);
+    }
+}
