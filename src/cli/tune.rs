@@ -4,7 +4,7 @@ use super::arguments::{ModelArguments, TuneArguments};
 use super::proof::{self, On, Proof};
 use super::slot::{self, Slot};
 use super::{Ending, Failure, Screen, limit, load, physics, tune_machines};
-use crate::document::{read_text, sha256_hex, write_text};
+use crate::document::{check_target, read_text, sha256_hex, write_text};
 use crate::feedback::Amplitudes;
 use crate::frf::Sweep;
 use crate::identify::{self, Identified, IdentifySettings, identify};
@@ -93,6 +93,7 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     if let (Some(machines), Some(gate)) = (&a.machines, &a.gate) {
         return tune_machines::run(a, machines, gate, screen);
     }
+    [Some(&a.out), a.report.as_ref()].into_iter().flatten().try_for_each(|file| check_target(file))?;
     let spec = Spec::read(&a.spec).map_err(crate::tune::TuneError::from)?;
     let spec_sha256 = sha256_hex(read_text(&a.spec)?.as_bytes());
     let start = a.controller.as_ref().map(|file| load::controller(file)).transpose()?;
@@ -103,6 +104,10 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
             let mut plant = load::plant(file)?;
             let clock = start.clone().unwrap_or_else(|| at_clock(a.sample_time_s));
             let physics = physics::restored(file, &plant, &context(&spec.profile, &clock), screen)?;
+            // Looked at before the search: the gap would speak of another plant than the table.
+            if let Some(physics) = physics.as_ref().filter(|_| a.gap) {
+                return Err(Failure::GapOfPhysics { file: file.clone(), effects: physics.names().join(", ") });
+            }
             plant.physics.clear();
             input("plant", sha256_hex(read_text(file)?.as_bytes()));
             Given::Model(Box::new(plant), physics.map(Box::new))

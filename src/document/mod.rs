@@ -10,4 +10,4 @@ mod write;
 
 pub use digest::sha256_hex;
 pub use read::{DocumentError, parse_toml, read_text, read_toml};
-pub use write::{temporary_beside, write_text, write_whole};
+pub use write::{check_target, temporary_beside, write_text, write_whole};

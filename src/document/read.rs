@@ -11,8 +11,11 @@ pub enum DocumentError {
     /// The file system refused.
     #[error("{}: cannot {action}: {source}", file.display())]
     Io { file: PathBuf, action: &'static str, source: std::io::Error },
+    /// Nothing can be written under this name.
+    #[error("{}: {found}; expected the name of a file to write, in a folder that is there or can be made; give another one", file.display())]
+    Target { file: PathBuf, found: String },
     /// The bytes are not UTF-8 text.
-    #[error("{}: byte {offset} is not UTF-8 text; expected a TOML document", file.display())]
+    #[error("{}: byte {offset} is not UTF-8 text; expected a text document", file.display())]
     NotText { file: PathBuf, offset: usize },
     /// The text is not the document expected: a syntax error, a wrong type, a missing or an unknown key.
     #[error("{}:{line}:{column}: {found}", file.display())]

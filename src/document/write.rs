@@ -15,14 +15,30 @@ pub fn temporary_beside(file: &Path) -> PathBuf {
     file.with_file_name(format!(".{name}.{process}.{count}.part"))
 }
 
+/// Refuses a name under which no file can be written: minutes of work should not end there.
+pub fn check_target(file: &Path) -> Result<(), DocumentError> {
+    let fail = |found: String| Err(DocumentError::Target { file: file.into(), found });
+    if file.is_dir() {
+        return fail("is a folder".to_owned());
+    }
+    if file.file_name().is_none() {
+        return fail("names no file".to_owned());
+    }
+    match file.ancestors().skip(1).find(|a| a.exists()) {
+        Some(above) if !above.is_dir() => fail(format!("{} is a file and no folder", above.display())),
+        _ => Ok(()),
+    }
+}
+
 /// Writes `bytes` so that the file is either the old one or the new one, never a part of either.
 pub fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), DocumentError> {
+    check_target(file)?;
     let fail = |action| move |source| DocumentError::Io { file: file.into(), action, source };
     let folder = match file.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),
     };
-    std::fs::create_dir_all(folder).map_err(fail("make the folder of"))?;
+    std::fs::create_dir_all(folder).map_err(fail("make the folder"))?;
     let temporary = temporary_beside(file);
     let written = std::fs::File::create(&temporary)
         .and_then(|mut f| f.write_all(bytes).and_then(|()| f.sync_all()))

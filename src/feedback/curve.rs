@@ -33,8 +33,7 @@ impl ResponseCurve {
         let end = PI / sample_time_s;
         let n = frf.w_rad_s().partition_point(|w| *w < end);
         if n < 2 {
-            let from_hz = frf.w_rad_s()[0] / TAU;
-            return Err(FeedbackError::Band { from_hz, half_rate_hz: end / TAU });
+            return Err(FeedbackError::Band { points: n, half_rate_hz: end / TAU, needed: 2 });
         }
         let w: Vec<f64> = frf.w_rad_s()[..n].to_vec();
         let ln_w: Vec<f64> = w.iter().map(|w| w.ln()).collect();

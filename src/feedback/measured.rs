@@ -65,6 +65,9 @@ pub struct MeasuredMargins {
 /// Two-sided 95 % of a normal, on one part of a complex value whose deviation is given for both parts together.
 const REACH: f64 = 1.96 * std::f64::consts::FRAC_1_SQRT_2;
 
+/// Points that a curve is drawn through at least.
+const NEEDED: usize = 4;
+
 impl<'a> MeasuredLoop<'a> {
     /// `hold_included`: the sweep was taken through the controller's own hold, so it is not applied again.
     ///
@@ -74,9 +77,8 @@ impl<'a> MeasuredLoop<'a> {
         let curve = ResponseCurve::of(frf, t, |w| if hold_included { Complex::new(1.0, 0.0) } else { hold(w * t) })?;
         let (ln_w, ln_p) = (curve.ln_w(), curve.ln_p());
         let n = ln_w.len();
-        if n < 4 {
-            let from_hz = frf.w_rad_s()[0] / TAU;
-            return Err(FeedbackError::Band { from_hz, half_rate_hz: 0.5 / t });
+        if n < NEEDED {
+            return Err(FeedbackError::Band { points: n, half_rate_hz: 0.5 / t, needed: NEEDED });
         }
         let (ln_size, phase): (Vec<f64>, Vec<f64>) = ln_p.iter().map(|p| (p.re, p.im)).unzip();
         let deviation: Vec<f64> = match frf.relative_std() {

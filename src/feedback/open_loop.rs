@@ -33,8 +33,15 @@ pub enum FeedbackError {
     #[error("the poles of the closed loop, order {order}, were not found within {limit} iterations")]
     Poles { order: usize, limit: usize },
     /// The sweep and half the sample rate leave no band to judge.
-    #[error("the sweep starts at {from_hz} Hz, at or above half the sample rate, {half_rate_hz} Hz")]
-    Band { from_hz: f64, half_rate_hz: f64 },
+    #[error(
+        "the sweep has {points} points below half the sample rate, {half_rate_hz} Hz: expected at least {needed}; sweep more points there"
+    )]
+    Band { points: usize, half_rate_hz: f64, needed: usize },
+    /// The sweep ends before a crossing.
+    #[error(
+        "|L| = {found:.3} at {hz:.2} Hz, where the sweep ends: expected below 1; no margin is read before the crossing, so sweep on beyond it, or check the controller's gains"
+    )]
+    Ends { hz: f64, found: f64 },
 }
 
 /// The loop of a sampled plant and the firmware's sections.

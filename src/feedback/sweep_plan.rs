@@ -87,6 +87,10 @@ pub fn sweep_plan(frf: &Frf, sections: &Sections, settings: &PlanSettings) -> Re
         Ok(measured_margins(&MeasuredLoop::new(f, sections, settings.hold_included)?))
     };
     let before = judge(frf)?;
+    // Tones around a peak that only the end of the sweep makes would narrow nothing.
+    if before.end_gain >= 1.0 {
+        return Err(FeedbackError::Ends { hz: before.band_hz.high, found: before.end_gain });
+    }
     let seconds = |hz: f64| settings.settle_s + settings.periods / hz;
     let full_seconds = frf.w_rad_s().iter().map(|w| seconds(w / TAU)).sum();
     let mut now = frf.clone();
@@ -111,7 +115,8 @@ pub fn sweep_plan(frf: &Frf, sections: &Sections, settings: &PlanSettings) -> Re
         (left, now, expected) = (width, next, found);
         tones.push(tone);
     }
-    let spent = tones.iter().map(|t| t.seconds).sum();
+    // A sum of none is -0.
+    let spent = tones.iter().map(|t| t.seconds).fold(0.0, |a, b| a + b);
     Ok(SweepPlan { tones, before, expected, seconds: spent, full_seconds })
 }
 
