@@ -265,3 +265,78 @@ fn physics_of_a_plant_file_is_used_or_refused_by_name() {
     assert_eq!(ran.code, 2);
     assert!(ran.err.contains("odd.toml") && ran.err.contains("gremlins"), "{}", ran.err);
 }
+
+/// Before the search, which takes minutes, not after it.
+#[test]
+fn a_result_that_cannot_be_written_is_refused_before_the_work() {
+    let dir = folder("targets");
+    let file = dir.join("file");
+    std::fs::write(&file, "").unwrap();
+    let below = file.join("x.json").to_str().unwrap().to_owned();
+    let dir = dir.to_str().unwrap();
+    let on = ["--plant", HEALTHY, "--spec", PAPER, "--out"];
+    for command in [&["limit"][..], &["pareto"], &["tune", "--gap"], &["verify", NOMINAL]] {
+        for (out, said) in [(below.as_str(), "a part of this path is a file"), (dir, "expected a file, not a folder")] {
+            let ran = servotune(&[command, &on, &[out]].concat());
+            assert_eq!(ran.code, 2, "{command:?}: {}", ran.err);
+            for word in [out, said, "cannot write"] {
+                assert!(ran.err.contains(word), "{command:?}: `{word}` is missing in: {}", ran.err);
+            }
+            assert!(ran.out.is_empty(), "{}", ran.out);
+        }
+    }
+    let ran = servotune(&["tune", "--plant", HEALTHY, "--spec", PAPER, "--out", "unused.toml", "--report", dir]);
+    assert!(ran.code == 2 && ran.err.contains("expected a file, not a folder"), "{}", ran.err);
+}
+
+#[test]
+fn limit_pareto_and_next_sweep_refuse_what_they_cannot_do() {
+    let dir = folder("counts");
+    let write = |name: &str, text: String| {
+        let file = dir.join(name);
+        std::fs::write(&file, text).unwrap();
+        file.to_str().unwrap().to_owned()
+    };
+    let healthy = std::fs::read_to_string(root(HEALTHY)).unwrap();
+    let metres = write("metres.toml", healthy.replace("position_unit = \"track\"", "position_unit = \"m\""));
+    let dry = write("dry.toml", healthy + "\n[[plant.physics]]\neffect = \"coulomb_friction\"\nlevel_command = 0.02\n");
+    let on = |command: &str, plant: &str, more: &[&str]| {
+        servotune(&[&[command, "--plant", plant, "--spec", PAPER], more].concat())
+    };
+    let next = |more: &[&str]| {
+        let given = ["next-sweep", "--frf", "tests/museum/good.bod", "--controller", NOMINAL];
+        servotune(&[&given, more].concat())
+    };
+    // The first rows of a sweep: too few, and an end before the crossing.
+    let good = std::fs::read_to_string(root("tests/museum/good.bod")).unwrap();
+    let swept = |rows: usize| {
+        let text: String = good.lines().take(rows).map(|l| format!("{l}\n")).collect();
+        let file = write(&format!("{rows}.bod"), text);
+        servotune(&["next-sweep", "--frf", &file, "--controller", NOMINAL, "--phase", "response"])
+    };
+    let out = dir.join("unused.html").to_str().unwrap().to_owned();
+    let long = on("limit", HEALTHY, &["--sample-time-s", "1", "--search", "0", "--rounds", "1", "--alone", "0"]);
+    for (ran, said) in [
+        (on("limit", HEALTHY, &["--rounds", "0"]), vec!["--rounds", "`0`", "at least 1"]),
+        (long, vec!["1 taps", "expected a sample time", "sample_time_s"]),
+        (on("pareto", HEALTHY, &["--out", &out, "--points", "1"]), vec!["--points", "`1`", "at least 2"]),
+        (on("pareto", HEALTHY, &["--out", &out, "--from", "3", "--to", "2"]), vec!["max_sensitivity from = 3", "less"]),
+        (on("pareto", HEALTHY, &["--out", &out, "--plant", &metres]), vec!["metres.toml", "`m`", "expected `track`"]),
+        (on("limit", &dry, &[]), vec!["coulomb_friction", "linear"]),
+        (on("tune", &dry, &["--out", &out, "--gap"]), vec!["dry.toml", "--gap", "linear", "coulomb_friction"]),
+        (next(&["--tones", "0"]), vec!["--tones", "`0`", "at least 1"]),
+        (swept(4), vec!["3 points", "at least 4", "sweep more"]),
+        (swept(12), vec!["|L| = 20", "48.94 Hz", "below 1", "sweep on"]),
+    ] {
+        assert_eq!(ran.code, 2, "{}", ran.err);
+        assert!(ran.out.is_empty(), "{}", ran.out);
+        for word in said {
+            assert!(ran.err.contains(word), "`{word}` is missing in: {}", ran.err);
+        }
+    }
+    assert!(!dir.join("unused.html").exists());
+    // Where no tone is worth its time, that is said.
+    let ran = next(&[]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert!(ran.out.contains("No tone narrows") && !ran.out.contains("-0.00"), "{}", ran.out);
+}

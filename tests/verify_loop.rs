@@ -3,7 +3,7 @@
 
 use servotune::controller::{Controller, Lowpass, Notch, Pid};
 use servotune::feedback::{ModelLoop, closed_loop_poles, margins};
-use servotune::lti::{DiscretePlant, FrequencyResponse, Plant};
+use servotune::lti::{Body, DiscretePlant, FrequencyResponse, Plant};
 use servotune::numeric::random::Random;
 use servotune::twin::plants::random_plant;
 use servotune::twin::{MachineClass, nominal_controller, paper_machine};
@@ -145,4 +145,56 @@ fn a_low_pass_just_below_half_the_rate_is_no_reason_to_refuse() {
             agree(&paper_machine(class).unwrap(), &c, class.name());
         }
     }
+}
+
+/// Without integrators |L| can be 1 at rest, below every cell of the proof.
+#[test]
+fn a_loop_whose_gain_at_rest_is_near_1_is_decided() {
+    let t = 39.6e-6;
+    let mut r = Random::new(19);
+    let mut stable = 0;
+    for (i, at_rest) in
+        [0.99, 1.0, 1.001, 1.01, -0.99, -1.0001, -0.9999, -1.01].into_iter().cycle().take(64).enumerate()
+    {
+        let mut plant = random_plant(&mut r, 4);
+        plant.delay_s *= if i % 3 == 0 { 4.0 } else { 1.0 };
+        if let (Body::SecondOrder { dc_gain, .. }, true) = (&mut plant.body, at_rest < 0.0) {
+            *dc_gain = -*dc_gain;
+        }
+        let hz = r.between(200.0, 900.0);
+        let mut c = Controller {
+            sample_time_s: t,
+            output_limit: None,
+            pid: Pid { kp: 1.0, ki_per_s: 0.0, kd_s: r.between(0.1, 1.0) / (TAU * hz), derivative_filter_s: 12e-6 },
+            lowpass: vec![Lowpass { frequency_hz: 9000.0, damping_ratio: 0.7 }],
+            notch: vec![],
+            feedforward: None,
+        };
+        let sampled = DiscretePlant::of(&plant, t).unwrap();
+        let size = sampled.at(1e-3).re * c.sections().unwrap().at(1e-3).re;
+        c.pid.kp *= at_rest / size;
+        c.pid.kd_s *= at_rest / size;
+        let sections = c.sections().unwrap();
+        let l = ModelLoop::new(&sampled, &sections).unwrap();
+        let outside = closed_loop_poles(&l).unwrap().iter().filter(|z| z.norm() > 1.0).count() as i64;
+        let b = prove_loop(&plant, &sections.chain, t, &Uncertainty::default(), &VerifySettings::default()).unwrap();
+        // Within 2 % of -1 at rest nothing is to be told; a pole leaves the circle there.
+        if at_rest < 0.0 {
+            assert_ne!(b.stability, Stability::Stable, "loop {i}");
+            continue;
+        }
+        assert_eq!(b.unstable_poles, Some(outside), "loop {i}: {b:?}");
+        assert_eq!(b.stability == Stability::Stable, outside == 0, "loop {i}");
+        if outside > 0 {
+            continue;
+        }
+        stable += 1;
+        let m = margins(&l);
+        let low = |b: servotune::verify::Bounded| b.low.unwrap_or(f64::INFINITY) * (1.0 - 1e-7);
+        assert!(m.max_sensitivity <= b.max_sensitivity.high.unwrap() * (1.0 + 1e-7), "loop {i}");
+        assert!(m.phase_margin_deg.is_none_or(|x| x.abs() >= low(b.phase_margin_deg)), "loop {i}: {m:?} {b:?}");
+        assert!(m.delay_margin_s.is_none_or(|x| x >= low(b.delay_margin_s)), "loop {i}: {m:?} {b:?}");
+        assert!(m.gain_margin_db.is_none_or(|x| x.abs() >= low(b.gain_margin_db)), "loop {i}: {m:?} {b:?}");
+    }
+    assert!(stable >= 10, "{stable} stable loops");
 }

@@ -141,3 +141,45 @@ fn a_table_tuned_on_a_sweep_says_what_the_sweep_does_not_prove() {
     assert!(says.contains("position units") && !says.contains("position_unit"), "{says}");
     std::fs::remove_dir_all(dir).unwrap();
 }
+
+#[test]
+fn what_is_wrong_is_named_with_its_file() {
+    let dir = folder("odd");
+    let gains = std::fs::read_to_string(dir.join("gains.toml")).unwrap();
+    let spec = std::fs::read_to_string(dir.join("spec.toml")).unwrap();
+    let changed = |text: &str, key: &str, value: &str| {
+        let line = text.lines().find(|l| l.starts_with(key)).unwrap();
+        text.replacen(line, &format!("{key} = {value}"), 1)
+    };
+    std::fs::write(dir.join("words.json"), "no certificate").unwrap();
+    let good = "tests/museum/good.bod";
+    let short: String = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(good)).unwrap();
+    let short: String = short.lines().take(6).map(|l| format!("{l}\n")).collect();
+    std::fs::write(dir.join("short.bod"), short).unwrap();
+    for (file, text, more, said) in [
+        (
+            "spec.toml",
+            changed(&spec, "max_sensitivity", "0.9"),
+            &[][..],
+            vec!["spec.toml: margins.max_sensitivity = 0.9", "expected"],
+        ),
+        ("gains.toml", changed(&gains, "kp", "nan"), &[], vec!["gains.toml: pid.kp = NaN", "expected"]),
+        ("gains.toml", changed(&gains, "b0", "inf"), &[], vec!["gains.toml: [[section]] 0", "inf", "expected"]),
+        ("spec.toml", spec.clone(), &["--certificate", "words.json"], vec!["words.json", "expected a certificate"]),
+        (
+            "spec.toml",
+            spec.clone(),
+            &["--frf", "short.bod", "--phase", "response"],
+            vec!["sweep 1: 5 points", "at least", "sweep more"],
+        ),
+    ] {
+        let old = std::fs::read_to_string(dir.join(file)).unwrap();
+        std::fs::write(dir.join(file), text).unwrap();
+        let (code, answer) = verify(&dir, more);
+        assert_eq!(code, 2, "{said:?}: {answer}");
+        for word in &said {
+            assert!(answer.contains(word), "`{word}` is missing in: {answer}");
+        }
+        std::fs::write(dir.join(file), old).unwrap();
+    }
+}

@@ -245,7 +245,7 @@ pub(super) struct TuneArguments {
     #[arg(long, value_name = "SHARES", value_parser = uncertainty, conflicts_with_all = ["no_certificate", "machines"])]
     pub uncertainty: Option<Uncertainty>,
     /// Say how far the table is from the best in its structure and from the best of all loops, and write it beside the table
-    /// (gains.limit.json); takes about a minute. Of a sweep, on the model identified from it
+    /// (gains.limit.json); takes a few minutes. Of a sweep, on the model identified from it
     #[arg(long, conflicts_with = "machines")]
     pub gap: bool,
     /// Sample time where no start controller gives one (s)

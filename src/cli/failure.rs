@@ -57,6 +57,13 @@ pub enum Failure {
     Limit(#[from] LimitError),
     #[error(transparent)]
     GainTable(#[from] GainTableError),
+    #[error(
+        "{}: position_unit is `{found}`; expected `{expected}` as in the first plant; give all plants in one unit",
+        file.display()
+    )]
+    Unit { file: PathBuf, found: String, expected: String },
+    #[error("--gap speaks of linear plants; found [[plant.physics]] with {effects} in {}; leave --gap out, or remove them", file.display())]
+    GapOfPhysics { file: PathBuf, effects: String },
     #[error("no machine: expected --plant PLANT, --frf FRF or --machines DIR with --gate GATE")]
     NoMachine,
     #[error("--override {id}: no such machine in {}; found {found}", folder.display())]

@@ -3,7 +3,7 @@
 use super::limit_arguments::LimitArguments;
 use super::{Ending, Failure, Screen, load};
 use crate::controller::Controller;
-use crate::document::write_text;
+use crate::document::{check_target, write_text};
 use crate::lti::Plant;
 use crate::report::limit::{limit_sentences, limit_table};
 use crate::tune::{
@@ -102,7 +102,7 @@ pub(super) fn beside(
 ) -> Result<Gap, Failure> {
     let t = controller.sample_time_s;
     let seen = LimitPlant::of_model(plant, t).map_err(LimitError::from)?;
-    screen.say("how far from the best possible: bound and search, about a minute");
+    screen.say("how far from the best possible: bounds and search, a few minutes");
     let settings = LimitSettings { alone: 0, ..LimitSettings::default() };
     let bound = limit(&seen, t, controller.feedforward.as_ref(), spec, &settings)?;
     let own = standing(&seen, controller, spec)?;
@@ -115,6 +115,7 @@ pub(super) fn beside(
 }
 
 pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    a.out.as_deref().map_or(Ok(()), check_target)?;
     let plant = load::plant(&a.plant)?;
     if let Some(p) = plant.physics.first() {
         return Err(LimitError::Physics { effect: p.effect.clone() }.into());

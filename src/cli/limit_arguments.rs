@@ -33,7 +33,7 @@ pub(super) struct LimitArguments {
     #[arg(long, value_name = "SUM", default_value_t = 0.05, value_parser = not_negative)]
     pub tail: f64,
     /// Rounds of cuts at most; every round's bound is one
-    #[arg(long, value_name = "N", default_value_t = 12)]
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = at_least_one)]
     pub rounds: usize,
     /// Rounds for each band alone; 0 leaves these two bounds out
     #[arg(long, value_name = "N", default_value_t = 4)]
@@ -64,7 +64,7 @@ pub(super) struct ParetoArguments {
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Points of the front
-    #[arg(long, value_name = "N", default_value_t = 12)]
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = at_least_two)]
     pub points: usize,
     /// Smallest Ms tried (ratio)
     #[arg(long, value_name = "MS", default_value_t = 1.3)]
@@ -119,7 +119,7 @@ pub(super) struct NextSweepArguments {
     #[arg(long)]
     pub hold_included: bool,
     /// Tones at most
-    #[arg(long, value_name = "N", default_value_t = 6)]
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = at_least_one)]
     pub tones: usize,
     /// Amplitude of the sweep that is there (command unit)
     #[arg(long, value_name = "AMPLITUDE", default_value_t = 0.1, value_parser = positive)]
@@ -157,4 +157,17 @@ fn not_negative(text: &str) -> Result<f64, String> {
 
 fn share(text: &str) -> Result<f64, String> {
     number(text, |x| 0.0 < x && x < 1.0, "a share between 0 and 1, such as 0.9")
+}
+
+fn count(text: &str, least: usize) -> Result<usize, String> {
+    let wrong = || format!("found `{text}`; expected a whole number of at least {least}");
+    text.parse::<usize>().ok().filter(|n| *n >= least).ok_or_else(wrong)
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    count(text, 1)
+}
+
+fn at_least_two(text: &str) -> Result<usize, String> {
+    count(text, 2)
 }

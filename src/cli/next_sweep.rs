@@ -20,8 +20,10 @@ pub(super) fn run(a: &NextSweepArguments, screen: &mut Screen) -> Result<Ending,
         hold_included: a.hold_included,
     };
     let plan = sweep_plan(&sweep.frf, &sections, &settings)?;
+    let none = "No tone narrows the intervals by 1 % of their mean width: none is planned.\n";
     let text = format!(
-        "{}\n{}\n{:.2} s of machine time; every point again would take {:.2} s.\n",
+        "{}{}\n{}\n{:.2} s of machine time; every point again would take {:.2} s.\n",
+        if plan.tones.is_empty() { none } else { "" },
         tones_table(&plan, "command unit")?.text(),
         narrowing_table(&plan)?.text(),
         plan.seconds,

@@ -2,7 +2,7 @@
 
 use super::limit_arguments::ParetoArguments;
 use super::{Ending, Failure, Screen, load, slot};
-use crate::document::{read_text, sha256_hex, write_text};
+use crate::document::{check_target, read_text, sha256_hex, write_text};
 use crate::report::pareto::{pareto_page, pareto_table};
 use crate::tune::{Machine, ParetoPoint, ParetoSettings, Spec, TuneError, TuneSettings, judge, pareto};
 use serde::Serialize;
@@ -15,14 +15,23 @@ struct Document<'a> {
 }
 
 pub(super) fn run(a: &ParetoArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    check_target(&a.out)?;
     let plants = a.plant.iter().map(|file| load::plant(file)).collect::<Result<Vec<_>, _>>()?;
+    let unit = slot::units(&plants[0]).position;
+    // Norms in other units cannot be compared.
+    for (file, plant) in a.plant.iter().zip(&plants) {
+        let found = slot::units(plant).position;
+        if found != unit {
+            let (file, found, expected) = (file.clone(), found.to_owned(), unit.to_owned());
+            return Err(Failure::Unit { file, found, expected });
+        }
+    }
     let machines: Vec<Machine<'_>> = plants.iter().map(Machine::Model).collect();
     let spec = Spec::read(&a.spec).map_err(TuneError::from)?;
     let start = a.controller.as_ref().map(|file| load::controller(file)).transpose()?;
     let settings = TuneSettings { sample_time_s: a.sample_time_s, ..TuneSettings::default() };
     let front = ParetoSettings { max_sensitivity: [a.from, a.to], points: a.points };
     let points = pareto(&machines, &spec, start.as_ref(), &settings, &front)?;
-    let unit = slot::units(&plants[0]).position;
     let document = Document { schema: "servotune.pareto/1", machines: plants.len(), points: &points };
     if a.out.extension().is_some_and(|e| e == "json") {
         let text = serde_json::to_string_pretty(&document).map_err(|source| Failure::Json { source })?;

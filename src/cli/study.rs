@@ -34,7 +34,7 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::Polish => study::polishes(&a.data, &mut |words| screen.say(words))?,
         StudyName::Ladder => study::ladder()?,
         StudyName::Line => study::line_study()?,
-        StudyName::Limits => study::limits(&a.data)?,
+        StudyName::Limits => study::limits(&a.data, &mut |words| screen.say(words))?,
         StudyName::Prediction => study::prediction()?,
         StudyName::Plants => study::plants()?,
         StudyName::Mirror => study::mirror(&a.data)?,

@@ -107,6 +107,10 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
             let mut plant = load::plant(file)?;
             let clock = start.clone().unwrap_or_else(|| at_clock(a.sample_time_s));
             let physics = physics::restored(file, &plant, &context(&spec.profile, &clock), screen)?;
+            // Looked at before the search: the gap would speak of another plant than the table.
+            if let Some(physics) = physics.as_ref().filter(|_| a.gap) {
+                return Err(Failure::GapOfPhysics { file: file.clone(), effects: physics.names().join(", ") });
+            }
             plant.physics.clear();
             input("plant", sha256_hex(read_text(file)?.as_bytes()));
             Given::Model(Box::new(plant), physics.map(Box::new))

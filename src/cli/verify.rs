@@ -2,7 +2,7 @@
 
 use super::verify_arguments::VerifyArguments;
 use super::{Ending, Failure, Screen, load};
-use crate::document::{read_text, write_text};
+use crate::document::{check_target, read_text, write_text};
 use crate::frf::Sweep;
 use crate::report::certificate::certificate_text;
 use crate::tune::Spec;
@@ -15,6 +15,7 @@ pub(super) fn beside(gains: &Path) -> PathBuf {
 }
 
 pub(super) fn run(a: &VerifyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    a.out.as_deref().map_or(Ok(()), check_target)?;
     let old = match &a.certificate {
         Some(file) => Some(file.clone()),
         None => Some(beside(&a.gains)).filter(|f| f.exists() && a.out.as_ref() != Some(f)),

@@ -3,6 +3,7 @@
 use super::hdd::{RATE_HZ, benchmark};
 use super::{Study, StudyError};
 use crate::controller::Controller;
+use crate::lti::Plant;
 use crate::report::number::NumberFormat;
 use crate::report::table::{Column, Table};
 use crate::tune::{
@@ -17,6 +18,8 @@ use std::path::Path;
 const WIDE: usize = 60;
 /// Rounds of each bound: later ones raise it by less than a percent.
 const ROUNDS: usize = 8;
+/// Boxes of the bound of the structure for the nine cases: of thirteen numbers without noise only small boxes have a bound.
+const FEW: usize = 6_000;
 
 /// One machine, tuned and bounded.
 struct Case {
@@ -32,60 +35,91 @@ struct Case {
     alone: GainsBound,
 }
 
-/// Makes the study; `data` holds the published parameters of the benchmark plant.
-pub fn limits(data: &Path) -> Result<Study, StudyError> {
-    let classes: Vec<Case> = MachineClass::ALL.into_par_iter().map(class).collect::<Result<_, StudyError>>()?;
+/// One machine as the study takes it.
+struct Subject<'a> {
+    name: String,
+    machine: Machine<'a>,
+    seen: LimitPlant,
+    spec: Spec,
+    start: Option<Controller>,
+    sample_time_s: f64,
+    /// Boxes of the bound of the structure, at most.
+    boxes: usize,
+}
+
+/// Makes the study; `data` holds the published parameters of the benchmark plant, `say` hears how far it is.
+pub fn limits(data: &Path, say: &mut dyn FnMut(&str)) -> Result<Study, StudyError> {
+    let plants = MachineClass::ALL.into_iter().map(paper_machine).collect::<Result<Vec<_>, _>>()?;
+    let four =
+        MachineClass::ALL.into_iter().zip(&plants).map(|(c, plant)| class(c, plant)).collect::<Result<_, _>>()?;
     let spec = Spec::parse(include_str!("specs/hdd.toml"), include_str!("specs/hdd_limit_profile.toml"))?;
     let nine = benchmark(data)?;
-    let nine: Vec<Case> = nine
-        .into_par_iter()
-        .map(|(name, frf, pulse)| {
-            let machine = Machine::Response { frf: &frf, hold: Hold::Included, continuation: None };
-            let seen = LimitPlant::Pulse { response: pulse, integrators: 2 };
-            case(name, &machine, &seen, &spec, None, 1.0 / RATE_HZ)
+    let nine: Vec<Subject<'_>> = nine
+        .iter()
+        .map(|(name, frf, pulse)| Subject {
+            name: name.clone(),
+            machine: Machine::Response { frf, hold: Hold::Included, continuation: None },
+            seen: LimitPlant::Pulse { response: pulse.clone(), integrators: 2 },
+            spec: spec.clone(),
+            start: None,
+            sample_time_s: 1.0 / RATE_HZ,
+            boxes: FEW,
         })
-        .collect::<Result<_, StudyError>>()?;
+        .collect();
+    let classes = cases(four, say)?;
+    let nine = cases(nine, say)?;
     let mut study = Study::default();
     study.page("limit.md", page(&classes, &nine)?);
     Ok(study)
 }
 
-fn class(class: MachineClass) -> Result<Case, StudyError> {
+fn class(class: MachineClass, plant: &Plant) -> Result<Subject<'_>, StudyError> {
     let mut spec =
         Spec::parse(include_str!("../../specs/limits/paper.toml"), include_str!("../../specs/profiles/spiral.toml"))?;
     spec.profile = paper_profile(class)?;
-    let plant = paper_machine(class)?;
     let start = nominal_controller()?;
-    let seen = LimitPlant::of_model(&plant, start.sample_time_s)?;
-    case(class.name().to_owned(), &Machine::Model(&plant), &seen, &spec, Some(&start), start.sample_time_s)
+    let sample_time_s = start.sample_time_s;
+    let seen = LimitPlant::of_model(plant, sample_time_s)?;
+    let name = class.name().to_owned();
+    let boxes = StructureSettings::default().boxes;
+    Ok(Subject { name, machine: Machine::Model(plant), seen, spec, start: Some(start), sample_time_s, boxes })
 }
 
-fn case(
-    name: String,
-    machine: &Machine<'_>,
-    seen: &LimitPlant,
-    spec: &Spec,
-    start: Option<&Controller>,
-    sample_time_s: f64,
-) -> Result<Case, StudyError> {
+/// Each machine in turn: what is made of it uses all threads but for the bound of all loops, of which as many run at once as there are threads.
+fn cases(subjects: Vec<Subject<'_>>, say: &mut dyn FnMut(&str)) -> Result<Vec<Case>, StudyError> {
+    let mut limits = Vec::new();
+    for some in subjects.chunks(rayon::current_num_threads().max(1)) {
+        let found: Vec<Limit> = some.par_iter().map(all_loops).collect::<Result<_, StudyError>>()?;
+        some.iter().for_each(|s| say(&format!("{}: bound of all loops", s.name)));
+        limits.extend(found);
+    }
+    subjects.into_iter().zip(limits).map(|(s, limit)| case(s, limit, say)).collect()
+}
+
+fn all_loops(s: &Subject<'_>) -> Result<Limit, StudyError> {
+    let settings = LimitSettings { rounds: ROUNDS, alone: 0, ..LimitSettings::default() };
+    Ok(limit(&s.seen, s.sample_time_s, None, &s.spec, &settings)?)
+}
+
+fn case(s: Subject<'_>, limit: Limit, say: &mut dyn FnMut(&str)) -> Result<Case, StudyError> {
+    let Subject { name, machine, seen, spec, start, sample_time_s, boxes } = s;
+    let start = start.as_ref();
     let settings = TuneSettings { sample_time_s, ..TuneSettings::default() };
-    let ordinary = tune(machine, spec, start, &settings)?;
+    let ordinary = tune(&machine, &spec, start, &settings)?;
+    say(&format!("{name}: tuned"));
     let mut other = spec.clone();
     other.search.seed += 1;
-    let wide = tune(machine, &other, start, &TuneSettings { starts: WIDE, ..settings })?;
-    let tuned = standing(seen, ordinary.controller(), spec)?;
-    let found = standing(seen, wide.controller(), spec)?;
+    let wide = tune(&machine, &other, start, &TuneSettings { starts: WIDE, ..settings })?;
+    say(&format!("{name}: tuned from {WIDE} starts"));
+    let tuned = standing(&seen, ordinary.controller(), &spec)?;
+    let found = standing(&seen, wide.controller(), &spec)?;
     let met = matches!(ordinary, Outcome::Tuned(_));
     let better = matches!(wide, Outcome::Tuned(_)) && found.figures.objective < tuned.figures.objective;
-    let limit = limit(
-        seen,
-        sample_time_s,
-        None,
-        spec,
-        &LimitSettings { rounds: ROUNDS, alone: 0, ..LimitSettings::default() },
-    )?;
-    let alone = gains_bound(machine, ordinary.controller(), spec, &GainsSettings::default())?;
-    let structure = structure_bound(machine, ordinary.controller(), spec, &StructureSettings::default())?;
+    let alone = gains_bound(&machine, ordinary.controller(), &spec, &GainsSettings::default())?;
+    say(&format!("{name}: bound of the gains, {} boxes", alone.boxes));
+    let settings = StructureSettings { boxes, ..StructureSettings::default() };
+    let structure = structure_bound(&machine, ordinary.controller(), &spec, &settings)?;
+    say(&format!("{name}: bound of the structure, {} boxes", structure.boxes));
     Ok(Case { name, met, tuned, best: if better { found } else { tuned }, limit, structure, alone })
 }
 
@@ -161,7 +195,7 @@ fn page(classes: &[Case], nine: &[Case]) -> Result<String, StudyError> {
          What falls short. The bound of all loops leaves phase and gain margin out, because they are not convex, and looks at a grid of frequencies. The nine cases \
          have no noise and are judged on one move: a loop of some hundred taps can then cancel the window's bins nearly one by one, which no PID with notches can, so \
          that their bound is true and far away. It speaks of loops whose gain crossings all lie inside the spec's range. The bound of the structure is true and not tight: seven numbers \
-         in {boxes} boxes are a few pieces a number, and what a wide box could do at one frequency and what at another need not go together. Without noise only small boxes have a \
+         in {boxes} boxes (the nine cases: {FEW}) are a few pieces a number, and what a wide box could do at one frequency and what at another need not go together. Without noise only small boxes have a \
          bound at all, and thirteen numbers hardly come down to such: where it is 0, what remains is the bound of all loops and the searches from many starts.\n",
         table("Four machine classes", classes)?.text(),
         table("HDD benchmark plant, nine cases", nine)?.text(),

@@ -59,6 +59,10 @@ pub fn pareto(
             return Err(TuneError::Setting { key, found, expected: "a finite ratio above 1" });
         }
     }
+    if from >= to {
+        let expected = "less than max_sensitivity to: the front goes from the small Ms to the large one";
+        return Err(TuneError::Setting { key: "max_sensitivity from", found: from, expected });
+    }
     let count = front.points.max(2);
     let mut all = Vec::with_capacity(count);
     let mut last: Option<Controller> = start.cloned();

@@ -74,7 +74,7 @@ pub enum TuneError {
     Response(#[from] FrfShapeError),
     /// The sweep is too short for a search.
     #[error(
-        "the response has {points} points below half the sample rate, {half_rate_hz} Hz: expected at least {needed}"
+        "the response has {points} points below half the sample rate, {half_rate_hz} Hz: expected at least {needed}; sweep more points there"
     )]
     Sweep { points: usize, half_rate_hz: f64, needed: usize },
     /// The bounds leave nothing to search.

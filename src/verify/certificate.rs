@@ -8,7 +8,7 @@ use super::{SweepAgain, SweepAssumption, Uncertainty, VerifyError, VerifySetting
 use crate::document::{parse_toml, read_text, sha256_hex};
 use crate::frf::Sweep;
 use crate::lti::{Plant, PlantFile};
-use crate::tune::{GainTable, Requirement, Side, Spec, What};
+use crate::tune::{GainTable, Requirement, Side, Spec, SpecError, What};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -156,8 +156,13 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
     // The table's own reader would refuse what is to be reported here.
     let table: GainTable = parse_toml(&i.gains.file, &i.gains.text).map_err(|e| e.expecting(GainTable::EXPECTED))?;
     let c = table.controller();
-    c.check().map_err(crate::tune::GainTableError::from)?;
-    let spec = Spec::parse(&i.spec.text, &i.profile.text)?;
+    let in_table = |source: VerifyError| source.of(&i.gains.file);
+    c.check().map_err(|e| in_table(crate::tune::GainTableError::from(e).into()))?;
+    let spec = Spec::parse(&i.spec.text, &i.profile.text).map_err(|e| match e {
+        SpecError::Document(_) => e.into(),
+        SpecError::Profile(_) => VerifyError::from(e).of(&i.profile.file),
+        _ => VerifyError::from(e).of(&i.spec.file),
+    })?;
     let spec_sha256 = i.spec.sha256();
     let mut findings = table::sections(&c, table.sections());
     let held = i.word.hold(table.sections())?;
@@ -176,7 +181,7 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
         if let Some(p) = plant.physics.first() {
             return Err(VerifyError::Physics { file: file.clone(), effect: p.effect.clone() });
         }
-        let bounds = prove_loop(&plant, &held, t, &i.uncertainty, settings)?;
+        let bounds = prove_loop(&plant, &held, t, &i.uncertainty, settings).map_err(in_table)?;
         let figures = write(&plant, &held, &c, &spec.profile);
         // The table states figures of its own coefficients on the plant as it stands.
         unfit.push(if plain {
@@ -204,8 +209,11 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
     }
     // Without a limit on Ms, a hidden mode that brings L this near to -1 is one to look for.
     let away = 1.0 / spec.margins.max_sensitivity.unwrap_or(MS_UNSAID);
-    for sweep in i.sweeps {
-        let prove = |sections, u| prove_sweep(&sweep.frf, sections, t, i.assumption, u, away, settings);
+    for (number, sweep) in i.sweeps.iter().enumerate() {
+        let prove = |sections, u| {
+            let of_sweep = |source| VerifyError::Sweep { number: number + 1, source: Box::new(source) };
+            prove_sweep(&sweep.frf, sections, t, i.assumption, u, away, settings).map_err(of_sweep)
+        };
         let (bounds, sweep_again) = prove(&held[..], &i.uncertainty)?;
         let of_table = if plain { bounds.clone() } else { prove(table.sections(), &none)?.0 };
         unfit.push(table::figures(&table.after, &of_table, None));

@@ -3,7 +3,7 @@
 use crate::document::DocumentError;
 use crate::lti::LtiError;
 use crate::tune::{GainTableError, SpecError};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Every way a proof can end before it begins.
@@ -20,11 +20,17 @@ pub enum VerifyError {
     Plant(#[from] LtiError),
     #[error("{}: {source}", file.display())]
     PlantFile { file: PathBuf, source: LtiError },
+    /// What is wrong stands in this file.
+    #[error("{}: {source}", file.display())]
+    File { file: PathBuf, source: Box<VerifyError> },
+    /// What is wrong stands in this sweep.
+    #[error("sweep {number}: {source}")]
+    Sweep { number: usize, source: Box<VerifyError> },
     /// A plant beyond linear.
     #[error("{}: [[plant.physics]] {effect}: bounds are proved of linear plants; give an equivalent linear plant for each amplitude", file.display())]
     Physics { file: PathBuf, effect: String },
     /// A certificate that is no JSON, or none of ours.
-    #[error("{}: no certificate: {source}", file.display())]
+    #[error("{}: {source}; expected a certificate, as `servotune verify --out` writes it", file.display())]
     CertificateText { file: PathBuf, source: serde_json::Error },
     /// The certificate cannot be put into text.
     #[error("the certificate cannot be written as JSON: {0}")]
@@ -53,7 +59,7 @@ pub enum VerifyError {
     )]
     Overflow { section: usize, key: &'static str, found: f64, bits: u32, fraction: u32, largest: f64 },
     /// A sweep of too few points.
-    #[error("the sweep has {found} points below half the sample rate: expected at least {expected}")]
+    #[error("{found} points below half the sample rate: expected at least {expected}; sweep more points there")]
     Points { found: usize, expected: usize },
     /// A sweep that ends where crossings may lie.
     #[error(
@@ -71,4 +77,11 @@ pub enum VerifyError {
     /// A share of uncertainty that is none.
     #[error("uncertainty of {key} = {found}: expected at least 0 and below 1")]
     Uncertainty { key: &'static str, found: f64 },
+}
+
+impl VerifyError {
+    /// The same with the file that it speaks of.
+    pub(super) fn of(self, file: &Path) -> VerifyError {
+        VerifyError::File { file: file.into(), source: Box::new(self) }
+    }
 }

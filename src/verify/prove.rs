@@ -128,9 +128,7 @@ impl Tally {
                 let still = Patch { half: Complex::new(0.0, 0.0), radius: p.radius + 0.02 * p.centre.norm(), ..*p };
                 t.modulus.take(still.distance(), start.angle);
                 t.balance.take(still.balance(), start.angle);
-                if still.size().holds(1.0) {
-                    t.open = true;
-                }
+                t.below(&still, start.angle);
             } else {
                 t.modulus
                     .take(if start.integrators == 1 && start.positive { 0.99 } else { size.low - 1.0 }, start.angle);
@@ -140,6 +138,25 @@ impl Tally {
             }
         }
         t
+    }
+
+    /// A loop without integrators below the first cell: a crossing may hide there.
+    fn below(&mut self, still: &Patch, angle: f64) {
+        let size = still.size();
+        let turn = still.angle().unwrap_or(Range { low: -PI, high: PI });
+        if size.holds(1.0) {
+            let value = Range { low: least_turn(turn), high: if turn.width() < PI { largest_turn(turn) } else { PI } };
+            self.phase.take(value.low, angle);
+            self.delay.take(least_lag(turn) / angle, angle);
+            self.gain_crossings.inside(Range { low: 0.0, high: angle }, value, false);
+        }
+        // At rest L is real: a negative one limits the gain there.
+        if least_turn(turn) == 0.0 {
+            let ln = Range { low: size.low.max(f64::MIN_POSITIVE).ln(), high: size.high.ln() };
+            self.gain.take(if ln.holds(0.0) { 0.0 } else { ln.low.abs().min(ln.high.abs()) }, angle);
+        }
+        self.touched |= still.distance() <= 0.0;
+        self.open |= still.clear() <= 0.0;
     }
 
     /// What the nominal loop surely has at the middle of a cell: no bound of the set can be better than this.

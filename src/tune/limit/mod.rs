@@ -66,7 +66,7 @@ pub enum LimitError {
     Physics { effect: String },
     /// The solver gave up in the first round.
     #[error(
-        "the convex programme of {taps} taps was not solved: the plant's gain or the noise is many orders away from the write's size"
+        "the convex programme of {taps} taps (controller samples of the write) was not solved; expected a sample time far below the write's duration, and a plant's gain and noise within some orders of its size; look at sample_time_s, and at the units of plant and profile"
     )]
     NotSolved { taps: usize },
 }
