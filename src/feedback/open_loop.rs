@@ -37,12 +37,12 @@ pub enum FeedbackError {
     Band { from_hz: f64, half_rate_hz: f64 },
     /// Noise and interpolation cannot be told from so few points.
     #[error(
-        "{found} points of the sweep lie below half the sample rate, {half_rate_hz} Hz; expected at least {expected}"
+        "{found} points of the sweep lie below half the sample rate, {half_rate_hz} Hz; expected at least {expected}: sweep more points there"
     )]
     FewPoints { found: usize, half_rate_hz: f64, expected: usize },
     /// The loop gain has not fallen below 1 where the sweep ends: what comes after it decides on stability.
     #[error(
-        "the sweep ends at {end_hz:.4} Hz, where |L| is still {gain:.4}; expected an end below 1, or stability cannot be judged: sweep to higher frequencies"
+        "the sweep ends at {end_hz:.4} Hz, where |L| = {gain:.4}; expected |L| below 1 there, or stability cannot be judged: sweep on to higher frequencies, or check the units of the gains"
     )]
     OpenEnd { end_hz: f64, gain: f64 },
 }

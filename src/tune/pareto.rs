@@ -65,18 +65,28 @@ pub fn pareto(
     }
     let count = front.points.max(2);
     let mut all = Vec::with_capacity(count);
-    let mut last: Option<Controller> = start.cloned();
+    let mut last: Option<Controller> = None;
     for i in (0..count).rev() {
         let allowed = from * (to / from).powf(i as f64 / (count - 1) as f64);
         let mut asked = spec.clone();
         asked.margins.max_sensitivity = Some(allowed);
         // The DFT limits only weigh here: a front that stopped at them would hide what lies beyond.
-        let outcome = tune_jointly(machines, &asked, last.as_ref(), settings)?;
-        let feasible = matches!(outcome, Outcome::Tuned(_));
-        all.push(point(allowed, feasible, &outcome, spec));
-        if feasible {
-            last = Some(outcome.controller().clone());
+        let tuned = |from: Option<&Controller>| -> Result<ParetoPoint, TuneError> {
+            let outcome = tune_jointly(machines, &asked, from, settings)?;
+            Ok(point(allowed, matches!(outcome, Outcome::Tuned(_)), &outcome, spec))
+        };
+        // A search from good gains looks near them only.
+        let mut best = tuned(start)?;
+        if let Some(before) = &last {
+            let other = tuned(Some(before))?;
+            if (other.feasible, -other.objective) > (best.feasible, -best.objective) {
+                best = other;
+            }
         }
+        if best.feasible {
+            last = Some(best.controller.clone());
+        }
+        all.push(best);
     }
     all.reverse();
     for i in 0..all.len() {
