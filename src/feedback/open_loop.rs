@@ -42,7 +42,7 @@ pub enum FeedbackError {
     FewPoints { found: usize, half_rate_hz: f64, expected: usize },
     /// The loop gain has not fallen below 1 where the sweep ends: what comes after it decides on stability.
     #[error(
-        "the sweep ends at {end_hz:.4} Hz, where |L| = {gain:.4}; expected |L| below 1 there, or stability cannot be judged: sweep on to higher frequencies, or check the units of the gains"
+        "the sweep ends at {end_hz:.2} Hz, where |L| = {gain:.4}; expected |L| below 1 there, or stability cannot be judged: sweep on to higher frequencies, or check the units of the gains"
     )]
     OpenEnd { end_hz: f64, gain: f64 },
 }
