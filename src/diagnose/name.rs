@@ -205,6 +205,7 @@ fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String
     // A number that nothing free enters tells which form or which mode: it is exact.
     let mut nudged = chosen.setting.clone();
     nudged.strengths.iter_mut().take(strengths_of(chosen)).for_each(|s| *s *= NUDGE);
+    let by_strength = effect.parameters(&nudged, scene);
     nudged.inner.iter_mut().zip(&chosen.continuous).filter(|(_, free)| **free).for_each(|(v, _)| *v *= NUDGE);
     let nudged = effect.parameters(&nudged, scene);
     let (position, command) = (&bench.form.given.position_unit, &bench.form.given.command_unit);
@@ -216,9 +217,12 @@ fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String
             let exact = nudged.get(k).is_none_or(|q| q.value == p.value);
             let form = if exact { 0.0 } else { effect.form(&chosen.setting, p.name) * p.value };
             let off = off.sqrt().hypot(form);
+            // Inner numbers are above 0: lengths, times, frequencies, damping.
+            let inner = by_strength.get(k).is_some_and(|q| q.value == p.value);
+            let least = if inner && p.value > 0.0 { 0.0 } else { f64::NEG_INFINITY };
             let e = Estimate {
                 value: p.value,
-                low: p.value - off,
+                low: (p.value - off).max(least),
                 high: p.value + off,
                 unit: p.unit.text(position, command),
             };
