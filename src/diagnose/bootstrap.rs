@@ -1,12 +1,14 @@
 //! How often the search finds something where nothing is: the whole first search on records made from the linear refit and its noise.
 //!
-//! In: the bench as it stood before the search, and the linear refit. Each draw simulates every mean record from the refit, adds
+//! In: the bench as it stood before the search, and the linear refit. Each draw simulates every mean record by the refitted plant, adds
 //! coloured noise of the measured levels, refits the linear parameters, smooths the motion anew and scans the whole library. The
 //! statistic is the smallest chance of any candidate, as the search weighs it (parametric bootstrap of a maximum; Davison &
 //! Hinkley 1997, ch. 4). Spec: `specs/mismatch.md`.
 
 use super::bench::Bench;
 use super::fitted::refit_from;
+use super::judge::{Judged, error};
+use super::run::Run;
 use super::select::{Model, strongest};
 use crate::numeric::random::Random;
 use crate::physics::Effect;
@@ -41,7 +43,13 @@ pub(super) fn bootstrap(
     draws: usize,
 ) -> Bootstrap {
     let observed_log_p = strongest(bench, library, baseline);
-    let errors = bench.fit(vec![]).errors(&baseline.refitted.p);
+    // Simulated by the refitted plant itself: what it answers along the recorded motion holds what is wrong with that motion.
+    let refitted = &baseline.refitted.plant;
+    let model =
+        Judged { plant: refitted, effects: Vec::new(), own: Vec::new(), lines: &[], fit: None, scene: &bench.scene };
+    let along = bench.fit(vec![]).errors(&baseline.refitted.p);
+    let simulated = |(run, along): (&Run, Vec<f64>)| error(&model, run, None).unwrap_or(along);
+    let errors: Vec<Vec<f64>> = bench.means.iter().zip(along).map(simulated).collect();
     let one = |draw: usize| {
         let mut random = Random::stream(SEED, draw as u64);
         let mut null = bench.clone();
