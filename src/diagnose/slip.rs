@@ -149,6 +149,9 @@ pub fn slips_of_answer(run: &Run, nuisances: &[Vec<f64>], clock: &[f64], sample_
     while slips.len() < MOST {
         let mut more = slips.clone();
         more.push(log.slip(&slips));
+        if log.squares(&more) >= TAKEN * left {
+            break;
+        }
         // What the first one took for itself is the others' too.
         for _ in 0..ROUNDS {
             let before = more.clone();
@@ -236,11 +239,31 @@ impl Log<'_> {
         let mut each: Vec<((f64, usize), i32)> = (1 - SLIP..SLIP).filter(|d| *d != 0).map(|d| (coarse(d), d)).collect();
         each.sort_by(|a, b| a.0.0.total_cmp(&b.0.0));
         // Between blocks the place is off, and with it the count by a sample or two.
-        let close = each.iter().take(CLOSE).flat_map(|((_, near), lost)| {
-            let around = near.saturating_sub(block).max(SLIP as usize)..(near + block).min(self.n);
-            around.map(|k| (k, *lost))
-        });
-        let left = |slip: Slip| self.squares(&[others, &[slip]].concat());
-        close.map(|s| (left(s), s)).min_by(|a, b| a.0.total_cmp(&b.0)).map_or((self.n / 2, 0), |best| best.1)
+        let close = each.iter().take(CLOSE).map(|((_, near), lost)| self.close(others, *near, block, *lost));
+        close.min_by(|a, b| a.0.total_cmp(&b.0)).map_or((self.n / 2, 0), |best| best.1)
+    }
+
+    /// The place within a block of `near` at which so many lost samples leave the least, and what that is.
+    fn close(&self, others: &[Slip], near: usize, block: usize, lost: i32) -> (f64, Slip) {
+        let around = near.saturating_sub(block).max(SLIP as usize)..(near + block).min(self.n);
+        let spans: Vec<[usize; 2]> = around.clone().map(|k| [k, k + 1]).collect();
+        let each = self.basis.coordinates(&vec![[1.0]; spans.len()], &spans);
+        let first = (around.start, lost);
+        let with = [others, &[first]].concat();
+        let start: Vec<f64> = (0..self.n).map(|k| self.at(k, &with, 0)).collect();
+        let mut sum = self.basis.coordinates(&[&start], &[[0, self.n]]).swap_remove(0);
+        let mut square = dot(&start, &start);
+        let mut best = (f64::INFINITY, first);
+        // From one place to the next a single sample is read otherwise.
+        for (k, unit) in around.zip(&each) {
+            let left = square - dot(&sum, &sum);
+            if left < best.0 {
+                best = (left, (k, lost));
+            }
+            let (before, after) = (self.at(k, others, lost), self.at(k, others, 0));
+            square += after * after - before * before;
+            sum.iter_mut().zip(unit).for_each(|(s, u)| *s += (after - before) * u);
+        }
+        best
     }
 }
