@@ -56,6 +56,12 @@ pub(super) fn text_of(name: &str) -> (&'static str, crate::physics::Port) {
     facts(name).map_or(("something that the model does not hold", crate::physics::Port::Torque), |f| (f.says, f.port))
 }
 
+/// A frequency to three digits, as a person says it.
+fn hertz(value: f64) -> String {
+    let places = (2.0 - value.abs().max(1e-3).log10().floor()).clamp(0.0, 5.0) as usize;
+    format!("{value:.places$}")
+}
+
 pub(super) fn plain(value: f64, unit: &str) -> Estimate {
     Estimate { value, low: value, high: value, unit: unit.into() }
 }
@@ -124,7 +130,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
         family,
         port,
         p_value: log_p.min(0.0).exp().max(1e-300),
-        says: format!("Between {:.3} and {:.3} Hz {says}.", band[0], band[1]),
+        says: format!("Between {} and {} Hz {says}.", hertz(band[0]), hertz(band[1])),
         parameters,
         place,
     })
@@ -246,9 +252,9 @@ pub(super) fn unexplained(bench: &Bench, selection: &Selection, explained: f64) 
         port: crate::physics::Port::Torque,
         p_value: log_tail(model.excess() + model.freedom, model.freedom as usize).min(0.0).exp().max(1e-300),
         says: format!(
-            "Between {:.3} and {:.3} Hz something acts that the library does not hold: its nearest law, {best}, leaves {:.1} % of the error.",
-            band[0],
-            band[1],
+            "Between {} and {} Hz something acts that the library does not hold: its nearest law, {best}, leaves {:.1} % of the error.",
+            hertz(band[0]),
+            hertz(band[1]),
             100.0 * (1.0 - explained)
         ),
         parameters: BTreeMap::new(),
