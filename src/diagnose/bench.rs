@@ -13,6 +13,7 @@ use crate::lti::{Body, LtiError, Plant};
 use crate::numeric::least_squares::Qr;
 use crate::physics::{Entry, Port, Scene};
 use crate::recording::Role;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// The ground of a diagnosis.
@@ -80,12 +81,17 @@ pub(super) fn without_start(
     filter: &dyn Fn(&mut Vec<f64>),
 ) -> Vec<(usize, Vec<f64>)> {
     let mut out = series.to_vec();
+    // Records of one length start in the same motions.
+    let mut starts: BTreeMap<usize, Basis> = BTreeMap::new();
     for (_, e) in &mut out {
-        let mut basis = Basis::default();
-        for mut c in free(e.len()) {
-            filter(&mut c);
-            basis.add_local(0, c);
-        }
+        let basis = starts.entry(e.len()).or_insert_with(|| {
+            let mut basis = Basis::default();
+            for mut c in free(e.len()) {
+                filter(&mut c);
+                basis.add_local(0, c);
+            }
+            basis
+        });
         filter(e);
         basis.project(e);
     }

@@ -9,7 +9,7 @@ use super::refit::{Chosen, Fit};
 use super::scan::log_tail;
 use super::select::{Model, Selection};
 use super::simulated::simulated_with;
-use crate::physics::{Setting, effect};
+use crate::physics::{Parameter, Setting, effect};
 use std::collections::BTreeMap;
 
 /// How a restricted model is fitted.
@@ -120,12 +120,11 @@ impl Lag {
         };
         let off = 1.96 * self.spread;
         let ends = parameters(-off).into_iter().zip(parameters(off));
-        let estimate =
-            |(p, (a, b)): (crate::physics::Parameter, (crate::physics::Parameter, crate::physics::Parameter))| {
-                let unit = p.unit.text(&given.position_unit, &given.command_unit);
-                let e = Estimate { value: p.value, low: a.value.min(b.value), high: a.value.max(b.value), unit };
-                (p.name.to_owned(), e)
-            };
+        let estimate = |(p, (a, b)): (Parameter, (Parameter, Parameter))| {
+            let unit = p.unit.text(&given.position_unit, &given.command_unit);
+            let e = Estimate { value: p.value, low: a.value.min(b.value), high: a.value.max(b.value), unit };
+            (p.name.to_owned(), e)
+        };
         Finding {
             effect: self.name().into(),
             family,
