@@ -71,8 +71,8 @@ pub fn pareto(
         let mut asked = spec.clone();
         asked.margins.max_sensitivity = Some(allowed);
         // The DFT limits only weigh here: a front that stopped at them would hide what lies beyond.
-        let tuned = |from: Option<&Controller>| -> Result<ParetoPoint, TuneError> {
-            let outcome = tune_jointly(machines, &asked, from, settings)?;
+        let tuned = |begin: Option<&Controller>| -> Result<ParetoPoint, TuneError> {
+            let outcome = tune_jointly(machines, &asked, begin, settings)?;
             Ok(point(allowed, matches!(outcome, Outcome::Tuned(_)), &outcome, spec))
         };
         // A search from good gains looks near them only.
