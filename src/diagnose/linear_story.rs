@@ -4,7 +4,7 @@ use super::bench::Bench;
 use super::clock::{Clock, SURE};
 use super::finding::{Diagnosis, Estimate, Finding, Verdict};
 use super::linear::{Knob, LinearForm, body_numbers};
-use super::name::{FAMILY, everywhere, text_of};
+use super::name::{FAMILY, everywhere, family_width, text_of};
 use super::refit::{Chosen, Fit};
 use super::scan::log_tail;
 use super::select::{Model, Selection};
@@ -197,8 +197,10 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
     }
     if d.findings.is_empty() && selection.model.chosen.is_empty() && later_s > 0.0 {
         let lags = Lag::alone(bench, later_s);
+        // Before or behind the arm a lag is the same to the records; how it meets a start is no evidence.
+        let width = lags.first().map_or(0.0, |l| family_width(fixed[0] - l.cost));
         let like: Vec<String> =
-            lags.iter().filter(|l| l.cost < lags[0].cost + FAMILY).map(|l| l.name().to_owned()).collect();
+            lags.iter().filter(|l| l.cost < lags[0].cost + width).map(|l| l.name().to_owned()).collect();
         let sure = |l: &&Lag| fixed[0] - l.cost > SURE && l.cost - selection.model.cost < allowed(1);
         if let Some(lag) = lags.first().filter(sure) {
             d.verdict = if like.len() > 1 { Verdict::Family } else { Verdict::Named };

@@ -78,11 +78,16 @@ fn continuous(grid: &[Vec<f64>]) -> Vec<bool> {
     magnitudes(grid).iter().map(|m| m.len() >= COARSE && m[0] != 0.0).collect()
 }
 
-fn range(grid: &[Vec<f64>]) -> Vec<[f64; 2]> {
-    let over = |i: usize, pick: fn(f64, f64) -> f64, from: f64| grid.iter().map(|p| p[i].abs()).fold(from, pick);
-    let ends = |i: usize| [over(i, f64::min, f64::INFINITY), over(i, f64::max, f64::NEG_INFINITY)];
+/// From the least to the greatest magnitude of each number in a class; where it has one only, among all points of its sign.
+fn range(grid: &[Vec<f64>], class: &[usize]) -> Vec<[f64; 2]> {
+    let ends = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    };
     let wide = |(i, m): (usize, &Vec<f64>)| {
-        let [low, high] = ends(i);
+        let [low, high] = ends(&mut class.iter().map(|&p| grid[p][i].abs()));
+        let alike = |v: &f64| v.is_sign_negative() == grid[class[0]][i].is_sign_negative();
+        let [low, high] =
+            if low < high { [low, high] } else { ends(&mut grid.iter().map(|p| p[i]).filter(alike).map(f64::abs)) };
         if m.len() == COARSE { [low / BEYOND, high * BEYOND] } else { [low, high] }
     };
     magnitudes(grid).iter().enumerate().map(wide).collect()
@@ -306,7 +311,7 @@ impl<'a, 'f> Ground<'a, 'f> {
                     strengths: if fixed { 1 } else { s.strengths.len() },
                     setting: Setting { inner: grid[class[i]].clone(), strengths: s.strengths },
                     continuous: free.to_vec(),
-                    range: range(grid),
+                    range: range(grid, class),
                 };
                 peaks.push((i, candidate));
             }

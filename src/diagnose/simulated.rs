@@ -36,6 +36,8 @@ const STRENGTH_STEP: f64 = 2e-3;
 const INNER_STEP: f64 = 5e-3;
 /// Shortest length of a dry drag over the shortest that the search takes.
 const DRIER: f64 = 0.02;
+/// Standard deviations of what is left beyond the noise from which a fit is made from elsewhere too.
+const UNSETTLED: f64 = 5.0;
 /// Whitened simulation error over that along the recorded motion above which the simulation runs away and fits nothing.
 const AWAY: f64 = 100.0;
 
@@ -286,7 +288,22 @@ pub(super) fn simulated_with(bench: &Bench, model: &Model, keep: impl Fn(Knob) -
 
 /// The model with body, delay and effects fitted by simulation; none where it has no effect, where its simulation runs away or where
 /// nothing is won.
+///
+/// Modes stay where the search left them, and along a noisy motion they may have taken what a drag owes. Where the fit does not come down
+/// to the noise, one from the linear parameters as given is made beside it: the better counts.
 pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
+    let found = descended(bench, model);
+    if found.as_ref().unwrap_or(model).excess_sigma() < UNSETTLED {
+        return found;
+    }
+    let mut given = model.clone();
+    given.refitted.p.fill(0.0);
+    let other = descended(bench, &given).filter(|o| o.cost < found.as_ref().map_or(model.cost, |f| f.cost));
+    other.or(found)
+}
+
+/// The fit by simulation from where a model stands.
+fn descended(bench: &Bench, model: &Model) -> Option<Model> {
     if model.chosen.is_empty() {
         return None;
     }
@@ -299,19 +316,20 @@ pub(super) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
     }
     let mut work = Workspace::default();
     let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
-    let (mut cost, mut converged) = (before, false);
+    let (mut cost, mut converged, mut best) = (before, false, None);
     for _ in 0..AGAIN {
-        let outcome = minimise(&mut problem, &mut x, &settings, &mut work);
-        converged = outcome.converged;
-        let further = outcome.cost < (1.0 - FURTHER) * cost;
-        cost = outcome.cost;
+        converged = minimise(&mut problem, &mut x, &settings, &mut work).converged;
+        // With the starts of where it ended, as the fit's own beginning was judged.
+        let settled = size(&problem.settle(&x));
+        let further = settled < (1.0 - FURTHER) * cost;
+        if settled <= (1.0 + TOLERANCE) * cost {
+            (cost, best) = (settled, Some(x.clone()));
+        }
         if !further {
             break;
         }
     }
-    if !cost.is_finite() || cost > before {
-        return None;
-    }
+    let x = best?;
     let (p, chosen) = problem.unpack(&x);
     if !chosen.iter().all(|c| c.effect.possible(&c.setting, &[])) {
         return None;

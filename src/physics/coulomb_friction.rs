@@ -1,14 +1,16 @@
 //! Dry friction: a constant drag against the motion, optionally higher at low speed.
 //!
 //! Coulomb with Stribeck's rise: level (1 + rise exp(-(v/v_s)²)) (Armstrong-Helouvry, Dupont, Canudas de Wit 1994). At rest the
-//! torque is what holds the arm: Dahl's law with a pre-sliding length near what the sensor resolves, never sgn(v). The
+//! torque is what holds the arm: Dahl's law with a pre-sliding length near what the sensor resolves, never sgn(v). A film that
+//! shears instead of sticking lets the arm creep: the drag then turns round over a speed, not over a length, tanh(v/v_c). The
 //! viscous part belongs to the linear plant; a mean offset belongs to the torque offset.
 
 use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 use super::pivot_friction::{SLID, dahl};
 use super::sample::{Sample, Scene, logarithmic};
 
-/// Inner: pre-sliding length, Stribeck speed (0 for none), Stribeck rise. Strength: the level at speed.
+/// Inner: pre-sliding length, or the speed of a creep with a minus; Stribeck speed (0 for none), Stribeck rise. Strength: the level at
+/// speed.
 pub struct CoulombFriction;
 
 static FACTS: Facts = Facts {
@@ -18,12 +20,15 @@ static FACTS: Facts = Facts {
     columns: 1,
     fixed: false,
     per_record: false,
-    equation: "tau = -F (1 + rise exp(-(v/v_s)^2)) z, dz/dx = (1 - sgn(dx) z)/length (sgn(v) once sliding)",
+    equation: "tau = -F (1 + rise exp(-(v/v_s)^2)) z, dz/dx = (1 - sgn(dx) z)/length (sgn(v) once sliding); of a film z = tanh(v/v_c)",
     says: "the arm drags with the same force at every speed, and the force turns round with the motion",
     confused_with: &["pivot_friction", "backlash", "dead_band", "torque_ripple"],
     experiment: "constant-velocity moves in both directions at six speeds over two decades",
     band_hz: [1.0, 300.0],
 };
+
+/// Speeds over which a creeping drag turns round, over the highest: a slower one is dry, a faster one all but viscous.
+const CREEP: [f64; 2] = [1e-3, 0.3];
 
 struct Slider {
     length: f64,
@@ -48,6 +53,11 @@ impl Law for Slider {
         // The mean over a straight path: s - (s - z0) (1 - exp(-r))/r with r the path in lengths.
         let (path, s) = ((to.x - from.x).abs() / self.length, (to.x - from.x).signum());
         let mean = match path {
+            // Simpson's rule; the sign turns round over more than one sample.
+            _ if self.length < 0.0 => {
+                let at = |v: f64| (v / -self.length).tanh();
+                (at(from.v) + 4.0 * at(0.5 * (from.v + to.v)) + at(to.v)) / 6.0
+            }
             p if p < 1e-6 => 0.5 * (self.z + z),
             p if p > SLID => s - (s - self.z) / p,
             p => s + (s - self.z) * (-p).exp_m1() / p,
@@ -56,7 +66,9 @@ impl Law for Slider {
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
-        self.z = self.moved(from, to);
+        if self.length > 0.0 {
+            self.z = self.moved(from, to);
+        }
     }
 }
 
@@ -72,6 +84,9 @@ impl Effect for CoulombFriction {
         let mut all: Vec<Vec<f64>> = logarithmic(short, long, 5).into_iter().map(|l| vec![l, 0.0, 0.0]).collect();
         // A rise that reaches up to the highest speed is no rise but the level.
         all.extend(logarithmic(0.015, 0.2, 4).into_iter().map(|share| vec![0.5 * long, share * scene.speed, 0.5]));
+        all.extend(
+            logarithmic(CREEP[0] * scene.speed, CREEP[1] * scene.speed, 8).into_iter().map(|v| vec![-v, 0.0, 0.0]),
+        );
         all
     }
 
@@ -90,7 +105,11 @@ impl Effect for CoulombFriction {
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         let mut all = vec![
             Parameter::new("level_command", setting.strengths[0], Unit::Command),
-            Parameter::new("sliding_length", setting.inner[0], Unit::Position),
+            if setting.inner[0] > 0.0 {
+                Parameter::new("sliding_length", setting.inner[0], Unit::Position)
+            } else {
+                Parameter::new("creep_speed", -setting.inner[0], Unit::PositionPerSecond)
+            },
         ];
         if setting.inner[1] > 0.0 {
             all.push(Parameter::new("stribeck_speed", setting.inner[1], Unit::PositionPerSecond));
@@ -109,7 +128,9 @@ impl Effect for CoulombFriction {
     }
 
     fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
-        let length = if given.has("sliding_length") {
+        let length = if given.has("creep_speed") {
+            -given.positive("creep_speed")?
+        } else if given.has("sliding_length") {
             given.positive("sliding_length")?
         } else {
             (6.0 * scene.noise).max(1e-5 * scene.travel)
