@@ -4,7 +4,7 @@ use super::bench::Bench;
 use super::clock::{Clock, SURE};
 use super::finding::{Diagnosis, Estimate, Finding, Verdict};
 use super::linear::{Knob, LinearForm, body_numbers};
-use super::name::{FAMILY, everywhere, family_width, text_of};
+use super::name::{FAMILY, everywhere, text_of};
 use super::refit::{Chosen, Fit};
 use super::scan::log_tail;
 use super::select::{Model, Selection};
@@ -70,6 +70,9 @@ fn lags_like(bench: &Bench, way: Way, delay_s: f64, cost: f64) -> Vec<String> {
 /// The lags of the library, and the iterations in which one of them alone is fitted.
 const LAGS: [&str; 2] = ["amplifier_lag", "sensor_lag"];
 const ITERATIONS: usize = 16;
+/// Share of what the best lag explains by which another may fall short: before or behind the arm a lag is the same to the records, but
+/// along a recorded motion that lags itself one of them is found less well.
+const ALIKE: f64 = 0.1;
 
 /// A lag whose time constant is looked for near a delay.
 fn lag(name: &str, near_s: f64) -> Option<Chosen> {
@@ -197,8 +200,7 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
     }
     if d.findings.is_empty() && selection.model.chosen.is_empty() && later_s > 0.0 {
         let lags = Lag::alone(bench, later_s);
-        // Before or behind the arm a lag is the same to the records; how it meets a start is no evidence.
-        let width = lags.first().map_or(0.0, |l| family_width(fixed[0] - l.cost));
+        let width = lags.first().map_or(0.0, |l| FAMILY.max(ALIKE * (fixed[0] - l.cost)));
         let like: Vec<String> =
             lags.iter().filter(|l| l.cost < lags[0].cost + width).map(|l| l.name().to_owned()).collect();
         let sure = |l: &&Lag| fixed[0] - l.cost > SURE && l.cost - selection.model.cost < allowed(1);
