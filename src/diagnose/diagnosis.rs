@@ -2,11 +2,12 @@
 
 use super::bench::Bench;
 use super::bump::{beyond, set_aside};
+use super::confirm::confirm;
 use super::corrected::{Corrected, corrected};
 use super::finding::*;
 use super::fit_report::fit_report;
 use super::fitted::refit;
-use super::held_out::{contradicts, held_out, mean};
+use super::held_out::{astray, contradicts, held_out, mean, unseen};
 use super::judge::{Judged, rms};
 use super::line_finding::{line_findings, same_line};
 use super::linear_story::linear_story;
@@ -161,6 +162,7 @@ pub fn diagnose(
         sample_faults: hygiene.faults.clone(),
         whitened,
         holdout_whitened: mean(&held_out),
+        confirmed: confirm(&bench, &selection, &fixed, &held_out, settings.select.iterations)?,
         held_out,
         leftover: selection.leftover.clone(),
         remarks,
@@ -240,6 +242,13 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
                 h.whitened[0]
             ));
         }
+        let denied = d.confirmed.iter().find(|c| c.denied()).cloned();
+        if let Some(c) = &denied {
+            d.remarks.push(format!(
+                "the records that were not used deny {}: it should take {:.0} units of their error, and takes {:.0}",
+                c.effect, c.says, c.gains
+            ));
+        }
         let mixture = bench.levels.from_repeats && selection.mixture();
         if mixture {
             let laws: Vec<&str> = model.chosen.iter().map(|c| c.effect.facts().name).collect();
@@ -260,7 +269,7 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
         let laws = model.chosen.len();
         let several = selection.leftover.is_some() && (laws > 2 || laws > 1 && !clean && explained < SEVERAL);
         let told = (explained >= NAMED_SHARE || clean || decisive) && !several && beside.is_none() && !mixture;
-        if told && holds && against.is_none() {
+        if told && holds && against.is_none() && denied.is_none() {
             if !clean && explained < NAMED_SHARE {
                 d.remarks.push(format!(
                     "no other law of the library comes near, but {:.1} % of the error in excess of noise stays unexplained",
@@ -324,6 +333,13 @@ fn judge(d: &mut Diagnosis, bench: &Bench, selection: &Selection, logs: Option<F
         && let Some(f) = super::name::noise_story(bench)
     {
         d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
+        d.findings.push(f);
+    }
+    // Nothing missing on the records that were fitted, and yet one that was not used is far off.
+    if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)
+        && let Some(f) = astray(bench, &d.held_out).and_then(|h| unseen(bench, selection, h))
+    {
+        d.verdict = Verdict::LocatedUnexplained;
         d.findings.push(f);
     }
     // Without repeats, what the refit leaves beyond the sensor's white noise may be noise of torque or missing physics.

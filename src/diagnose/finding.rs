@@ -1,6 +1,7 @@
 //! What a diagnosis says, as `diagnosis.json` of the contract carries it.
 
 use super::bootstrap::Bootstrap;
+use super::confirm::Confirmation;
 use super::held_out::HeldOut;
 use super::hygiene::{Replay, SampleFault};
 use super::judge::Simulation;
@@ -180,6 +181,8 @@ pub struct Diagnosis {
     pub holdout_whitened: Option<[f64; 2]>,
     /// Record by record.
     pub held_out: Vec<HeldOut>,
+    /// What the records that were not used say of each law of the model.
+    pub confirmed: Vec<Confirmation>,
     /// What the library still sees in the error of the final model, beyond chance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leftover: Option<Leftover>,

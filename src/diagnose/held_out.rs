@@ -2,14 +2,20 @@
 
 use super::bench::Bench;
 use super::corrected::Corrected;
+use super::finding::Finding;
 use super::judge::Judged;
+use super::linear::free_motions;
+use super::place::{Part, place_of};
 use super::run::Run;
+use super::scan::log_tail;
 use super::select::{Model, Selection};
 use super::stack::Segment;
 use crate::lti::LtiError;
 use crate::numeric::least_squares::dot;
+use crate::physics::Port;
 use crate::recording::Role;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// One record that was not used.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -81,6 +87,13 @@ const BEYOND: f64 = 0.5;
 const TOGETHER: f64 = 3.75;
 const UNMOVED: f64 = 0.6;
 
+/// Power of the noise of the noisiest segment over that of what the filter makes white: where some of the fit's records are noisier than
+/// the filter says, so may one that was not used be.
+fn loudest(bench: &Bench) -> f64 {
+    let noise = |s: &Segment| s.runs.len() as f64 / (s.weight * s.weight);
+    bench.stack.segments.iter().map(noise).fold(1.0, f64::max)
+}
+
 /// The record that contradicts the final model most: it still misses it by far more than noise, and the laws that were found elsewhere
 /// take too little of what the linear refit leaves there.
 ///
@@ -89,9 +102,7 @@ pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) 
     if model.chosen.iter().any(|c| c.effect.facts().per_record || c.effect.clocked()) {
         return None;
     }
-    // Where some of the fit's records are noisier than the filter says, so may this one be.
-    let noise = |s: &Segment| s.runs.len() as f64 / (s.weight * s.weight);
-    let loudest = bench.stack.segments.iter().map(noise).fold(1.0, f64::max);
+    let loudest = loudest(bench);
     let [excess, left] = [0, 1].map(|i| move |h: &HeldOut| h.whitened[i] - loudest);
     let far = |h: &&HeldOut| {
         let (far, share) = if h.inside { (FAR, INSIDE) } else { (FAR_BEYOND, BEYOND) };
@@ -108,4 +119,42 @@ pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) 
     let (refit, after) = (mean(&excess), mean(&left));
     let unmoved = after > TOGETHER * loudest * (2.0 / samples).sqrt() && after > UNMOVED * refit;
     inside.into_iter().filter(|_| unmoved).max_by(most)
+}
+
+/// Excess over noise, in its standard deviations and as a share of it, from which a record that was not used shows something that the
+/// fitted records do not: far more than errs a linear model that is only continued.
+const ASTRAY: [f64; 2] = [10.0, 0.3];
+
+/// The record that the linear refit misses most, by far more than noise.
+pub(super) fn astray<'a>(bench: &Bench, all: &'a [HeldOut]) -> Option<&'a HeldOut> {
+    let loudest = loudest(bench);
+    let left = |h: &HeldOut| h.whitened[0] - loudest;
+    let far = |h: &&HeldOut| left(h) > loudest * ASTRAY[1].max(ASTRAY[0] * (2.0 / h.samples as f64).sqrt());
+    all.iter().filter(far).max_by(|a, b| left(a).total_cmp(&left(b)))
+}
+
+/// What acts on a record that was not used and shows on no other: the finding without a name.
+pub(super) fn unseen(bench: &Bench, selection: &Selection, h: &HeldOut) -> Option<Finding> {
+    let run = bench.runs.iter().find(|r| r.name == h.record)?;
+    let carrier = bench.form.carrier(&selection.baseline.refitted.p).plant;
+    let free = free_motions(&carrier.body, bench.scene.sample_time_s, run.len());
+    let error = bench.along(run, &selection.baseline, &free).ok()?;
+    let t = bench.scene.sample_time_s;
+    let speed = |k: usize| (run.position[(k + 1).min(run.len() - 1)] - run.position[k.saturating_sub(1)]) / (2.0 * t);
+    let motion = (0..run.len()).map(|k| [run.position[k], speed(k)]).collect();
+    let place = place_of(&[Part { records: vec![h.record.clone()], signal: &error, motion }], t);
+    let n = h.samples as f64;
+    Some(Finding {
+        effect: "unexplained".into(),
+        family: vec!["unexplained".into()],
+        port: Port::Torque,
+        p_value: log_tail(h.whitened[0] * n, h.samples).min(0.0).exp().max(1e-300),
+        says: format!(
+            "In record {}, which was not used for the fit, something acts that the fitted records do not show: the refitted model misses it by {:.3} times the noise.",
+            h.record,
+            h.whitened[0].sqrt()
+        ),
+        parameters: BTreeMap::new(),
+        place,
+    })
 }

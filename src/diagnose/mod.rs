@@ -10,6 +10,7 @@ mod bootstrap;
 mod bump;
 mod clock;
 mod columns;
+mod confirm;
 mod corrected;
 mod diagnosis;
 mod differing;
@@ -47,6 +48,7 @@ mod whiten;
 
 pub use bench::Bench;
 pub use bootstrap::Bootstrap;
+pub use confirm::Confirmation;
 pub use corrected::Corrected;
 pub use diagnosis::{DiagnoseError, DiagnoseSettings, Diagnosed, diagnose};
 pub use finding::{

@@ -2,7 +2,8 @@
 
 use super::bench::Bench;
 use super::finding::Where;
-use super::stack::Stack;
+use super::stack::{Segment, Stack};
+use super::trajectory::Trajectory;
 use crate::numeric::spectrum::forward;
 
 /// Windows of a record.
@@ -66,29 +67,39 @@ fn bands(spectrum: &[(f64, f64)], resolution: f64) -> Vec<[f64; 2]> {
     out.into_iter().map(|([from, to], _)| [edge(from), edge(to)]).collect()
 }
 
+/// A stretch of a whitened signal.
+pub struct Part<'a> {
+    /// The records that it stands for.
+    pub records: Vec<String>,
+    /// The signal.
+    pub signal: &'a [f64],
+    /// Position and velocity under each of its samples.
+    pub motion: Vec<[f64; 2]>,
+}
+
 /// Where `signal`, stacked and whitened, has its energy.
 pub fn place(bench: &Bench, stack: &Stack, signal: &[f64]) -> Where {
-    let t = bench.scene.sample_time_s;
-    let energy = |i: usize| -> f64 {
-        let s = &stack.segments[i];
-        signal[s.start..s.start + s.len].iter().map(|v| v * v).sum()
+    let part = |(s, motion): (&Segment, &Trajectory)| Part {
+        records: s.runs.iter().map(|&r| bench.runs[r].name.clone()).collect(),
+        signal: &signal[s.start..s.start + s.len],
+        motion: motion.samples.iter().map(|m| [m.x, m.v]).collect(),
     };
-    let energies: Vec<f64> = (0..stack.segments.len()).map(energy).collect();
+    let parts: Vec<Part> = stack.segments.iter().zip(&bench.trajectories).map(part).collect();
+    place_of(&parts, bench.scene.sample_time_s)
+}
+
+/// Where whitened signals, sampled every `t` seconds, have their energy.
+pub fn place_of(parts: &[Part], t: f64) -> Where {
+    let energies: Vec<f64> = parts.iter().map(|p| p.signal.iter().map(|v| v * v).sum()).collect();
     let most = energies.iter().copied().fold(0.0, f64::max);
-    if most.is_nan() || most <= 0.0 {
+    let Some(strongest) = energies.iter().position(|e| *e == most && most > 0.0) else {
         return Where { velocity_sign: "both", ..Where::default() };
-    }
-    let strongest = energies.iter().position(|e| *e == most).unwrap_or(0);
-    let mut records = Vec::new();
-    for (s, e) in stack.segments.iter().zip(&energies) {
-        if *e > 0.02 * most {
-            records.extend(s.runs.iter().map(|&r| bench.runs[r].name.clone()));
-        }
-    }
+    };
+    let loud = parts.iter().zip(&energies).filter(|(_, e)| **e > 0.02 * most);
+    let records = loud.flat_map(|(p, _)| p.records.iter().cloned()).collect();
     // Time: the fewest windows of the strongest record that hold nine tenths, joined where they touch.
-    let s = &stack.segments[strongest];
-    let part = &signal[s.start..s.start + s.len];
-    let width = s.len.div_ceil(WINDOWS);
+    let part = parts[strongest].signal;
+    let width = part.len().div_ceil(WINDOWS);
     let mut windows: Vec<(usize, f64)> =
         part.chunks(width).enumerate().map(|(i, c)| (i, c.iter().map(|v| v * v).sum())).collect();
     windows.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -104,24 +115,24 @@ pub fn place(bench: &Bench, stack: &Stack, signal: &[f64]) -> Where {
     kept.sort_unstable();
     let mut time_s: Vec<[f64; 2]> = Vec::new();
     for i in kept {
-        let (from, to) = ((i * width) as f64 * t, ((i + 1) * width).min(s.len) as f64 * t);
+        let (from, to) = ((i * width) as f64 * t, ((i + 1) * width).min(part.len()) as f64 * t);
         match time_s.last_mut() {
             Some(last) if (last[1] - from).abs() < 0.5 * t => last[1] = to,
             _ => time_s.push([from, to]),
         }
     }
     let mut spectrum = Vec::new();
-    let longest = stack.segments.iter().map(|s| s.len).max().unwrap_or(1);
+    let longest = parts.iter().map(|p| p.signal.len()).max().unwrap_or(1);
     let mut zone = Vec::new();
     let (mut ahead, mut back) = (0.0, 0.0);
-    for (i, s) in stack.segments.iter().enumerate() {
-        let part = &signal[s.start..s.start + s.len];
-        let bins = forward(part);
-        let hz = 1.0 / (s.len as f64 * t);
-        spectrum.extend((1..s.len / 2).map(|k| (k as f64 * hz, bins[k].norm_sqr() / s.len as f64)));
-        for (v, m) in part.iter().zip(&bench.trajectories[i].samples) {
-            zone.push((m.x, v * v));
-            if m.v > 0.0 { ahead += v * v } else { back += v * v }
+    for Part { signal, motion, .. } in parts {
+        let n = signal.len();
+        let bins = forward(signal);
+        let hz = 1.0 / (n as f64 * t);
+        spectrum.extend((1..n / 2).map(|k| (k as f64 * hz, bins[k].norm_sqr() / n as f64)));
+        for (v, [at, speed]) in signal.iter().zip(motion) {
+            zone.push((*at, v * v));
+            if *speed > 0.0 { ahead += v * v } else { back += v * v }
         }
     }
     let velocity_sign = if ahead > 6.0 * back {

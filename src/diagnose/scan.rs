@@ -8,7 +8,7 @@ use super::bench::Bench;
 use super::columns::{raw_columns, white_columns};
 use super::differing::Difference;
 use super::linear::Sampled;
-use super::refit::Fit;
+use super::refit::{Chosen, Fit};
 use super::stack::{Basis, Explained, Normal};
 use crate::lti::Plant;
 use crate::numeric::least_squares::dot;
@@ -37,6 +37,17 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// As an effect of a model, taken in a step.
+    pub fn chosen(&self, step: usize) -> Chosen {
+        Chosen {
+            effect: self.effect,
+            setting: self.setting.clone(),
+            continuous: self.continuous.clone(),
+            range: self.range.clone(),
+            step,
+        }
+    }
+
     /// Logarithm of an upper bound of the chance that noise alone gives this gain somewhere on the grid, for `effects`
     /// effects tried at once: the tail of chi-square by Chernoff's bound, times all points and effects (Bonferroni).
     pub fn log_p_value(&self, effects: usize) -> f64 {
@@ -73,22 +84,21 @@ fn swept(grid: &[Vec<f64>]) -> Vec<bool> {
     magnitudes(grid).iter().map(|m| m.len() >= SWEPT).collect()
 }
 
-/// Measures that are never 0: they may be refined, sign kept.
-fn continuous(grid: &[Vec<f64>]) -> Vec<bool> {
-    magnitudes(grid).iter().map(|m| m.len() >= COARSE && m[0] != 0.0).collect()
+/// Measures that are never 0: they may be refined, sign kept. A class that holds a swept one at one place does not know it.
+fn continuous(grid: &[Vec<f64>], class: &[usize]) -> Vec<bool> {
+    let known = |i: usize| class.iter().any(|&p| grid[p][i] != grid[class[0]][i]);
+    let free = |(i, m): (usize, &Vec<f64>)| m.len() >= COARSE && m[0] != 0.0 && (m.len() == COARSE || known(i));
+    magnitudes(grid).iter().enumerate().map(free).collect()
 }
 
-/// From the least to the greatest magnitude of each number in a class; where it has one only, among all points of its sign.
+/// From the least to the greatest magnitude of each number: of a coarse one on the grid, of a swept one in its class.
 fn range(grid: &[Vec<f64>], class: &[usize]) -> Vec<[f64; 2]> {
-    let ends = |values: &mut dyn Iterator<Item = f64>| {
-        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
-    };
     let wide = |(i, m): (usize, &Vec<f64>)| {
-        let [low, high] = ends(&mut class.iter().map(|&p| grid[p][i].abs()));
-        let alike = |v: &f64| v.is_sign_negative() == grid[class[0]][i].is_sign_negative();
-        let [low, high] =
-            if low < high { [low, high] } else { ends(&mut grid.iter().map(|p| p[i]).filter(alike).map(f64::abs)) };
-        if m.len() == COARSE { [low / BEYOND, high * BEYOND] } else { [low, high] }
+        if m.len() == COARSE {
+            return [m[0] / BEYOND, m[COARSE - 1] * BEYOND];
+        }
+        let own = class.iter().map(|&p| grid[p][i].abs());
+        own.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
     };
     magnitudes(grid).iter().enumerate().map(wide).collect()
 }
@@ -257,8 +267,7 @@ impl<'a, 'f> Ground<'a, 'f> {
             .par_iter()
             .flat_map(|e| {
                 let grid = e.grid(self.fit.scene);
-                let free = continuous(&grid);
-                classes(&grid).into_par_iter().map(move |class| self.peaks(*e, &grid, &free, &class))
+                classes(&grid).into_par_iter().map(move |class| self.peaks(*e, &grid, &class))
             })
             .collect();
         all.retain(|peaks| !peaks.is_empty());
@@ -267,7 +276,7 @@ impl<'a, 'f> Ground<'a, 'f> {
     }
 
     /// The strongest points of a class, none beside another; none where none can be worked out.
-    fn peaks(&self, effect: &'static dyn Effect, grid: &[Vec<f64>], free: &[bool], class: &[usize]) -> Vec<Candidate> {
+    fn peaks(&self, effect: &'static dyn Effect, grid: &[Vec<f64>], class: &[usize]) -> Vec<Candidate> {
         let fixed = effect.facts().fixed;
         let last = class.len() - 1;
         // Near the ends points lie farther apart: the longest waves, the lowest frequencies.
@@ -310,7 +319,7 @@ impl<'a, 'f> Ground<'a, 'f> {
                     points: grid.len(),
                     strengths: if fixed { 1 } else { s.strengths.len() },
                     setting: Setting { inner: grid[class[i]].clone(), strengths: s.strengths },
-                    continuous: free.to_vec(),
+                    continuous: continuous(grid, class),
                     range: range(grid, class),
                 };
                 peaks.push((i, candidate));

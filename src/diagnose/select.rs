@@ -189,7 +189,16 @@ pub fn select(
         progress(&format!("scan of {} effects for finding {}", library.len(), model.chosen.len() + 1));
         let mut step = scan(bench, library, &model);
         let concealed = if model.excess_sigma() < SETTLED { NEARLY_ALL } else { CONCEALED };
-        // Two forms of the leading effect, one of each other.
+        let price = (bench.stack.total as f64).ln();
+        // Two forms of the leading effect, one of each other: the one that is worth its numbers most. Each number of a law is paid for (Schwarz
+        // 1978): of two that fit alike, the one with fewer.
+        let best_form = |c: &Candidate| {
+            let moved = |c: &Candidate| c.continuous.iter().filter(|c| **c).count();
+            let there = |c: &Candidate| c.setting.strengths.iter().filter(|s| **s != 0.0).count();
+            let net = |c: &Candidate| c.gain - price * (there(c) + moved(c)) as f64;
+            let forms = step.candidates.iter().filter(|o| o.effect.facts().name == c.effect.facts().name);
+            forms.map(net).fold(f64::NEG_INFINITY, f64::max) <= net(c)
+        };
         let mut worth: Vec<usize> = Vec::new();
         for (i, c) in step.candidates.iter().enumerate() {
             let name = c.effect.facts().name;
@@ -206,7 +215,12 @@ pub fn select(
                 && (c.log_p_value(library.len()) < limit && hums(bench, c, c.gain, library.len()) < limit
                     || (!bench.levels.from_repeats && c.gain > LOOK))
                 && c.concealed < concealed
-                && seen < 1 + usize::from(leads)
+                && match (leads, seen) {
+                    (true, 0) => true,
+                    (true, 1) => best_form(c) || best_form(&step.candidates[worth[0]]),
+                    (false, 0) => best_form(c),
+                    _ => false,
+                }
                 && worth.len() < settings.refits
             {
                 worth.push(i);
@@ -216,13 +230,7 @@ pub fn select(
             progress(&format!("refit with {}", step.candidates[i].effect.facts().name));
             let c = &step.candidates[i];
             let mut chosen = model.chosen.clone();
-            chosen.push(Chosen {
-                effect: c.effect,
-                setting: c.setting.clone(),
-                continuous: c.continuous.clone(),
-                range: c.range.clone(),
-                step: steps.len(),
-            });
+            chosen.push(c.chosen(steps.len()));
             let mut tried = fitted_from_both(bench, &chosen, &model.refitted.p, settings.iterations);
             if !bench.levels.from_repeats {
                 tried = settled(bench, tried, settings.iterations);
@@ -231,8 +239,6 @@ pub fn select(
                 step.tried.push((i, tried));
             }
         }
-        // Each number of a law is paid for (Schwarz 1978): of two that fit alike, the one with fewer.
-        let price = (bench.stack.total as f64).ln();
         // Repeats take part with their mean: what differs from record to record by its nature is no first thought.
         let paid = |t: &(usize, Model)| {
             let c = &step.candidates[t.0];
@@ -366,7 +372,7 @@ pub(super) fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model
 const CROOKED: f64 = 3.0;
 
 /// The scan around linear parameters `p`; gains count from where the model stands.
-fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Model, p: &[f64]) -> Vec<Candidate> {
+pub(super) fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Model, p: &[f64]) -> Vec<Candidate> {
     let fit = bench.fit(model.chosen.clone());
     let (error, basis) = fit.screen_basis(p);
     let plant = bench.form.carrier(p).plant;

@@ -3,9 +3,10 @@
 use super::bench::Bench;
 use super::fitted::{fitted, fitted_from_both};
 use super::refit::Chosen;
-use super::rival::{BETTER, Rival};
-use super::select::{MINOR, Model, OWN, Step, begun, gain_of};
+use super::rival::{BETTER, Rival, more};
+use super::select::{MINOR, Model, OWN, Step, begun, gain_of, scan_at};
 use super::simulated::simulated;
+use crate::physics::{Effect, library};
 
 /// Takes effects out again that later ones made needless.
 pub(super) fn prune(bench: &Bench, model: &mut Model, before: f64, iterations: usize) {
@@ -70,33 +71,61 @@ pub(super) fn spare(
 /// noise that each model left for itself, by which a poor start makes its own excuse.
 const NEAR: f64 = 0.8;
 const NEAR_UNKNOWN: f64 = 0.4;
+/// Most laws that are looked for afresh in the place of one.
+const AFRESH: usize = 4;
+
+/// Laws of other names that may stand in the place of effect `at`: those that came near it in its own step, and where it is not alone, those
+/// it is confused with that explain as much beside the others. What is found later changes what the first step saw.
+fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, iterations: usize) -> Vec<Chosen> {
+    let near = if bench.levels.from_repeats { NEAR } else { NEAR_UNKNOWN };
+    let own = &model.chosen[at];
+    let facts = own.effect.facts();
+    let in_place = |c: &Chosen| Chosen { step: own.step, ..c.clone() };
+    let close = step.tried.iter().filter(|(_, tried)| step.before - tried.evidence >= near * gain);
+    let mut all: Vec<Chosen> = close.filter_map(|(_, tried)| tried.chosen.last()).map(in_place).collect();
+    if model.chosen.len() > 1 {
+        let alike = |e: &&'static dyn Effect| {
+            let f = e.facts();
+            facts.confused_with.contains(&f.name) || f.confused_with.contains(&facts.name)
+        };
+        let alike: Vec<&'static dyn Effect> = library().iter().copied().filter(alike).collect();
+        let mut chosen = model.chosen.clone();
+        chosen.remove(at);
+        let without = fitted(bench, chosen, &model.refitted.p, iterations);
+        let mut seen = scan_at(bench, &alike, &without, &without.refitted.p);
+        seen.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let close = seen.iter().filter(|c| c.gain >= near * (without.cost - model.cost));
+        for c in close.filter(|c| c.effect.possible(&c.setting, &[])).take(AFRESH) {
+            if all.iter().all(|o| o.effect.facts().name != c.effect.facts().name) {
+                all.push(c.chosen(own.step));
+            }
+        }
+    }
+    let elsewhere = |c: &Chosen| model.chosen.iter().any(|m| m.effect.facts().name == c.effect.facts().name);
+    all.retain(|c| !elsewhere(c));
+    all
+}
 
 /// Tries the rivals of each effect in its place, everything else refitted, and takes them where they fit better now.
 pub(super) fn exchange(bench: &Bench, model: &mut Model, steps: &[Step], iterations: usize) -> Vec<Vec<Rival>> {
     let mut all = Vec::new();
-    let near = if bench.levels.from_repeats { NEAR } else { NEAR_UNKNOWN };
     for at in 0..model.chosen.len() {
         let step = &steps[model.chosen[at].step];
         let gain = gain_of(steps, &model.chosen[at]);
         let mut found: Vec<Rival> = Vec::new();
-        for (i, tried) in &step.tried {
-            let c = &step.candidates[*i];
-            let (name, own) = (c.effect.facts().name, model.chosen[at].effect.facts().name);
-            let elsewhere = model.chosen.iter().any(|m| m.effect.facts().name == name);
-            if name == own || elsewhere || step.before - tried.evidence < near * gain {
-                continue;
-            }
-            let Some(last) = tried.chosen.last() else { continue };
+        for law in others(bench, model, at, step, gain, iterations) {
+            let (facts, own) = (law.effect.facts(), model.chosen[at].effect.facts().name);
+            let each = facts.per_record || begun(bench, &law.setting.inner, law.effect) > 0;
             let mut chosen = model.chosen.clone();
-            chosen[at] = Chosen { step: model.chosen[at].step, ..last.clone() };
+            chosen[at] = law;
             let other = fitted_from_both(bench, &chosen, &model.refitted.p, iterations);
-            let each = c.effect.facts().per_record || begun(bench, &last.setting.inner, last.effect) > 0;
             let dearer = if each { OWN * gain } else { 0.0 };
+            let dearer = dearer + more(bench, &other.chosen[at], &model.chosen[at]);
             if other.cost + BETTER + dearer < model.cost && other.possible() {
                 let cost = model.cost;
                 found.push(Rival { name: own, cost, model: std::mem::replace(model, other) });
             } else {
-                found.push(Rival { name, cost: other.cost, model: other });
+                found.push(Rival { name: facts.name, cost: other.cost, model: other });
             }
         }
         all.push(found);

@@ -83,7 +83,8 @@ impl Effect for CoulombFriction {
         let (short, long) = ((1.5 * scene.noise).max(0.3 * floor), (12.0 * scene.noise).max(2.0 * floor));
         let mut all: Vec<Vec<f64>> = logarithmic(short, long, 5).into_iter().map(|l| vec![l, 0.0, 0.0]).collect();
         // A rise that reaches up to the highest speed is no rise but the level.
-        all.extend(logarithmic(0.015, 0.2, 4).into_iter().map(|share| vec![0.5 * long, share * scene.speed, 0.5]));
+        let rises = logarithmic(0.015, 0.2, 4);
+        all.extend([0.25, 0.5].iter().flat_map(|l| rises.iter().map(move |v| vec![l * long, v * scene.speed, 0.5])));
         all.extend(
             logarithmic(CREEP[0] * scene.speed, CREEP[1] * scene.speed, 8).into_iter().map(|v| vec![-v, 0.0, 0.0]),
         );

@@ -291,6 +291,11 @@ pub trait Effect: Sync {
         false
     }
 
+    /// Whether every machine of this kind has it to some degree: a coil in a magnet gap, an arm on a bearing.
+    fn usual(&self) -> bool {
+        false
+    }
+
     /// Whether a machine may have several that differ in their first inner number: lines, modes, pushes.
     fn several(&self) -> bool {
         false

@@ -167,6 +167,10 @@ impl Effect for PivotFriction {
         if inner[1] < 0.5 * SHAPES[0] { Vec::new() } else { vec![(1, SHAPES)] }
     }
 
+    fn usual(&self) -> bool {
+        true
+    }
+
     fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         setting.strengths.first().is_some_and(|s| *s > 0.0)
     }

@@ -28,7 +28,7 @@ static FACTS: Facts = Facts {
     per_record: false,
     equation: "tau = Kt0 (1 - s x - a x^2 - b x^4 - c x^6) i; with a corner c: a min(|x|, c)^2, or a max(|x| - c, 0)^2",
     says: "the motor pushes less towards the ends of the stroke: the same current gives less torque there",
-    confused_with: &["gain_drift", "cable_spring", "mode_shift"],
+    confused_with: &["nonlinear_spring", "encoder_scale_error", "gain_drift", "cable_spring", "mode_shift"],
     experiment: "the same multisine in three or more zones of the stroke",
     band_hz: [1.0, 2000.0],
 };
@@ -92,6 +92,10 @@ impl Effect for TorqueFactorRolloff {
     fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
         // The magnet's zones are told by the position as recorded.
         Box::new(Rolloff { shape: inner[0], corner: inner[1], travel: scene.travel * scene.arm_over_record() })
+    }
+
+    fn usual(&self) -> bool {
+        true
     }
 
     /// Between fields that fall as their curvature says (a parabola, a bell, the edge of a gap) the fall at one place differs by so much.

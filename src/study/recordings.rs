@@ -9,6 +9,7 @@ use crate::frf::{PeriodicSettings, periodic};
 use crate::identify::{BodyChoice, Hold, IdentifySettings, OrderChoice, identify};
 use crate::lti::{Body, Plant};
 use crate::recording::{Case, ColumnNames, Record, RecordEntry, RecordSettings, Role, read_columns};
+use crate::report::diagnosis::diagnosis_page;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -230,11 +231,19 @@ pub fn recordings(data: &Path) -> Result<Study, StudyError> {
          otherwise from what the best model leaves.\n\nSources: EMPS, A. Janot, M. Gautier, M. Brunot, 2019 Workshop on Nonlinear System Identification Benchmarks. Silverbox, T. Wigren, J. Schoukens, \
          ECC 2013. Motor bench, Hori-Fujimoto Lab (FdiTools), MIT. Mirror, M. Floren et al., ISMA-USD 2024, CC BY 4.0.\n\n",
     );
+    let mut study = Study::default();
     for r in [emps(), silverbox(), motor(data)?] {
-        text.push_str(&section(&r, &made(&r, data)?));
+        let made = made(&r, data)?;
+        let page = format!("{}.html", r.name.to_lowercase().replace(' ', "_"));
+        text.push_str(&section(&r, &made));
+        let _ = writeln!(text, "Report with pictures: [{page}]({page}).\n");
+        let source = [
+            ("Records".to_owned(), r.file.to_owned()),
+            ("Rows fitted".to_owned(), format!("{} to {}", r.fit[0], r.fit[1])),
+        ];
+        study.page(&format!("mismatch/{page}"), diagnosis_page(&made, source.to_vec())?.html());
     }
     text.push_str(&mirror(data)?);
-    let mut study = Study::default();
     study.page("mismatch/recordings.md", text);
     Ok(study)
 }
