@@ -4,7 +4,7 @@
 mod diagnose_common;
 
 use diagnose_common::*;
-use servotune::diagnose::{DiagnoseSettings, Verdict, diagnose};
+use servotune::diagnose::{Confirmation, DiagnoseSettings, Verdict, diagnose};
 use servotune::numeric::random::Random;
 use servotune::recording::{Case, Role};
 use std::path::PathBuf;
@@ -43,7 +43,6 @@ fn dry_friction_is_named_and_measured() {
     // The tanh falls short of the sign near rest: a few per cent of the level.
     assert!((f.parameters["level_command"].value / 0.006 - 1.0).abs() < 0.05, "{:?}", f.parameters);
     let h = d.fit.holdout.unwrap();
-    // A smooth sign is no law of the library: its neighbourhood of rest stays unexplained, a few thousandths of the power.
     assert!(h.explained_share > 0.99 && h.rms_after < 0.1 * h.rms_refit_linear, "{h:?}");
 }
 
@@ -199,4 +198,31 @@ fn a_limit_that_every_repeat_meets_is_found_though_their_mean_does_not() {
     let limit = &d.findings[0].parameters["limit"];
     // Each sample above it tells the limit to the noise over the gain of a pulse; some ten do.
     assert!((limit.value / clip - 1.0).abs() < 0.01, "{limit:?} for {clip}");
+}
+
+#[test]
+fn a_held_out_record_far_off_is_no_agreement() {
+    // The limit lies far above what the fitted records ask for.
+    let truth = Truth { clip: 0.5, ..GIVEN };
+    let mut records = records(&truth);
+    let u = excitation(1.0, 77);
+    records.push(record("far.csv", Role::Holdout, "far", &u, respond(&truth, &u, 78)));
+    let d = diagnosed_from(records);
+    assert_eq!((d.verdict, d.findings[0].effect.as_str()), (Verdict::LocatedUnexplained, "unexplained"));
+    assert_eq!(d.findings[0].place.records, ["far.csv"]);
+}
+
+#[test]
+fn a_law_is_denied_where_it_is_absent_and_seldom_where_it_acts() {
+    let mut noise = Random::new(11);
+    for says in [60.0, 400.0, 1e4] {
+        let denied = |mean: f64, noise: &mut Random| {
+            let draw =
+                |_| Confirmation { effect: "dead_band", says, gains: mean + 2.0 * f64::sqrt(says) * noise.normal() };
+            (0..4000).map(draw).filter(Confirmation::denied).count()
+        };
+        // Three standard deviations: 1.3 of a thousand, 5.4 of 4000.
+        assert!(denied(says, &mut noise) < 14, "{says}");
+        assert!(denied(-says, &mut noise) > 3900, "{says}");
+    }
 }

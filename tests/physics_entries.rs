@@ -48,7 +48,7 @@ fn parameters_and_restore_are_inverse_at_every_point_of_every_grid() {
                 // What a simpler form of a law leaves out has no strength.
                 let unused = |name: &str, c: usize| match name {
                     "encoder_cyclic_error" => setting.inner[1] < 1.5 && c >= 2,
-                    "torque_factor_rolloff" => setting.inner[0] < 1.5 && c != 1,
+                    "torque_factor_rolloff" => setting.inner[0] < 3.5 && c != 1,
                     _ => false,
                 };
                 let gone: Vec<usize> = (0..facts.columns).filter(|c| unused(facts.name, *c)).collect();

@@ -4,7 +4,7 @@
 mod physics_common;
 
 use nalgebra::Complex;
-use physics_common::{T, along, close, df, law, run};
+use physics_common::{T, along, close, df, law, run, scene};
 use servotune::physics::Sample;
 use std::f64::consts::{PI, TAU};
 
@@ -19,6 +19,10 @@ fn describing_functions_of_the_textbook() {
     close(df("dead_band", &[0.3], 1.0, a, w), Complex::new(-clipped, 0.0), 1e-6);
     // Coulomb F with a pre-sliding length of 1e-5 A: 4F/(pi A) against the velocity; the length turns the phase by about sqrt.
     close(df("coulomb_friction", &[1e-5, 0.0, 0.0], 0.03, a, w), Complex::new(0.0, -4.0 * 0.03 / (PI * a)), 1e-2);
+    // A drag that creeps, tanh(v/v_c): F/v_c of a slow motion, but for its square over four; a sign of a fast one.
+    let creeps = |v_c: f64| df("coulomb_friction", &[-v_c, 0.0, 0.0], 0.03, a, w);
+    close(creeps(1e3 * a * w), Complex::new(0.0, -0.03 / (1e3 * a)), 1e-6);
+    close(creeps(1e-4 * a * w), Complex::new(0.0, -4.0 * 0.03 / (PI * a)), 1e-3);
     // x³: 3/4 k A²; sin³ has no kink, and Simpson's rule is exact for a cubic of a straight path.
     close(df("nonlinear_spring", &[0.0, 0.0], 2.0, a, w), Complex::new(-0.75 * 2.0 * a * a, 0.0), 1e-5);
     // v|v|: 8/(3 pi) w² A.
@@ -153,5 +157,21 @@ fn springs_and_memory_follow_their_equations() {
         let bias = run(law("bearing_bias", &[3.0, 2e-3, 0.018]).as_mut(), &moved);
         // 0.08 s of rest at least: exp(-40).
         assert!((bias[2998][0] + level).abs() < 1e-9, "{}", bias[2998][0]);
+    }
+}
+
+#[test]
+fn a_torque_factor_may_fall_up_to_a_corner_or_from_one() {
+    // Arm at rest: the mean over the interval is the value. Positions are told by the record, the law sees the arm's own.
+    let ratio = scene().arm_over_record();
+    let column = |inner: &[f64], z: f64| {
+        let here = Sample { x: 15.0 * ratio * z, i: 0.4, ..Sample::default() };
+        run(law("torque_factor_rolloff", inner).as_mut(), &[here, here])[0][1]
+    };
+    for z in [-1.0f64, -0.6, 0.2, 0.7, 0.9] {
+        let (size, corner): (f64, f64) = (z.abs(), 0.7);
+        assert!((column(&[1.0, 1.0], z) + 0.4 * size * size).abs() < 1e-12, "{z}");
+        assert!((column(&[2.0, corner], z) + 0.4 * (size - corner).max(0.0).powi(2)).abs() < 1e-12, "{z}");
+        assert!((column(&[3.0, corner], z) + 0.4 * size.min(corner).powi(2)).abs() < 1e-12, "{z}");
     }
 }

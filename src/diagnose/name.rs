@@ -109,6 +109,10 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
     {
         family.push("line_disturbance".to_owned());
     }
+    // Nobody said how fast a spindle turns: any line may be one of its orders.
+    if name == "line_disturbance" && spindle_hz.is_none() && !family.iter().any(|f| f == "repeatable_runout") {
+        family.push("repeatable_runout".to_owned());
+    }
     // Where the refit leaves next to nothing, a slight curve in the spectrum may be what its own straightness falls short of.
     let line = own == "line_disturbance";
     let curve = line || chosen.effect.facts().port == crate::physics::Port::Structure && c.concealed > CURVED;
