@@ -146,10 +146,11 @@ impl Effect for TorqueFactorRolloff {
         };
         let lead = match given.need("curvature") {
             Ok(a) => a * l.powi(2),
-            Err(missing) => {
-                let known = bowl(inner[0], inner[1], KNOWN / l);
-                given.need("drop_at_15").map_err(|_| missing)? / known.max(f64::MIN_POSITIVE)
-            }
+            // A fall that begins beyond the known position is not told by it.
+            Err(missing) => match bowl(inner[0], inner[1], KNOWN / l) {
+                known if known > 0.0 => given.need("drop_at_15").map_err(|_| missing)? / known,
+                _ => return Err(missing),
+            },
         };
         let strengths = vec![
             given.or("slope", 0.0) * l,

@@ -7,7 +7,7 @@ use super::diagnosis_chance::chance_blocks;
 use super::diagnosis_error::{error_figure, spectrum_figure};
 use super::diagnosis_law::{amplitude_figure, law_figures, unexplained_figure};
 use super::diagnosis_place::{Map, time_map, zone_map};
-use super::diagnosis_tables::{log_blocks, noise_table, records_table, search_blocks, where_table};
+use super::diagnosis_tables::{confirmed_table, log_blocks, noise_table, records_table, search_blocks, where_table};
 use super::number::NumberFormat;
 use super::page::{Block, Card, Page, Section};
 use super::table::{Cell, Column, Table, Verdict as Badge};
@@ -95,6 +95,7 @@ pub fn diagnosis_page(made: &Diagnosed, provenance: Vec<(String, String)>) -> Re
         sections.push(laws);
     }
     let mut search = search_blocks(&shown)?;
+    search.extend(confirmed_table(&shown)?.map(Block::Table));
     search.extend(chance_blocks(&shown)?);
     sections.push(Section { heading: "The search".into(), blocks: search });
     let mut logs = log_blocks(&shown)?;

@@ -133,6 +133,33 @@ pub(super) fn search_blocks(s: &Shown) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
+/// What the records that were not used say of each law; nothing where they were not asked.
+pub(super) fn confirmed_table(s: &Shown) -> Result<Option<Table>, ReportError> {
+    let asked = &s.made.diagnosis.confirmed;
+    if asked.is_empty() {
+        return Ok(None);
+    }
+    let mut table = Table::new(
+        "Asked of the records that were not used: fall of their whitened squared error when the law is added",
+        vec![
+            Column::words("Law"),
+            Column::numbers("It should take", "", NumberFormat::Significant(4)),
+            Column::numbers("Standard deviation", "", NumberFormat::Significant(3)),
+            Column::numbers("It takes", "", NumberFormat::Significant(4)),
+        ],
+    );
+    for c in asked {
+        let takes = Cell::from(c.gains);
+        table.push(vec![
+            words(c.effect).as_str().into(),
+            c.says.into(),
+            (2.0 * c.says.sqrt()).into(),
+            if c.denied() { takes.flagged(Badge::Fail, "denied") } else { takes },
+        ])?;
+    }
+    Ok(Some(table))
+}
+
 /// What the logs are worth: replay of the controller, faults of samples.
 pub(super) fn log_blocks(s: &Shown) -> Result<Vec<Block>, ReportError> {
     let d = &s.made.diagnosis;
