@@ -6,7 +6,7 @@
 use super::bench::Bench;
 use super::name::family_width;
 use super::refit::Chosen;
-use super::select::{Model, OWN, Step, gain_of};
+use super::select::{Model, OWN, Step, begun, gain_of};
 use super::simulated::simulated;
 
 /// Another law in the place of one effect of the model, everything else refitted.
@@ -31,14 +31,19 @@ const NO_JUDGE: f64 = 1.2;
 /// the records do not.
 const USUAL: f64 = 4.6;
 
+/// Free numbers of a law.
+pub(super) fn numbers(c: &Chosen) -> usize {
+    let strengths = if c.effect.facts().fixed { 0 } else { c.setting.strengths.iter().filter(|s| **s != 0.0).count() };
+    strengths + c.continuous.iter().filter(|c| **c).count()
+}
+
 /// What one law must take more than another because it has more numbers (Schwarz 1978) or because machines seldom follow it; less where
 /// it has fewer, or most machines do.
 pub(super) fn more(bench: &Bench, law: &Chosen, than: &Chosen) -> f64 {
+    let price = (bench.stack.total as f64).ln();
     let of = |c: &Chosen| {
-        let strengths =
-            if c.effect.facts().fixed { 0 } else { c.setting.strengths.iter().filter(|s| **s != 0.0).count() };
-        let numbers = strengths + c.continuous.iter().filter(|c| **c).count();
-        numbers as f64 * (bench.stack.total as f64).ln() - if c.effect.usual() { USUAL } else { 0.0 }
+        let numbers = numbers(c) + begun(bench, &c.setting.inner, c.effect);
+        price * numbers as f64 - if c.effect.usual() { USUAL } else { 0.0 }
     };
     of(law) - of(than)
 }

@@ -3,7 +3,7 @@
 use super::bench::Bench;
 use super::fitted::{fitted, fitted_from_both};
 use super::refit::Chosen;
-use super::rival::{BETTER, Rival, more};
+use super::rival::{BETTER, Rival, more, numbers};
 use super::select::{MINOR, Model, OWN, Step, begun, gain_of, scan_at};
 use super::simulated::simulated;
 use crate::physics::{Effect, library};
@@ -71,11 +71,17 @@ pub(super) fn spare(
 /// noise that each model left for itself, by which a poor start makes its own excuse.
 const NEAR: f64 = 0.8;
 const NEAR_UNKNOWN: f64 = 0.4;
-/// Most laws that are looked for afresh in the place of one.
-const AFRESH: usize = 4;
+/// Most forms of one law that are tried in the place of another.
+const FORMS: usize = 2;
 
-/// Laws of other names that may stand in the place of effect `at`: those that came near it in its own step, and where it is not alone, those
-/// it is confused with that explain as much beside the others. What is found later changes what the first step saw.
+/// What tells two forms of one law apart: how many numbers they have, and the kind that the first inner one names.
+fn form(c: &Chosen) -> (&'static str, usize, u64) {
+    let kind = c.setting.inner.first().filter(|v| v.fract() == 0.0).map_or(0, |v| v.to_bits());
+    (c.effect.facts().name, numbers(c), kind)
+}
+
+/// Laws that may stand in the place of effect `at`, simpler forms of its own first: those that came near it in its own step, and where it
+/// is not alone, those it is confused with that explain as much beside the others. What is found later changes what the first step saw.
 fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, iterations: usize) -> Vec<Chosen> {
     let near = if bench.levels.from_repeats { NEAR } else { NEAR_UNKNOWN };
     let own = &model.chosen[at];
@@ -86,23 +92,30 @@ fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, itera
     if model.chosen.len() > 1 {
         let alike = |e: &&'static dyn Effect| {
             let f = e.facts();
-            facts.confused_with.contains(&f.name) || f.confused_with.contains(&facts.name)
+            f.name == facts.name || facts.confused_with.contains(&f.name) || f.confused_with.contains(&facts.name)
         };
         let alike: Vec<&'static dyn Effect> = library().iter().copied().filter(alike).collect();
         let mut chosen = model.chosen.clone();
         chosen.remove(at);
         let without = fitted(bench, chosen, &model.refitted.p, iterations);
-        let mut seen = scan_at(bench, &alike, &without, &without.refitted.p);
-        seen.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let seen = scan_at(bench, &alike, &without, &without.refitted.p);
         let close = seen.iter().filter(|c| c.gain >= near * (without.cost - model.cost));
-        for c in close.filter(|c| c.effect.possible(&c.setting, &[])).take(AFRESH) {
-            if all.iter().all(|o| o.effect.facts().name != c.effect.facts().name) {
-                all.push(c.chosen(own.step));
+        let possible = close.filter(|c| c.effect.possible(&c.setting, &[]));
+        let mut afresh: Vec<(f64, Chosen)> = possible.map(|c| (c.gain, c.chosen(own.step))).collect();
+        afresh.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (_, c) in afresh {
+            let forms = all.iter().filter(|o| o.effect.facts().name == c.effect.facts().name).count();
+            if forms < FORMS && all.iter().all(|o| form(o) != form(&c)) {
+                all.push(c);
             }
         }
     }
-    let elsewhere = |c: &Chosen| model.chosen.iter().any(|m| m.effect.facts().name == c.effect.facts().name);
-    all.retain(|c| !elsewhere(c));
+    let stays = |c: &Chosen| match c.effect.facts().name {
+        name if name == facts.name => form(c) != form(own),
+        name => model.chosen.iter().all(|m| m.effect.facts().name != name),
+    };
+    all.retain(stays);
+    all.sort_by_key(|c| c.effect.facts().name != facts.name);
     all
 }
 
@@ -121,11 +134,16 @@ pub(super) fn exchange(bench: &Bench, model: &mut Model, steps: &[Step], iterati
             let other = fitted_from_both(bench, &chosen, &model.refitted.p, iterations);
             let dearer = if each { OWN * gain } else { 0.0 };
             let dearer = dearer + more(bench, &other.chosen[at], &model.chosen[at]);
-            if other.cost + BETTER + dearer < model.cost && other.possible() {
-                let cost = model.cost;
-                found.push(Rival { name: own, cost, model: std::mem::replace(model, other) });
-            } else {
-                found.push(Rival { name: facts.name, cost: other.cost, model: other });
+            let better = other.cost + BETTER + dearer < model.cost && other.possible();
+            // Another form of the same law is no rival.
+            match (better, facts.name == own) {
+                (true, true) => *model = other,
+                (true, false) => {
+                    let cost = model.cost;
+                    found.push(Rival { name: own, cost, model: std::mem::replace(model, other) });
+                }
+                (false, true) => {}
+                (false, false) => found.push(Rival { name: facts.name, cost: other.cost, model: other }),
             }
         }
         all.push(found);

@@ -36,6 +36,8 @@ const STRENGTH_STEP: f64 = 2e-3;
 const INNER_STEP: f64 = 5e-3;
 /// Shortest length of a dry drag over the shortest that the search takes.
 const DRIER: f64 = 0.02;
+/// The same above which a fit that wins nothing says nothing.
+const FAR_OFF: f64 = 1.2;
 /// Standard deviations of what is left beyond the noise from which a fit is made from elsewhere too.
 const UNSETTLED: f64 = 5.0;
 /// Whitened simulation error over that along the recorded motion above which the simulation runs away and fits nothing.
@@ -316,20 +318,23 @@ fn descended(bench: &Bench, model: &Model) -> Option<Model> {
     }
     let mut work = Workspace::default();
     let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
-    let (mut cost, mut converged, mut best) = (before, false, None);
+    let (mut cost, mut converged, mut best) = (before, false, x.clone());
     for _ in 0..AGAIN {
         converged = minimise(&mut problem, &mut x, &settings, &mut work).converged;
         // With the starts of where it ended, as the fit's own beginning was judged.
         let settled = size(&problem.settle(&x));
         let further = settled < (1.0 - FURTHER) * cost;
-        if settled <= (1.0 + TOLERANCE) * cost {
-            (cost, best) = (settled, Some(x.clone()));
+        if settled < cost {
+            (cost, best) = (settled, x.clone());
         }
         if !further {
             break;
         }
     }
-    let x = best?;
+    if cost == before && before > FAR_OFF * model.cost {
+        return None;
+    }
+    let x = best;
     let (p, chosen) = problem.unpack(&x);
     if !chosen.iter().all(|c| c.effect.possible(&c.setting, &[])) {
         return None;
