@@ -209,7 +209,7 @@ fn a_held_out_record_far_off_is_no_agreement() {
     records.push(record("far.csv", Role::Holdout, "far", &u, respond(&truth, &u, 78)));
     let d = diagnosed_from(records);
     assert_eq!((d.verdict, d.findings[0].effect.as_str()), (Verdict::LocatedUnexplained, "unexplained"));
-    assert_eq!(d.findings[0].place.records, ["far.csv"]);
+    assert_eq!(d.findings[0].place.records, ["far"]);
 }
 
 #[test]

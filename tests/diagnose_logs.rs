@@ -4,9 +4,11 @@
 mod diagnose_common;
 
 use diagnose_common::*;
-use servotune::diagnose::{DiagnoseSettings, Verdict, diagnose};
+use servotune::controller::{Controller, Pid};
+use servotune::diagnose::{DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use servotune::lti::Plant;
-use servotune::recording::{Case, Role};
+use servotune::numeric::random::Random;
+use servotune::recording::{Case, Record, RecordEntry, Role};
 use std::path::PathBuf;
 
 #[test]
@@ -114,4 +116,66 @@ fn a_clock_that_runs_wrong_is_a_fault_of_the_log() {
     // The same body with another gain is another machine, and no clock.
     let other = diagnosed(&Truth { b: GIVEN.b * 1.1, ..truth });
     assert_eq!(other.verdict, Verdict::Refit, "{:?}", other.findings);
+}
+
+/// A loop that follows a triangle: the law of the contract written out, the machine by Runge-Kutta as everywhere here.
+fn closed(seed: u64) -> (RecordEntry, Record) {
+    let (pid, mut noise) = (law().pid, Random::new(seed));
+    let triangle = |k: usize| 20.0 * (((k as f64 * T / 0.05 + 0.5) % 2.0 - 1.0).abs() - 0.5);
+    let reference: Vec<f64> = (0..N).map(triangle).collect();
+    let (mut x, mut v, mut sum, mut rate, mut last) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    let (mut command, mut position) = (Vec::new(), Vec::new());
+    let h = T / STEPS as f64;
+    for (k, r) in reference.iter().enumerate() {
+        let y = x + NOISE * noise.normal();
+        let e = r - y;
+        sum += pid.ki_per_s * T * e;
+        rate = (pid.derivative_filter_s * rate + pid.kd_s * (e - last)) / (T + pid.derivative_filter_s);
+        last = e;
+        position.push(y);
+        command.push(pid.kp * e + sum + rate);
+        for s in 0..STEPS {
+            let at = ((k as f64 + (s as f64 + 0.5) / STEPS as f64) * T - GIVEN.delay) / T;
+            let u = if at < 0.0 { 0.0 } else { command[at as usize] };
+            let slope = |x: f64, v: f64| GIVEN.b * u - GIVEN.k * x - GIVEN.c * v;
+            let (k1x, k1v) = (v, slope(x, v));
+            let (k2x, k2v) = (v + 0.5 * h * k1v, slope(x + 0.5 * h * k1x, v + 0.5 * h * k1v));
+            let (k3x, k3v) = (v + 0.5 * h * k2v, slope(x + 0.5 * h * k2x, v + 0.5 * h * k2v));
+            let (k4x, k4v) = (v + h * k3v, slope(x + h * k3x, v + h * k3v));
+            x += h / 6.0 * (k1x + 2.0 * k2x + 2.0 * k3x + k4x);
+            v += h / 6.0 * (k1v + 2.0 * k2v + 2.0 * k3v + k4v);
+        }
+    }
+    let (entry, record) = record(&format!("closed{seed}.csv"), Role::Fit, "closed", &command, position);
+    (entry, Record { reference: Some(reference), ..record })
+}
+
+fn law() -> Controller {
+    let pid = Pid { kp: 0.3, ki_per_s: 20.0, kd_s: 2.5e-4, derivative_filter_s: 2e-5 };
+    Controller { sample_time_s: T, output_limit: None, pid, lowpass: vec![], notch: vec![], feedforward: None }
+}
+
+fn replayed(records: Vec<(RecordEntry, Record)>) -> Diagnosis {
+    let case =
+        Case { id: "test".into(), plant: PathBuf::new(), controller: Some("c.toml".into()), spindle_hz: None, records };
+    diagnose(&case, &plant(), Some(&law()), &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
+}
+
+#[test]
+fn whole_rows_that_a_log_lacks_are_lost_samples_though_its_clock_runs_on() {
+    let sound: Vec<_> = (1..4).map(closed).collect();
+    assert_eq!(replayed(sound.clone()).verdict, Verdict::NoMismatch);
+    let mut broken = sound;
+    let r = &mut broken[1].1;
+    let rows = 1210..1217;
+    r.reference.as_mut().unwrap().drain(rows.clone());
+    for column in [&mut r.excitation, &mut r.command, &mut r.position] {
+        column.drain(rows.clone());
+    }
+    let d = replayed(broken);
+    assert_eq!((d.verdict, d.findings[0].effect.as_str()), (Verdict::DataFault, "lost_samples"), "{:?}", d.findings);
+    let f = &d.sample_faults[0];
+    assert_eq!((d.sample_faults.len(), f.record.as_str(), f.samples, f.stuck), (1, "closed2", 7.0, false));
+    // The first row behind the gap.
+    assert!((f.time_s - 1210.0 * T).abs() < 1.5 * T, "{f:?}");
 }

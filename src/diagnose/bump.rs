@@ -3,16 +3,17 @@
 //! In: what repeats differ by, whitened. Out: the record, the time and the strength of the push. The mean over repeats would carry
 //! it into every fit and their spread would count it as noise, so such a record is kept out of both.
 
-use super::bench::Bench;
+use super::bench::{Bench, without_start};
 use super::columns::raw_columns;
 use super::differing::Difference;
 use super::finding::{Estimate, Finding, Where};
 use super::fitted::refit;
 use super::judge::{Judged, error};
-use super::linear::Sampled;
+use super::linear::{Sampled, free_motions};
 use super::name::text_of;
 use super::run::Run;
 use super::scan::log_tail;
+use super::stack::Segment;
 use super::trajectory::Trajectory;
 use crate::lti::{LtiError, Plant};
 use crate::numeric::least_squares::dot;
@@ -39,6 +40,8 @@ pub struct Bump {
 
 /// Chance of a false push.
 const FALSE: f64 = 1e-9;
+/// Chance under which a push is suspected: it is among the repeats that the noise was taken from, and hides behind itself.
+const SUSPECT: f64 = 1e-3;
 /// Share of what a record has beyond its noise that one push must explain: what comes and goes all the time is no bump.
 const WHOLE: f64 = 0.6;
 /// Widths of a push that are tried, and the shares of the record from which to which they go.
@@ -103,6 +106,11 @@ fn best(answers: &[Answer], x: &[f64], sigma: f64) -> Option<(f64, usize, usize,
 
 /// The clearest push among the repeats, if there is one.
 pub fn bump(bench: &Bench) -> Option<Bump> {
+    strongest(bench, FALSE)
+}
+
+/// The clearest push among the repeats that noise shows with a chance below `limit`.
+fn strongest(bench: &Bench, limit: f64) -> Option<Bump> {
     let sampled = Sampled::of(&bench.form.given, bench.scene.sample_time_s).ok()?;
     let longest = bench.repeats.iter().map(|r| r.1.len()).max()?;
     let answers = answers(bench, &sampled, longest);
@@ -123,7 +131,7 @@ pub fn bump(bench: &Bench) -> Option<Bump> {
         let log_p = log_tail(gain, 1) + (points.max(1) as f64).ln();
         // Less three standard deviations of the noise's own share, its level being that of a median.
         let excess = excess_of / (sigma * sigma) - n - 3.0 * (6.0 * n).sqrt();
-        if log_p < FALSE.ln() && gain > WHOLE * excess && found.as_ref().is_none_or(|f| gain > f.0) {
+        if log_p < limit.ln() && gain > WHOLE * excess && found.as_ref().is_none_or(|f| gain > f.0) {
             // A repeat less the mean holds this part of what is its own.
             let part = ((mates - 1) as f64 / mates as f64).sqrt();
             let t = bench.scene.sample_time_s;
@@ -168,6 +176,29 @@ fn of_two(bench: &Bench, answers: &[Answer], bump: Bump) -> Bump {
     Bump { run, peak: [sign * bump.peak[0], bump.peak[1]], ..bump }
 }
 
+/// A push that is clear once the noise is taken from the other records.
+fn suspected(bench: &Bench, plant: &Plant, spindle_hz: Option<f64>) -> Option<Bump> {
+    let bump = strongest(bench, SUSPECT)?;
+    let mut runs = bench.runs.clone();
+    runs[bump.run].bumped = true;
+    let without = Bench::new(plant, runs, bench.scene.sample_time_s, spindle_hz).ok()?;
+    let run = &without.runs[bump.run];
+    let mates = |s: &Segment| without.runs[s.runs[0]].group == run.group && s.len == run.len();
+    let at = without.stack.segments.iter().position(mates).filter(|_| without.levels.from_repeats)?;
+    let mut stand: Vec<Run> = without.means.clone();
+    stand[at] = run.clone();
+    let p = vec![0.0; without.form.knobs.len()];
+    let fit = without.fit(vec![]);
+    let [own, mean] = [&stand, &without.means].map(|runs| fit.errors_of(&p, runs).swap_remove(at));
+    let apart: Vec<f64> = own.iter().zip(&mean).map(|(a, b)| a - b).collect();
+    let free = |n: usize| free_motions(&without.form.given.body, without.scene.sample_time_s, n).to_vec();
+    let whitened = without_start(&[(bump.run, apart)], &free, &|x| without.whitener.apply(x)).swap_remove(0).1;
+    // The mean of the others has noise of its own.
+    let gain = bump.gain(&without, &whitened)? / (1.0 + 1.0 / without.stack.segments[at].runs.len() as f64);
+    let log_p = bump.log_p + log_tail(gain, 1) - log_tail(bump.gain, 1);
+    (log_p < FALSE.ln()).then_some(Bump { gain, log_p, ..bump })
+}
+
 /// Share of the fit records into which pushes may fall; where there are more, they are no bumps but how the machine is.
 const BUMPED: f64 = 0.25;
 
@@ -181,7 +212,7 @@ pub(super) fn set_aside(
     spindle_hz: Option<f64>,
     iterations: usize,
 ) -> Result<Vec<Bump>, LtiError> {
-    if bench.repeats.is_empty() || bump(bench).is_none() {
+    if bench.repeats.is_empty() || strongest(bench, SUSPECT).is_none() {
         return Ok(Vec::new());
     }
     let sample_time_s = bench.scene.sample_time_s;
@@ -189,7 +220,7 @@ pub(super) fn set_aside(
     let plant = refit(&mut bench.clone(), iterations).refitted.plant;
     let mut cleaner = Bench::new(&plant, bench.runs.clone(), sample_time_s, spindle_hz)?;
     let mut found = Vec::new();
-    while let Some(b) = bump(&cleaner) {
+    while let Some(b) = bump(&cleaner).or_else(|| suspected(&cleaner, &plant, spindle_hz)) {
         if found.len() == most || bent(&cleaner, &b) {
             return Ok(Vec::new());
         }

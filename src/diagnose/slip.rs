@@ -24,6 +24,8 @@ struct Break {
     later: f64,
     /// Wrong samples over which the position stood still; 0 where it did not.
     still: usize,
+    /// Rows that the whole log lacks there.
+    gone: f64,
 }
 
 /// Places in a record where the replay starts to fail, each with the shift behind it that makes the replay right again; the next
@@ -36,7 +38,7 @@ pub fn breaks_of_replay(law: &Law, run: &Run, sample_time_s: f64) -> Vec<SampleF
         all.push(SampleFault {
             record: run.name.clone(),
             time_s: b.at as f64 * sample_time_s,
-            samples: if b.still > 0 { b.still as f64 } else { -b.later },
+            samples: if b.still > 0 { b.still as f64 } else { b.gone - b.later },
             stuck: b.still > 0,
         });
         (from, shift) = (b.at + (SLIP as usize).max(b.still), shift + b.later);
@@ -90,7 +92,7 @@ fn first_break(law: &Law, run: &Run, from: usize, shift: f64) -> Option<Break> {
     if still.len() >= STILL && from + n > still.end + tail_least {
         let left = squares(still.end - from, 0.0) / tail_least as f64;
         if left.sqrt() < FAILS * quiet {
-            return Some(Break { at: still.start + 1, later: 0.0, still: still.len() - 1 });
+            return Some(Break { at: still.start + 1, later: 0.0, still: still.len() - 1, gone: 0.0 });
         }
     }
     let tail = first + SLIP as usize;
@@ -99,9 +101,42 @@ fn first_break(law: &Law, run: &Run, from: usize, shift: f64) -> Option<Break> {
         return None;
     }
     let before = squares(tail, 0.0);
+    // Right again without a shift, from another memory: rows are gone, unless a motion that runs on without a jump says no.
+    if (before / tail_least as f64).sqrt() < FAILS * quiet {
+        let told = run.reference.as_deref().and_then(|r| rows_gone(r, at)).or_else(|| rows_gone(&run.position, at));
+        let gone = told.unwrap_or(1.0);
+        return (gone > 0.0).then_some(Break { at, later: 0.0, still: 0, gone });
+    }
     let all = (1 - SLIP..SLIP).filter(|d| *d != 0).map(|d| (f64::from(d), squares(tail, f64::from(d))));
     let (later, left) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (left < LEFT * before).then_some(Break { at, later, still: 0 })
+    (left < LEFT * before).then_some(Break { at, later, still: 0, gone: 0.0 })
+}
+
+/// Samples on either side of a place over which a motion is taken as straight; what it must move over one of them, over its scatter; and the
+/// share of a row by which a count may be off.
+const STRAIGHT: usize = 16;
+const MOVES: f64 = 2.0;
+const WHOLE: f64 = 0.3;
+
+/// Rows that lack before sample `at` of a series that goes on straight on both sides of it, 0 where it runs through; none where it hardly
+/// moves or jumps by no number of its own steps.
+fn rows_gone(y: &[f64], at: usize) -> Option<f64> {
+    let (before, after) = (y.get(at.checked_sub(STRAIGHT)?..at)?, y.get(at..at + STRAIGHT)?);
+    let offset = |i: usize| i as f64 - 0.5 * (STRAIGHT - 1) as f64;
+    let line = |part: &[f64]| {
+        let mean = part.iter().sum::<f64>() / STRAIGHT as f64;
+        let slope = part.iter().enumerate().map(|(i, v)| offset(i) * v).sum::<f64>()
+            / (0..STRAIGHT).map(|i| offset(i).powi(2)).sum::<f64>();
+        let off: f64 = part.iter().enumerate().map(|(i, v)| (v - mean - slope * offset(i)).powi(2)).sum();
+        (mean, slope, off)
+    };
+    let ((a, s, off_a), (b, r, off_b)) = (line(before), line(after));
+    let scatter = ((off_a + off_b) / (2.0 * STRAIGHT as f64 - 4.0)).sqrt();
+    let slope = 0.5 * (s + r);
+    // The middles lie a stretch apart; what they differ by beyond it was run through in rows that are not there.
+    let rows = (b - a) / slope - STRAIGHT as f64;
+    let told = slope.abs() > MOVES * scatter && rows > -WHOLE && (rows - rows.round()).abs() < WHOLE;
+    told.then(|| rows.round().max(0.0))
 }
 
 /// The stretch of equal positions around a sample, or the one that ends before it where that is longer.
