@@ -298,6 +298,12 @@ pub fn select(
     prune(bench, &mut model, baseline.cost, settings.iterations);
     progress("rivals of the findings");
     let mut rivals = exchange(bench, &mut model, &steps, settings.iterations);
+    // A law that has found its place may do what another was there for.
+    let before = model.chosen.len();
+    prune(bench, &mut model, baseline.cost, settings.iterations);
+    if model.chosen.len() < before {
+        rivals = exchange(bench, &mut model, &steps, settings.iterations);
+    }
     if !bench.levels.from_repeats && !model.chosen.is_empty() {
         // By the noise that the best model leaves, what the others left too.
         given = bench.fit(vec![]).cost(&zero);
