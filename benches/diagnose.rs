@@ -84,7 +84,7 @@ fn run() -> Outcome<()> {
     let out = words.iter().position(|w| w == "--out").and_then(|i| words.get(i + 1)).map(PathBuf::from);
     let friction = || law("pivot_friction", &[2.5, 0.0], &[0.012]);
     // 8 % less torque at the ends of the travel.
-    let rolloff = || law("torque_factor_rolloff", &[1.0], &[0.0, 0.08, 0.0, 0.0]);
+    let rolloff = || law("torque_factor_rolloff", &[1.0, 1.0], &[0.0, 0.08, 0.0, 0.0]);
     let machines = [
         ("nothing missing", vec![]),
         ("bearing that sticks", vec![friction()?]),

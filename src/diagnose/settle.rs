@@ -89,7 +89,12 @@ fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, itera
     let in_place = |c: &Chosen| Chosen { step: own.step, ..c.clone() };
     let close = step.tried.iter().filter(|(_, tried)| step.before - tried.evidence >= near * gain);
     let mut all: Vec<Chosen> = close.filter_map(|(_, tried)| tried.chosen.last()).map(in_place).collect();
-    if model.chosen.len() > 1 {
+    let mut company = model.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| c.effect.facts().name);
+    // Those of its own step, where it was taken beside the same others, have seen what is to be seen.
+    let before = step.tried.first().and_then(|(_, t)| t.chosen.split_last()).map_or(&[][..], |(_, rest)| rest);
+    let known =
+        before.len() + 1 == model.chosen.len() && company.all(|n| before.iter().any(|c| c.effect.facts().name == n));
+    if !known {
         let alike = |e: &&'static dyn Effect| {
             let f = e.facts();
             f.name == facts.name || facts.confused_with.contains(&f.name) || f.confused_with.contains(&facts.name)
