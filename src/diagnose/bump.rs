@@ -104,13 +104,8 @@ fn best(answers: &[Answer], x: &[f64], sigma: f64) -> Option<(f64, usize, usize,
     best
 }
 
-/// The clearest push among the repeats, if there is one.
-pub fn bump(bench: &Bench) -> Option<Bump> {
-    strongest(bench, FALSE)
-}
-
-/// The clearest push among the repeats that noise shows with a chance below `limit`.
-fn strongest(bench: &Bench, limit: f64) -> Option<Bump> {
+/// The clearest push among the repeats that is at least suspected, if there is one.
+fn strongest(bench: &Bench) -> Option<Bump> {
     let sampled = Sampled::of(&bench.form.given, bench.scene.sample_time_s).ok()?;
     let longest = bench.repeats.iter().map(|r| r.1.len()).max()?;
     let answers = answers(bench, &sampled, longest);
@@ -131,7 +126,7 @@ fn strongest(bench: &Bench, limit: f64) -> Option<Bump> {
         let log_p = log_tail(gain, 1) + (points.max(1) as f64).ln();
         // Less three standard deviations of the noise's own share, its level being that of a median.
         let excess = excess_of / (sigma * sigma) - n - 3.0 * (6.0 * n).sqrt();
-        if log_p < limit.ln() && gain > WHOLE * excess && found.as_ref().is_none_or(|f| gain > f.0) {
+        if log_p < SUSPECT.ln() && gain > WHOLE * excess && found.as_ref().is_none_or(|f| gain > f.0) {
             // A repeat less the mean holds this part of what is its own.
             let part = ((mates - 1) as f64 / mates as f64).sqrt();
             let t = bench.scene.sample_time_s;
@@ -176,9 +171,12 @@ fn of_two(bench: &Bench, answers: &[Answer], bump: Bump) -> Bump {
     Bump { run, peak: [sign * bump.peak[0], bump.peak[1]], ..bump }
 }
 
-/// A push that is clear once the noise is taken from the other records.
-fn suspected(bench: &Bench, plant: &Plant, spindle_hz: Option<f64>) -> Option<Bump> {
-    let bump = strongest(bench, SUSPECT)?;
+/// The clearest push, if it is clear as it stands or once the noise is taken from the other records.
+fn clear(bench: &Bench, plant: &Plant, spindle_hz: Option<f64>) -> Option<Bump> {
+    let bump = strongest(bench)?;
+    if bump.log_p < FALSE.ln() {
+        return Some(bump);
+    }
     let mut runs = bench.runs.clone();
     runs[bump.run].bumped = true;
     let without = Bench::new(plant, runs, bench.scene.sample_time_s, spindle_hz).ok()?;
@@ -212,7 +210,7 @@ pub(super) fn set_aside(
     spindle_hz: Option<f64>,
     iterations: usize,
 ) -> Result<Vec<Bump>, LtiError> {
-    if bench.repeats.is_empty() || strongest(bench, SUSPECT).is_none() {
+    if bench.repeats.is_empty() || strongest(bench).is_none() {
         return Ok(Vec::new());
     }
     let sample_time_s = bench.scene.sample_time_s;
@@ -220,7 +218,7 @@ pub(super) fn set_aside(
     let plant = refit(&mut bench.clone(), iterations).refitted.plant;
     let mut cleaner = Bench::new(&plant, bench.runs.clone(), sample_time_s, spindle_hz)?;
     let mut found = Vec::new();
-    while let Some(b) = bump(&cleaner).or_else(|| suspected(&cleaner, &plant, spindle_hz)) {
+    while let Some(b) = clear(&cleaner, &plant, spindle_hz) {
         if found.len() == most || bent(&cleaner, &b) {
             return Ok(Vec::new());
         }

@@ -7,7 +7,7 @@ use super::leftover::{Leftover, leftover};
 use super::locked::follows_motion;
 use super::name::same_drag;
 use super::refit::{Chosen, Refitted};
-use super::rival::{Rival, by_simulation};
+use super::rival::{Rival, by_simulation, numbers as free_numbers};
 use super::scan::{Candidate, Ground, log_tail};
 use super::settle::{exchange, prune, spare};
 use super::simulated::simulated;
@@ -193,9 +193,7 @@ pub fn select(
         // Two forms of the leading effect, one of each other: the one that is worth its numbers most. Each number of a law is paid for (Schwarz
         // 1978): of two that fit alike, the one with fewer.
         let best_form = |c: &Candidate| {
-            let moved = |c: &Candidate| c.continuous.iter().filter(|c| **c).count();
-            let there = |c: &Candidate| c.setting.strengths.iter().filter(|s| **s != 0.0).count();
-            let net = |c: &Candidate| c.gain - price * (there(c) + moved(c)) as f64;
+            let net = |c: &Candidate| c.gain - price * free_numbers(&c.chosen(0)) as f64;
             let forms = step.candidates.iter().filter(|o| o.effect.facts().name == c.effect.facts().name);
             forms.map(net).fold(f64::NEG_INFINITY, f64::max) <= net(c)
         };

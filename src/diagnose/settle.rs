@@ -80,8 +80,8 @@ fn form(c: &Chosen) -> (&'static str, usize, u64) {
     (c.effect.facts().name, numbers(c), kind)
 }
 
-/// Laws that may stand in the place of effect `at`, simpler forms of its own first: those that came near it in its own step, and where it
-/// is not alone, those it is confused with that explain as much beside the others. What is found later changes what the first step saw.
+/// Laws that may stand in the place of effect `at`, simpler forms of its own first: those that came near it in its own step, and where
+/// other laws stand beside it than did then, those it is confused with that explain as much beside these.
 fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, iterations: usize) -> Vec<Chosen> {
     let near = if bench.levels.from_repeats { NEAR } else { NEAR_UNKNOWN };
     let own = &model.chosen[at];
@@ -90,8 +90,8 @@ fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, itera
     let close = step.tried.iter().filter(|(_, tried)| step.before - tried.evidence >= near * gain);
     let mut all: Vec<Chosen> = close.filter_map(|(_, tried)| tried.chosen.last()).map(in_place).collect();
     let mut company = model.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| c.effect.facts().name);
-    // Those of its own step, where it was taken beside the same others, have seen what is to be seen.
     let before = step.tried.first().and_then(|(_, t)| t.chosen.split_last()).map_or(&[][..], |(_, rest)| rest);
+    // Whether the step in which it was taken had the same others beside it.
     let known =
         before.len() + 1 == model.chosen.len() && company.all(|n| before.iter().any(|c| c.effect.facts().name == n));
     if !known {

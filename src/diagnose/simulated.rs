@@ -36,12 +36,12 @@ const STRENGTH_STEP: f64 = 2e-3;
 const INNER_STEP: f64 = 5e-3;
 /// Shortest length of a dry drag over the shortest that the search takes.
 const DRIER: f64 = 0.02;
-/// The same above which a fit that wins nothing says nothing.
-const FAR_OFF: f64 = 1.2;
 /// Standard deviations of what is left beyond the noise from which a fit is made from elsewhere too.
 const UNSETTLED: f64 = 5.0;
 /// Whitened simulation error over that along the recorded motion above which the simulation runs away and fits nothing.
 const AWAY: f64 = 100.0;
+/// The same above which a fit that wins nothing says nothing.
+const FAR_OFF: f64 = 1.2;
 
 /// What is moved: places in the linear parameters, then strengths and inner parameters by effect and place.
 struct Free {
