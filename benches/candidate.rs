@@ -9,7 +9,7 @@ use servotune::controller::Controller;
 use servotune::feedback::{LoopOnGrid, SampledPlant};
 use servotune::lti::DiscretePlant;
 use servotune::pes::{Scene, WindowDft};
-use servotune::tune::{Bench, Machine, Parameters, Spec, TuneSettings, tune};
+use servotune::tune::{Machine, Spec, TuneSettings, TuningProblem, tune};
 use tune_common::{paper_plant, paper_response, paper_spec, start_controller};
 
 fn main() {
@@ -51,11 +51,10 @@ fn dft(b: Bencher) {
 
 fn candidate_of(b: Bencher, spec: &Spec, machine: Machine<'_>) {
     let start = controller();
-    let p = Parameters::of(spec, Some(&start), start.sample_time_s);
-    let bench = Bench::new(&[machine], spec, p).unwrap();
-    let x = bench.parameters().vector(&start);
-    let mut desk = bench.desk();
-    b.bench_local(|| bench.score(black_box(&x), &mut desk));
+    let problem = TuningProblem::around(&[machine], spec, &start).unwrap();
+    let x = problem.parameters().vector(&start);
+    let mut work = problem.work();
+    b.bench_local(|| problem.score(black_box(&x), &mut work));
 }
 
 #[divan::bench]

@@ -13,7 +13,7 @@ use servotune::identify::{IdentifySettings, OrderChoice, identify};
 use servotune::lti::{DiscretePlant, FrequencyResponse, Plant, PlantFile};
 use servotune::numeric::random::Random;
 use servotune::pes::simulate;
-use servotune::tune::{Bench, Machine, Outcome, Parameters, Spec, TuneSettings, tune};
+use servotune::tune::{Machine, Outcome, Spec, TuneSettings, TuningProblem, tune};
 use servotune::twin::plants::{log_grid, measure, random_plant};
 use servotune::twin::{MachineClass, nominal_controller, paper_machine};
 use std::error::Error;
@@ -93,28 +93,28 @@ fn responses(job: &Path) -> Outcomes<Vec<Vec<[f64; 2]>>> {
 }
 
 /// Decision vectors within 5 % of the controller's, so that no two calls in a row judge the same candidate.
-fn candidates(bench: &Bench, controller: &Controller) -> Vec<Vec<f64>> {
+fn candidates(problem: &TuningProblem, controller: &Controller) -> Vec<Vec<f64>> {
     let mut random = Random::new(1);
-    let at = bench.parameters().vector(controller);
+    let at = problem.parameters().vector(controller);
     let near = |_| {
-        let moved = at.iter().zip(bench.parameters().bounds());
+        let moved = at.iter().zip(problem.parameters().bounds());
         moved.map(|(x, [from, to])| (x + random.between(-0.05, 0.05)).clamp(*from, *to)).collect()
     };
     (0..64).map(near).collect()
 }
 
 fn candidate_times(plant: &Plant, controller: &Controller, spec: &Spec) -> Outcomes<Vec<Timing>> {
-    let parameters = Parameters::of(spec, Some(controller), controller.sample_time_s);
-    let bench = Bench::new(&[Machine::Model(plant)], spec, parameters)?;
-    let some = candidates(&bench, controller);
-    let mut desk = bench.desk();
+    let profile = spec.write("a write")?;
+    let problem = TuningProblem::around(&[Machine::Model(plant)], spec, controller)?;
+    let some = candidates(&problem, controller);
+    let mut work = problem.work();
     let whole = timing("candidate: margins and DFT, search", 400, 64, |i| {
-        black_box(bench.score(black_box(&some[i % some.len()]), &mut desk));
+        black_box(problem.score(black_box(&some[i % some.len()]), &mut work));
     });
     let sampled = DiscretePlant::of(plant, controller.sample_time_s)?;
     let grid = SampledPlant::of_model(&sampled);
     let chains =
-        some.iter().map(|x| Ok(bench.parameters().controller(x).sections()?.chain)).collect::<Outcomes<Vec<_>>>()?;
+        some.iter().map(|x| Ok(problem.parameters().controller(x).sections()?.chain)).collect::<Outcomes<Vec<_>>>()?;
     let mut on = LoopOnGrid::default();
     let quick = timing("candidate: margins alone, search", 400, 64, |i| {
         grid.judge(black_box(&chains[i % chains.len()]), &mut on);
@@ -125,7 +125,7 @@ fn candidate_times(plant: &Plant, controller: &Controller, spec: &Spec) -> Outco
         black_box(margins(black_box(&model)));
     });
     let write = timing("simulate: whole write with sampling of the plant", 200, 4, |_| {
-        black_box(simulate(black_box(plant), controller, &spec.profile)).ok();
+        black_box(simulate(black_box(plant), controller, profile)).ok();
     });
     Ok(vec![whole, quick, exact, write])
 }

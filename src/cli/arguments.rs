@@ -3,8 +3,7 @@
 pub(super) use super::diagnose_arguments::DiagnoseArguments;
 pub(super) use super::fleet_arguments::{FleetArguments, TwinFleetArguments};
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
-pub(super) use super::limit_arguments::{BudgetArguments, LimitArguments, NextSweepArguments, ParetoArguments};
-pub(super) use super::polish_arguments::PolishArguments;
+pub(super) use super::performance_arguments::{BudgetArguments, NextSweepArguments, ParetoArguments};
 pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
 pub(super) use super::verify_arguments::VerifyArguments;
 use super::verify_arguments::uncertainty;
@@ -34,7 +33,6 @@ pub(super) enum Command {
     Features(FeaturesArguments),
     Fleet(FleetArguments),
     Identify(Box<IdentifyArguments>),
-    Limit(LimitArguments),
     Pareto(ParetoArguments),
     Budget(BudgetArguments),
     NextSweep(Box<NextSweepArguments>),
@@ -244,18 +242,12 @@ pub(super) struct TuneArguments {
     /// the gain alone
     #[arg(long, value_name = "SHARES", value_parser = uncertainty, conflicts_with_all = ["no_certificate", "machines"])]
     pub uncertainty: Option<Uncertainty>,
-    /// Say how far the table is from the best in its structure and from the best of all loops, and write it beside the table
-    /// (gains.limit.json); takes a few minutes. Of a sweep, on the model identified from it
-    #[arg(long, conflicts_with = "machines")]
-    pub gap: bool,
-    /// Sample time where no start controller gives one (s)
-    #[arg(long, value_name = "SECONDS", default_value_t = 39.6e-6)]
-    pub sample_time_s: f64,
+    /// Sample time of the controller where neither a start controller nor the spec says it (s)
+    #[arg(long, value_name = "SECONDS")]
+    pub sample_time_s: Option<f64>,
     /// Starts of the search
     #[arg(long, value_name = "N", default_value_t = 12)]
     pub starts: usize,
-    #[command(flatten)]
-    pub polish: PolishArguments,
     #[command(flatten)]
     pub reading: ReadingArguments,
     #[command(flatten)]
@@ -363,10 +355,6 @@ pub(super) enum StudyName {
     Ladder,
     /// The production line in features (figures 24-34)
     Line,
-    /// How far tuned gains are from the best possible: four classes, nine cases of the HDD benchmark plant
-    Limits,
-    /// Quadratic steps alone and with convex-concave ones, on the four classes and the nine cases of the HDD benchmark plant
-    Polish,
     /// The DFT under gains never run, predicted and recorded
     Prediction,
     /// 200 random plants of order 22: response, frequency and margin errors

@@ -1,12 +1,12 @@
 //! `servotune budget`: the sources of a PES, and predicted figures of gains never run.
 
-use super::limit_arguments::BudgetArguments;
+use super::performance_arguments::BudgetArguments;
 use super::{Ending, Failure, Screen, load, margins};
 use crate::feedback::ModelLoop;
 use crate::lti::DiscretePlant;
 use crate::pes::{Budget, PredictSettings, Prediction, budget, predict};
 use crate::report::budget::{budget_table, prediction_table};
-use crate::tune::LimitError;
+use crate::tune::TuneError;
 use serde::Serialize;
 use std::path::Path;
 
@@ -29,7 +29,7 @@ struct Predicted<'a> {
 pub(super) fn run(a: &BudgetArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     let plant = load::plant(&a.plant)?;
     if let Some(p) = plant.physics.first() {
-        return Err(LimitError::Physics { effect: p.effect.clone() }.into());
+        return Err(TuneError::Physics { effect: p.effect.clone() }.into());
     }
     let controller = load::controller(&a.controller)?;
     let profile = load::profile(&a.profile)?;

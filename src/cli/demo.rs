@@ -2,7 +2,7 @@
 //! the model does not explain, then a tester of sixteen slots.
 
 use super::arguments::DemoArguments;
-use super::proof::{self, On, Proof};
+use super::proof::{self, OnSweep, Proof};
 use super::slot::{self, Slot};
 use super::tune::{provenance, text};
 use super::{Ending, Failure, Screen, demo_diagnosis, demo_fleet, demo_gate, gated};
@@ -12,10 +12,10 @@ use crate::identify::{IdentifySettings, identify};
 use crate::lti::PlantFile;
 use crate::numeric::random::Random;
 use crate::report::identified::identified_sentences;
-use crate::tune::{GainTable, Hold, InputDigest, Machine, Outcome, Spec, TuneError, TuneSettings, tune};
+use crate::tune::{Hold, InputDigest, Machine, Outcome, Spec, TuneError, TuneSettings, tune};
 use crate::twin::plants::{log_grid, measure};
 use crate::twin::{MachineClass, nominal_controller, paper_machine};
-use crate::verify::Uncertainty;
+use crate::verify::Assured;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -27,7 +27,7 @@ struct Document<'a> {
     #[serde(flatten)]
     outcome: &'a Outcome,
     gain_table: PathBuf,
-    certificate: Proof,
+    certificate: Option<Proof>,
     report: PathBuf,
     machines: &'a [super::gated::Row],
     machines_table: PathBuf,
@@ -70,27 +70,31 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let spec = Spec::read(&file("spec.toml")).map_err(TuneError::from)?;
     let settings = TuneSettings::default();
     let hold = Hold::NotIncluded;
-    let outcome = tune(
-        &Machine::Response { frf: &sweep.frf, hold, continuation: Some(&id.plant) },
-        &spec,
-        Some(&start),
-        &settings,
-    )?;
     let over_model = tune(&Machine::Model(&id.plant), &spec, Some(&start), &settings)?;
     let digest = |role: &str, sha256: String| InputDigest { role: role.into(), sha256 };
     let controller_text = read_text(&file("controller.toml"))?;
     let inputs =
         vec![digest("frf", sweep.source_digest.clone()), digest("controller", sha256_hex(controller_text.as_bytes()))];
-    let table = GainTable::of(&outcome, spec.search.seed, sha256_hex(spec_text.as_bytes()), inputs)?;
-    let gain_table = file("gains.toml");
-    table.write(&gain_table)?;
-    let on = On::Sweep { sweep: &sweep, hold_included: false };
-    let certificate = proof::beside(&gain_table, &on, &file("spec.toml"), Uncertainty::default(), screen)?;
+    let (gain_table, spec_file) = (file("gains.toml"), file("spec.toml"));
+    let job = OnSweep {
+        sweep: &sweep,
+        hold,
+        plant: &id.plant,
+        spec: &spec,
+        spec_file: &spec_file,
+        start: Some(&start),
+        inputs: &inputs,
+        gains: &gain_table,
+    };
+    let Assured { outcome, table, certificate, .. } = job.tune(&settings, screen)?;
+    let certificate = proof::write(&gain_table, &table, certificate.as_ref(), screen)?;
+    let says = certificate.as_ref().map(|c| c.says.clone()).unwrap_or_default();
 
     screen.say("4/7 report");
     let page = slot::page(&Slot {
         name: "demo, the paper's tunable machine",
         plant: &id.plant,
+        units: slot::units(&id.plant),
         sweep: Some((&sweep, hold)),
         identified: Some(&id),
         spec: &spec,
@@ -98,6 +102,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
         outcome: &outcome,
         over_model: Some(&over_model),
         table: &table,
+        certificate: Some(&says),
         provenance: provenance(&table),
         physics: None,
     })?;
@@ -112,8 +117,8 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let found = demo_diagnosis::run(&a.out, &machine, &start, screen)?;
     screen.say("7/7 a tester of sixteen slots: gate, identification, tables for each slot and shared ones");
     let floor = demo_fleet::run(&a.out, screen)?;
-    let words = text(&outcome, Some(&start), slot::units(&id.plant))?;
-    let ending = if matches!(outcome, Outcome::Tuned(_)) { Ending::Accepted } else { Ending::Rejected };
+    let words = text(&outcome, Some(&start), &spec, slot::units(&id.plant))?;
+    let ending = if outcome.tuned().is_some() { Ending::Accepted } else { Ending::Rejected };
     let shown = format!(
         "{words}\n{}\n{} {}\nOpen this table: {}\n\nRecords that the model does not explain\n{}Open this report: {}\n\nA tester of sixteen slots\n{}Open this page: {}\n\nGain table: {}\n{}\nOpen this report: {}\n",
         gated::sheet(&judged.rows)?.text(),
@@ -125,7 +130,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
         floor.text,
         floor.page.display(),
         gain_table.display(),
-        certificate.says,
+        says,
         report.display()
     );
     let document = Document {

@@ -15,7 +15,7 @@ use crate::physics::PhysicsError;
 use crate::recording::RecordingError;
 use crate::report::ReportError;
 use crate::study::StudyError;
-use crate::tune::{GainTableError, LimitError, TuneError};
+use crate::tune::{GainTableError, TuneError};
 use crate::twin::TwinError;
 use crate::verify::VerifyError;
 use std::path::PathBuf;
@@ -54,16 +54,12 @@ pub enum Failure {
     #[error(transparent)]
     Tune(#[from] TuneError),
     #[error(transparent)]
-    Limit(#[from] LimitError),
-    #[error(transparent)]
     GainTable(#[from] GainTableError),
     #[error(
         "{}: position_unit is `{found}`; expected `{expected}` as in the first plant; give all plants in one unit",
         file.display()
     )]
     Unit { file: PathBuf, found: String, expected: String },
-    #[error("--gap speaks of linear plants; found [[plant.physics]] with {effects} in {}; leave --gap out, or remove them", file.display())]
-    GapOfPhysics { file: PathBuf, effects: String },
     #[error("no machine: expected --plant PLANT, --frf FRF or --machines DIR with --gate GATE")]
     NoMachine,
     #[error("--override {id}: no such machine in {}; found {found}", folder.display())]

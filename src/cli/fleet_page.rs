@@ -108,7 +108,7 @@ fn line(row: &SlotRow, shared: Option<String>) -> SlotLine {
         phase_margin_deg: of(&|p| p.figures.phase_margin_deg),
         gain_margin_db: of(&|p| p.figures.gain_margin_db),
         max_sensitivity: of(&|p| Some(p.figures.max_sensitivity)),
-        dft: of(&|p| Some(p.figures.dft_low + p.figures.dft_high)),
+        dft: of(&|p| Some(p.figures.dft())),
         worst: of(&|p| Some(p.worst)),
         limit: limit.unwrap_or_default(),
         shared: shared.unwrap_or_default(),

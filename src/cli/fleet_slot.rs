@@ -6,7 +6,7 @@ use super::tune::provenance;
 use crate::fleet::{Context, OwnTable, SlotRow, SlotSource, gain_table_of};
 use crate::frf::Sweep;
 use crate::lti::Plant;
-use crate::tune::{Machine, Outcome, Route, Tuned, Work, judge};
+use crate::tune::{Machine, Outcome, Reached, Route, Tuned, Work, judge, ranges};
 
 /// Where the page of a slot lies beside the fleet's page.
 pub(super) fn file(row: &SlotRow) -> String {
@@ -31,7 +31,9 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
         controller: gains.clone(),
         before: Some(vec![judge(&machine, start, &context.spec)?]),
         after: vec![judge(&machine, gains, &context.spec)?],
+        objective: Reached { name: context.spec.objective.minimise, value: f64::NAN, starts: 0, starts_at_best: 0 },
         at_bounds: Vec::new(),
+        ranges: ranges(&[machine], &context.spec, context.base.sample_time_s),
         work,
     });
     let table = gain_table_of(context, row, gains, proved)?;
@@ -42,6 +44,7 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
     let page = slot::page(&Slot {
         name: &name,
         plant: &plant,
+        units: slot::units(&plant),
         sweep: Some((&sweep, context.hold)),
         identified: None,
         spec: &context.spec,
@@ -49,6 +52,7 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
         outcome: &outcome,
         over_model: None,
         table: &table,
+        certificate: None,
         provenance: provenance(&table),
         physics: None,
     })?;

@@ -3,7 +3,7 @@
 //! In: a folder of machine folders, a gate, a spec. Out: a row for each machine with its class, action, reason and what became of it, and a gain
 //! table for each tuned one. A broken folder is a row with its error. What `tune --machines` and `demo` share.
 
-use super::proof::{self, On, Proof};
+use super::proof::{self, OnSweep, Proof};
 use super::{Failure, Screen};
 use crate::controller::Controller;
 use crate::document::sha256_hex;
@@ -13,8 +13,7 @@ use crate::gate::{Action, Gate, Table, Verdict};
 use crate::identify::{IdentifySettings, identify};
 use crate::report::number::NumberFormat;
 use crate::report::table::{self, Column};
-use crate::tune::{GainTable, Hold, InputDigest, Machine, Outcome, Spec, TuneSettings, tune};
-use crate::verify::Uncertainty;
+use crate::tune::{GainTable, Hold, InputDigest, Machine, Spec, TuneSettings, tune};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -180,28 +179,48 @@ fn tuned(job: &Job<'_>, row: &mut Row, screen: &mut Screen) -> Result<(), Failur
     }
     let identified =
         identify(&sweep.frf, &job.model).map_err(|source| Failure::Identify { file: file.clone(), source })?;
-    let machine = Machine::Response { frf: &sweep.frf, hold: job.hold, continuation: Some(&identified.plant) };
-    let outcome = tune(&machine, job.spec, job.start.as_ref().map(|s| &s.0), &job.tuning)?;
     let digest = |role: &str, sha256: &str| InputDigest { role: role.into(), sha256: sha256.into() };
     let mut inputs = vec![digest("frf", &sweep.source_digest), digest("gate", &job.gate_sha256)];
     inputs.extend(job.start.as_ref().map(|s| digest("controller", &s.1)));
-    let mut table = GainTable::of(&outcome, job.spec.search.seed, job.spec_sha256.clone(), inputs)?;
+    let gains = job.out.join(&row.id).join(GAINS);
+    let start = job.start.as_ref().map(|s| &s.0);
+    let (outcome, mut table, certificate) = match job.certify {
+        Some(spec_file) => {
+            let (plant, spec) = (&identified.plant, job.spec);
+            let on = OnSweep {
+                sweep: &sweep,
+                hold: job.hold,
+                plant,
+                spec,
+                spec_file,
+                start,
+                inputs: &inputs,
+                gains: &gains,
+            };
+            let done = on.tune(&job.tuning, screen)?;
+            (done.outcome, done.table, done.certificate)
+        }
+        None => {
+            let machine = Machine::Response { frf: &sweep.frf, hold: job.hold, continuation: Some(&identified.plant) };
+            let outcome = tune(&machine, job.spec, start, &job.tuning)?;
+            let table = GainTable::of(&outcome, job.spec.search.seed, job.spec_sha256.clone(), inputs)?
+                .in_units(&identified.plant.position_unit, &identified.plant.command_unit);
+            (outcome, table, None)
+        }
+    };
     let p = &mut table.provenance;
     p.gate_class = Some(row.class_name.clone());
     p.gate_action = Some(row.action.word().to_owned());
     p.gate_probability = Some(row.probability);
     p.gate_override.clone_from(&row.by_order);
-    let met = matches!(outcome, Outcome::Tuned(_));
+    let met = outcome.tuned().is_some();
     row.fate = if met { Fate::Tuned } else { Fate::LimitsNotMet };
     if met || job.keep_infeasible {
-        let gains = job.out.join(&row.id).join(GAINS);
-        table.write(&gains)?;
-        screen.say(&format!("wrote {}", gains.display()));
-        if let Some(spec) = job.certify {
-            let on = On::Sweep { sweep: &sweep, hold_included: job.hold == Hold::Included };
-            let proof = proof::beside(&gains, &on, spec, Uncertainty::default(), screen)?;
+        // The gate's words are part of the table: the certificate is of these bytes.
+        let certificate = certificate.map(|c| c.and_then(|c| c.of_text(&table).map_err(|e| e.to_string())));
+        row.certificate = proof::write(&gains, &table, certificate.as_ref(), screen)?;
+        if let Some(proof) = &row.certificate {
             screen.say(&format!("machine {}: {}", row.id, proof.says));
-            row.certificate = Some(proof);
         }
         row.gains = Some(gains);
     } else {

@@ -27,14 +27,12 @@ mod fleet_twin;
 mod gate_arguments;
 mod gated;
 mod identify;
-mod limit;
-mod limit_arguments;
 mod load;
 mod margins;
 mod next_sweep;
 mod pareto;
+mod performance_arguments;
 mod physics;
-mod polish_arguments;
 mod proof;
 mod response;
 mod screen;
@@ -81,7 +79,6 @@ pub fn main() -> ExitCode {
         Command::Features(a) => features::run(&a, &mut screen),
         Command::Fleet(a) => fleet::run(&a, &mut screen),
         Command::Identify(a) => identify::run(&a, &mut screen),
-        Command::Limit(a) => limit::run(&a, &mut screen),
         Command::Pareto(a) => pareto::run(&a, &mut screen),
         Command::Budget(a) => budget::run(&a, &mut screen),
         Command::NextSweep(a) => next_sweep::run(&a, &mut screen),

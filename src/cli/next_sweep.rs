@@ -1,6 +1,6 @@
 //! `servotune next-sweep`: the few tones that would narrow the margins' intervals most.
 
-use super::limit_arguments::NextSweepArguments;
+use super::performance_arguments::NextSweepArguments;
 use super::{Ending, Failure, Screen, load};
 use crate::feedback::{PlanSettings, sweep_plan};
 use crate::report::budget::{narrowing_table, tones_table};

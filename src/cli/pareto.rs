@@ -1,10 +1,10 @@
 //! `servotune pareto`: what a margin costs in DFT, over one or several machines.
 
-use super::limit_arguments::ParetoArguments;
+use super::performance_arguments::ParetoArguments;
 use super::{Ending, Failure, Screen, load, slot};
 use crate::document::{check_target, read_text, sha256_hex, write_text};
 use crate::report::pareto::{pareto_page, pareto_table};
-use crate::tune::{Machine, ParetoPoint, ParetoSettings, Spec, TuneError, TuneSettings, judge, pareto};
+use crate::tune::{Machine, ParetoPoint, ParetoSettings, Spec, TuneError, TuneSettings, TuningProblem, judge, pareto};
 use serde::Serialize;
 
 #[derive(Serialize)]
@@ -32,6 +32,8 @@ pub(super) fn run(a: &ParetoArguments, screen: &mut Screen) -> Result<Ending, Fa
     let settings = TuneSettings { sample_time_s: a.sample_time_s, ..TuneSettings::default() };
     let front = ParetoSettings { max_sensitivity: [a.from, a.to], points: a.points };
     let points = pareto(&machines, &spec, start.as_ref(), &settings, &front)?;
+    let of = spec.objective.unit(unit, slot::units(&plants[0]).command);
+    let objective = (spec.objective.minimise.name(), of.as_str());
     let document = Document { schema: "servotune.pareto/1", machines: plants.len(), points: &points };
     if a.out.extension().is_some_and(|e| e == "json") {
         let text = serde_json::to_string_pretty(&document).map_err(|source| Failure::Json { source })?;
@@ -40,18 +42,18 @@ pub(super) fn run(a: &ParetoArguments, screen: &mut Screen) -> Result<Ending, Fa
         let mut now = None;
         if let Some(c) = &start {
             let proofs = machines.iter().map(|m| judge(m, c, &spec)).collect::<Result<Vec<_>, _>>()?;
-            let largest = |of: &dyn Fn(&crate::tune::Found) -> f64| {
-                proofs.iter().map(|p| of(&p.judged.found)).fold(0.0, f64::max)
-            };
-            now = Some((largest(&|f| f.max_sensitivity), largest(&|f| f.dft_low), largest(&|f| f.dft_high)));
+            let ms = proofs.iter().map(|p| p.judged.found.max_sensitivity).fold(0.0, f64::max);
+            let problem = TuningProblem::around(&machines, &spec, c)?;
+            let value = problem.score(&problem.parameters().vector(c), &mut problem.work()).objective.exp();
+            now = problem.parameters().fits(c).then_some((ms, value));
         }
         let mut provenance = vec![("program".to_owned(), format!("servotune {}", env!("CARGO_PKG_VERSION")))];
         for file in a.plant.iter().chain([&a.spec]) {
             provenance.push((file.display().to_string(), sha256_hex(read_text(file)?.as_bytes())));
         }
-        write_text(&a.out, &pareto_page(&points, now, unit, provenance)?.html())?;
+        write_text(&a.out, &pareto_page(&points, now, objective, unit, provenance)?.html())?;
     }
     screen.say(&format!("wrote {}", a.out.display()));
-    screen.result(&document, &pareto_table(&points, unit)?.text())?;
+    screen.result(&document, &pareto_table(&points, objective, unit)?.text())?;
     Ok(if points.iter().any(|p| p.feasible) { Ending::Accepted } else { Ending::Rejected })
 }

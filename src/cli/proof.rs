@@ -1,15 +1,17 @@
 //! The certificate that `tune` writes beside a gain table.
 //!
-//! In: the table as it lies on disk, the files it was made from. Out: `gains.certificate.json` and what it says, or why there can be none.
+//! In: a tuned table with its certificate, or a sweep to tune on. Out: `gains.toml`, `gains.certificate.json`, and what it says, or why there can be none.
 //! Spec: `specs/certificate.md`.
 
 use super::{Failure, Screen, verify};
+use crate::controller::Controller;
 use crate::document::write_text;
 use crate::frf::Sweep;
+use crate::lti::Plant;
 use crate::report::certificate::certificate_sentence;
-use crate::tune::Spec;
+use crate::tune::{GainTable, Hold, InputDigest, Machine, Spec, TuneError, TuneSettings};
 use crate::verify::{
-    Inputs, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, VerifyError, VerifySettings, Word, certify,
+    Assurance, Assured, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, tune_assured,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -25,61 +27,63 @@ pub(super) struct Proof {
     pub says: String,
 }
 
-/// What a table was tuned on.
-pub(super) enum On<'a> {
-    Plant(&'a Path),
-    Sweep { sweep: &'a Sweep, hold_included: bool },
-}
-
-/// Proves the table at `gains` over the box `u` and writes the certificate beside it. That a plant is beyond the proof, or a sweep ends too early, stops no
-/// tuning: it is said.
-pub(super) fn beside(
+/// Writes a table and its certificate, and says what is proved; none without a certificate asked for.
+pub(super) fn write(
     gains: &Path,
-    on: &On<'_>,
-    spec: &Path,
-    u: Uncertainty,
+    table: &GainTable,
+    certificate: Option<&Result<Certificate, String>>,
     screen: &mut Screen,
-) -> Result<Proof, Failure> {
+) -> Result<Option<Proof>, Failure> {
+    table.write(gains)?;
+    screen.say(&format!("wrote {}", gains.display()));
     let file = verify::beside(gains);
-    Ok(match prove(gains, on, spec, u) {
-        Ok(c) => {
+    // One of an earlier table would speak of this one.
+    if file.exists() && !matches!(certificate, Some(Ok(_))) {
+        std::fs::remove_file(&file).map_err(|source| Failure::Remove { file: file.clone(), source })?;
+    }
+    Ok(match certificate {
+        None => None,
+        Some(Ok(c)) => {
             write_text(&file, &c.text()?)?;
             screen.say(&format!("wrote {}", file.display()));
-            Proof { file: Some(file), proved: c.proved, says: certificate_sentence(&c) }
+            Some(Proof { file: Some(file), proved: c.proved, says: certificate_sentence(c) })
         }
-        Err(e) => {
-            // One of an earlier table would speak of this one.
-            if file.exists() {
-                std::fs::remove_file(&file).map_err(|source| Failure::Remove { file, source })?;
-            }
-            Proof { file: None, proved: false, says: format!("No certificate: {e}.") }
-        }
+        Some(Err(reason)) => Some(Proof { file: None, proved: false, says: format!("No certificate: {reason}.") }),
     })
 }
 
-fn prove(
-    gains: &Path,
-    on: &On<'_>,
-    spec: &Path,
-    uncertainty: Uncertainty,
-) -> Result<crate::verify::Certificate, VerifyError> {
-    let (mut plants, mut sweeps, mut hold) = (Vec::new(), Vec::new(), false);
-    match on {
-        On::Plant(file) => plants.push(Source::read(file)?),
-        On::Sweep { sweep, hold_included } => {
-            sweeps.push((*sweep).clone());
-            hold = *hold_included;
-        }
+/// A sweep that is tuned on, with the files that a certificate names.
+pub(super) struct OnSweep<'a> {
+    pub sweep: &'a Sweep,
+    pub hold: Hold,
+    /// The model that continues it.
+    pub plant: &'a Plant,
+    pub spec: &'a Spec,
+    pub spec_file: &'a Path,
+    pub start: Option<&'a Controller>,
+    pub inputs: &'a [InputDigest],
+    pub gains: &'a Path,
+}
+
+impl OnSweep<'_> {
+    /// Tunes on the sweep, with as much room as its intervals ask for.
+    pub fn tune(&self, settings: &TuneSettings, screen: &mut Screen) -> Result<Assured, Failure> {
+        let spec_source = Source::read(self.spec_file)?;
+        let profile = Spec::profile_path(self.spec_file).map_err(TuneError::from)?;
+        let profile = profile.map(|p| Source::read(&p)).transpose()?;
+        let assumption = SweepAssumption { least_damping: LEAST_DAMPING, hold_included: self.hold == Hold::Included };
+        let machine = Machine::Response { frf: &self.sweep.frf, hold: self.hold, continuation: Some(self.plant) };
+        let job = Assurance {
+            ground: Ground::Sweep { sweep: self.sweep, machine, assumption },
+            spec: self.spec,
+            spec_source: &spec_source,
+            profile: profile.as_ref(),
+            uncertainty: Uncertainty::default(),
+            start: self.start,
+            units: (&self.plant.position_unit, &self.plant.command_unit),
+            inputs: self.inputs,
+            gains: self.gains,
+        };
+        Ok(tune_assured(&job, settings, &mut |words| screen.say(words))?)
     }
-    let inputs = Inputs {
-        gains: &Source::read(gains)?,
-        plants: &plants,
-        sweeps: &sweeps,
-        assumption: SweepAssumption { least_damping: LEAST_DAMPING, hold_included: hold },
-        spec: &Source::read(spec)?,
-        profile: &Source::read(&Spec::profile_path(spec)?)?,
-        word: Word::Double,
-        uncertainty,
-    };
-    certify(&inputs, &VerifySettings::default())
 }

@@ -25,6 +25,8 @@ pub(super) struct Slot<'a> {
     pub name: &'a str,
     /// The model: given, or identified from the sweep.
     pub plant: &'a Plant,
+    /// Units of position and command.
+    pub units: Units<'a>,
     /// The sweep with the hold it contains, where there is one.
     pub sweep: Option<(&'a Sweep, Hold)>,
     pub identified: Option<&'a Identified>,
@@ -35,6 +37,8 @@ pub(super) struct Slot<'a> {
     /// The outcome of the other way, over the model, where the first one went straight on the response.
     pub over_model: Option<&'a Outcome>,
     pub table: &'a GainTable,
+    /// What the certificate says of the table; none without one.
+    pub certificate: Option<&'a str>,
     pub provenance: Vec<(String, String)>,
     /// The physics and the tuning with it, where the plant has any.
     pub physics: Option<(&'a Restored, &'a PhysicalTuning)>,
@@ -60,18 +64,23 @@ fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Res
     w.extend(l.grid().into_iter().filter(|w| *w > from));
     w.sort_by(f64::total_cmp);
     w.dedup();
-    let write = match slot.physics {
-        Some((physics, _)) => simulate_physical(physics, c, &slot.spec.profile)?,
-        None => simulate(slot.plant, c, &slot.spec.profile)?,
+    let write = match &slot.spec.profile {
+        Some(profile) => {
+            let write = match slot.physics {
+                Some((physics, _)) => simulate_physical(physics, c, profile)?,
+                None => simulate(slot.plant, c, profile)?,
+            };
+            let stable = judged_margins.stable && write.pes.iter().all(|p| p.is_finite());
+            stable.then(|| (figures(&write.pes, profile), write))
+        }
+        None => None,
     };
-    let stable = judged_margins.stable && write.pes.iter().all(|p| p.is_finite());
-    let found = stable.then(|| figures(&write.pes, &slot.spec.profile));
     Ok(LoopView {
         name: name.to_owned(),
         open_loop: w.iter().map(|&w| l.at(w)).collect(),
         hz: w.into_iter().map(|w| w / TAU).collect(),
         margins: judged_margins,
-        write: found.map(|f| (write, f)),
+        write: write.map(|(figures, write)| (write, figures)),
         judged: Some(judged),
     })
 }
@@ -93,13 +102,9 @@ pub(super) fn page(slot: &Slot<'_>) -> Result<Page, Failure> {
     let after_controller = slot.outcome.controller();
     let judged_after = slot.physics.map_or(&slot.outcome.after()[0].judged, |(_, t)| &t.after.judged);
     let after = loop_view("after", slot, after_controller, judged_after.clone())?;
-    let was = match slot.outcome {
-        Outcome::Tuned(t) => &t.before,
-        Outcome::Infeasible(i) => &i.before,
-    };
     let judged_before = match slot.physics {
         Some((_, t)) => t.before.as_ref().map(|p| &p.judged),
-        None => was.as_ref().and_then(|b| b.first()).map(|p| &p.judged),
+        None => slot.outcome.before().and_then(|b| b.first()).map(|p| &p.judged),
     };
     let before = match (slot.start, judged_before) {
         (Some(c), Some(judged)) => Some(loop_view("before", slot, c, judged.clone())?),
@@ -113,7 +118,8 @@ pub(super) fn page(slot: &Slot<'_>) -> Result<Page, Failure> {
         before: before.as_ref(),
         after: &after,
         spec: slot.spec,
-        units: units(slot.plant),
+        units: slot.units,
+        certificate: slot.certificate,
         gains: gain_sections(slot)?,
         provenance: slot.provenance.clone(),
     };
@@ -123,13 +129,17 @@ pub(super) fn page(slot: &Slot<'_>) -> Result<Page, Failure> {
 /// The verdict in a sentence.
 pub(super) fn verdict(outcome: &Outcome) -> (Verdict, String) {
     match outcome {
-        Outcome::Tuned(t) if t.at_bounds.is_empty() => (Verdict::Ok, "Every limit is met.".to_owned()),
-        Outcome::Tuned(t) => {
+        Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => {
+            let held = match outcome {
+                Outcome::Tuned(_) => "Every limit is met",
+                _ => "Every limit is met, but not with the room that `guard` asks for",
+            };
+            if t.at_bounds.is_empty() {
+                let verdict = if held.len() > 20 { Verdict::Warn } else { Verdict::Ok };
+                return (verdict, format!("{held}."));
+            }
             let names: Vec<String> = t.at_bounds.iter().map(|b| b.parameter.to_string()).collect();
-            (
-                Verdict::Warn,
-                format!("Every limit is met, but the bounds set {}: widening them may do better.", names.join(", ")),
-            )
+            (Verdict::Warn, format!("{held}. Search bounds set {}: widening them may do better.", names.join(", ")))
         }
         Outcome::Infeasible(i) => {
             let names: Vec<String> = i.conflicts.iter().map(|c| c.what.to_string()).collect();
@@ -153,8 +163,8 @@ pub(super) fn verdict(outcome: &Outcome) -> (Verdict, String) {
 /// The verdict of a tuning with physics.
 pub(super) fn physical_verdict(t: &PhysicalTuning) -> (Verdict, String) {
     match &t.outcome {
-        Outcome::Tuned(_) if !t.after.judged.passes() => {
-            let missed = t.after.judged.limits.iter().filter(|l| l.violation > 0.0);
+        o if o.tuned().is_some() && !t.after.judged.passes() => {
+            let missed = t.after.judged.limits.iter().filter(|l| !l.met());
             let names: Vec<String> = missed.map(|l| l.wanted.what.to_string()).collect();
             let what = if names.is_empty() { "a stable loop at every amplitude".to_owned() } else { names.join(", ") };
             (Verdict::Fail, format!("With the physics the limits are not all met; missed: {what}."))
@@ -172,9 +182,10 @@ fn physical_sections(slot: &Slot<'_>, before: Option<&LoopView>, after: &LoopVie
         (Some(after), Some(slot.outcome.controller()), Some(&tuning.after)),
     ] {
         if let (Some(view), Some(c), Some(proof)) = (view, c, proof) {
-            let write = simulate(slot.plant, c, &slot.spec.profile)?;
+            let profile = slot.spec.write("tuning a plant with physics").map_err(crate::tune::TuneError::from)?;
+            let write = simulate(slot.plant, c, profile)?;
             let stable = proof.linear.stable && write.pes.iter().all(|p| p.is_finite());
-            writes.push((view, proof, stable.then(|| figures(&write.pes, &slot.spec.profile))));
+            writes.push((view, proof, stable.then(|| figures(&write.pes, profile))));
         }
     }
     let views: Vec<PriceView<'_>> = writes
@@ -185,7 +196,7 @@ fn physical_sections(slot: &Slot<'_>, before: Option<&LoopView>, after: &LoopVie
             physical: (&proof.margins.worst, view.write.as_ref().map(|(_, f)| f)),
         })
         .collect();
-    let units = units(slot.plant);
+    let units = slot.units;
     let words = format!(
         "The plant file carries: {}. Each effect was simulated as it stands; the gains were tuned on the plant's equivalent response at {} amplitudes at once.",
         physics.names().join(", "),
@@ -233,13 +244,10 @@ fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
 }
 
 fn gain_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
-    let bounds = match slot.outcome {
-        Outcome::Tuned(t) => &t.at_bounds,
-        Outcome::Infeasible(i) => &i.at_bounds,
-    };
+    let bounds = slot.outcome.at_bounds();
     let mut blocks = vec![Block::Table(gains_table(slot.start, slot.outcome.controller(), bounds)?)];
     if let Outcome::Infeasible(i) = slot.outcome {
-        blocks.push(Block::Table(conflicts_table(i, units(slot.plant))?));
+        blocks.push(Block::Table(conflicts_table(i, slot.units)?));
     }
     blocks.push(Block::Details("Sections".into(), vec![Block::Table(sections_table(slot.table.sections())?)]));
     blocks.push(Block::Details("Gain table (gains.toml)".into(), vec![Block::Code(slot.table.text()?)]));
@@ -253,7 +261,7 @@ fn gain_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
         let table = routes_table(
             RouteView { on_response: &first.0, on_model: &first.1 },
             RouteView { on_response: &second.0, on_model: &second.1 },
-            units(slot.plant),
+            slot.units,
         )?;
         let words = "The gains above were tuned straight on the measured response. The same limits were also tuned over the \
                      identified model; each way's gains are judged by both ways.";

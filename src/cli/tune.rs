@@ -1,9 +1,10 @@
 //! `servotune tune`: gains that meet the limits, a gain table, a report.
 
 use super::arguments::{ModelArguments, TuneArguments};
-use super::proof::{self, On, Proof};
+use super::proof::{self, Proof};
 use super::slot::{self, Slot};
-use super::{Ending, Failure, Screen, limit, load, physics, tune_machines};
+use super::{Ending, Failure, Screen, load, physics, tune_machines};
+use crate::controller::Controller;
 use crate::document::{check_target, read_text, sha256_hex, write_text};
 use crate::feedback::Amplitudes;
 use crate::frf::Sweep;
@@ -14,8 +15,10 @@ use crate::physics::Restored;
 use crate::report::physical::{amplitude_table, limit_cycle_sentences};
 use crate::report::tuned::{Units, conflicts_table, gains_table, limits_table};
 use crate::tune::{
-    GainTable, Hold, InputDigest, Machine, Outcome, PhysicalTuning, Spec, TuneSettings, tune, tune_physical,
+    GainTable, Hold, InputDigest, Machine, Outcome, PhysicalTuning, Spec, TuneError, TuneSettings, sample_time_s, tune,
+    tune_physical,
 };
+use crate::verify::{Assurance, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, tune_assured};
 use serde::Serialize;
 use std::path::Path;
 
@@ -23,16 +26,26 @@ use std::path::Path;
 struct Document<'a> {
     #[serde(flatten)]
     outcome: &'a Outcome,
+    objective: Objective,
     gain_table: Option<&'a Path>,
     /// The proof of the table; absent without a table or by --no-certificate.
     certificate: Option<&'a Proof>,
-    /// How far the table is from the best possible; absent without --gap.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    gap: Option<&'a limit::Gap>,
     report: Option<&'a Path>,
     /// Names and judgement of the physics; absent without any.
     #[serde(skip_serializing_if = "Option::is_none")]
     physics: Option<Physics<'a>>,
+}
+
+/// What was made smallest, as the contract names it.
+#[derive(Serialize)]
+struct Objective {
+    name: &'static str,
+    value: f64,
+    unit: String,
+    /// No bound is computed.
+    lower_bound: Option<f64>,
+    starts: usize,
+    starts_at_best: usize,
 }
 
 #[derive(Serialize)]
@@ -44,16 +57,23 @@ struct Physics<'a> {
     after: &'a crate::tune::PhysicalProof,
 }
 
-/// What a tuning came to, for its page.
-struct Reached<'a> {
-    outcome: &'a Outcome,
-    table: &'a GainTable,
-    physics: Option<(&'a Restored, &'a PhysicalTuning)>,
+/// What a tuning came to.
+struct Reached {
+    outcome: Outcome,
+    table: GainTable,
+    /// Every limit is met.
+    tuned: bool,
+    certificate: Option<Result<Certificate, String>>,
+    physics: Option<PhysicalTuning>,
 }
 
 /// What is tuned, as files gave it.
 enum Given {
-    Model(Box<Plant>, Option<Box<Restored>>),
+    Model {
+        plant: Box<Plant>,
+        source: Box<Source>,
+        physics: Option<Box<Restored>>,
+    },
     /// With the model that continues it outside the sweep.
     Response {
         sweep: Box<Sweep>,
@@ -66,25 +86,24 @@ impl Given {
     /// Units from the plant file, or as given for the sweep.
     fn units<'a>(&'a self, words: &'a ModelArguments) -> Units<'a> {
         match self {
-            Given::Model(plant, _) => slot::units(plant),
+            Given::Model { plant, .. } => slot::units(plant),
             Given::Response { .. } => Units { position: &words.position_unit, command: &words.command_unit },
-        }
-    }
-
-    /// The linear plant: as given, or as identified from the sweep.
-    fn plant(&self) -> &Plant {
-        match self {
-            Given::Model(plant, _) => plant,
-            Given::Response { identified, .. } => &identified.plant,
         }
     }
 
     fn machine(&self) -> Machine<'_> {
         match self {
-            Given::Model(plant, _) => Machine::Model(plant),
+            Given::Model { plant, .. } => Machine::Model(plant),
             Given::Response { sweep, hold, identified } => {
                 Machine::Response { frf: &sweep.frf, hold: *hold, continuation: Some(&identified.plant) }
             }
+        }
+    }
+
+    fn physics(&self) -> Option<&Restored> {
+        match self {
+            Given::Model { physics, .. } => physics.as_deref(),
+            Given::Response { .. } => None,
         }
     }
 }
@@ -97,133 +116,171 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     for target in [Some(&a.out), a.report.as_ref()].into_iter().flatten() {
         check_target(target)?;
     }
-    let spec = Spec::read(&a.spec).map_err(crate::tune::TuneError::from)?;
-    let spec_sha256 = sha256_hex(read_text(&a.spec)?.as_bytes());
+    let spec = Spec::read(&a.spec).map_err(TuneError::from)?;
     let start = a.controller.as_ref().map(|file| load::controller(file)).transpose()?;
+    let settings = TuneSettings { sample_time_s: a.sample_time_s, starts: a.starts, ..TuneSettings::default() };
+    let clock = sample_time_s(&spec, start.as_ref(), &settings)?;
     let mut inputs = Vec::new();
+    let given = given(a, &spec, start.as_ref(), clock, &mut inputs, screen)?;
+    if let Some(file) = &a.controller {
+        inputs.push(InputDigest { role: "controller".into(), sha256: sha256_hex(read_text(file)?.as_bytes()) });
+    }
+    let reached = reach(a, &given, &spec, start.as_ref(), &settings, &inputs, screen)?;
+    let (outcome, table) = (&reached.outcome, &reached.table);
+    let (mut written, mut proof) = (None, None);
+    if reached.tuned || a.keep_infeasible {
+        proof = proof::write(&a.out, table, reached.certificate.as_ref(), screen)?;
+        written = Some(a.out.as_path());
+    } else {
+        screen.say("no gain table was written: the limits are not met (--keep-infeasible writes the compromise)");
+    }
+    if let Some(file) = &a.report {
+        let page = report(a, &given, &spec, start.as_ref(), &settings, &reached, proof.as_ref())?;
+        write_text(file, &page)?;
+        screen.say(&format!("wrote {}", file.display()));
+    }
+    let units = given.units(&a.model);
+    let physics = given.physics().zip(reached.physics.as_ref());
+    let text = match physics {
+        Some((physics, t)) => physical_text(physics, t, start.as_ref(), units)?,
+        None => text(outcome, start.as_ref(), &spec, units)?,
+    };
+    let certificate = proof.as_ref();
+    let said = certificate.map_or_else(String::new, |p| format!("{}\n", p.says));
+    let o = outcome.objective();
+    let document = Document {
+        outcome,
+        objective: Objective {
+            name: o.name.name(),
+            value: o.value,
+            unit: spec.objective.unit(units.position, units.command),
+            lower_bound: None,
+            starts: o.starts,
+            starts_at_best: o.starts_at_best,
+        },
+        gain_table: written,
+        certificate,
+        report: a.report.as_deref(),
+        physics: physics.map(|(physics, t)| Physics {
+            effects: physics.names(),
+            amplitudes: &t.amplitudes,
+            rounds: t.rounds,
+            before: t.before.as_ref(),
+            after: &t.after,
+        }),
+    };
+    screen.result(&document, &(text + &said))?;
+    Ok(if reached.tuned { Ending::Accepted } else { Ending::Rejected })
+}
+
+/// The machine in the files, digests of them into `inputs`.
+fn given(
+    a: &TuneArguments,
+    spec: &Spec,
+    start: Option<&Controller>,
+    clock: f64,
+    inputs: &mut Vec<InputDigest>,
+    screen: &mut Screen,
+) -> Result<Given, Failure> {
     let mut input = |role: &str, sha256: String| inputs.push(InputDigest { role: role.into(), sha256 });
-    let given = match (&a.plant, &a.frf) {
+    match (&a.plant, &a.frf) {
         (Some(file), _) => {
             let mut plant = load::plant(file)?;
-            let clock = start.clone().unwrap_or_else(|| at_clock(a.sample_time_s));
-            let physics = physics::restored(file, &plant, &context(&spec.profile, &clock), screen)?;
-            // Looked at before the search: the gap would speak of another plant than the table.
-            if let Some(physics) = physics.as_ref().filter(|_| a.gap) {
-                return Err(Failure::GapOfPhysics { file: file.clone(), effects: physics.names().join(", ") });
-            }
+            let physics = if plant.physics.is_empty() {
+                None
+            } else {
+                let clock = start.cloned().unwrap_or_else(|| at_clock(clock));
+                let profile = spec.write("tuning a plant with physics").map_err(TuneError::from)?;
+                physics::restored(file, &plant, &context(profile, &clock), screen)?.map(Box::new)
+            };
             plant.physics.clear();
-            input("plant", sha256_hex(read_text(file)?.as_bytes()));
-            Given::Model(Box::new(plant), physics.map(Box::new))
+            let source = Source::read(file)?;
+            input("plant", source.sha256());
+            Ok(Given::Model { plant: Box::new(plant), source: Box::new(source), physics })
         }
         (None, Some(file)) => {
             let sweep = load::sweep(file, &a.reading, screen)?;
             input("frf", sweep.source_digest.clone());
             let hold = if a.hold_included { Hold::Included } else { Hold::NotIncluded };
-            let identified = identify(&sweep.frf, &model_settings(a))
+            let identified = identify(&sweep.frf, &model_settings(a, clock))
                 .map_err(|source| Failure::Identify { file: file.clone(), source })?;
-            Given::Response { sweep: Box::new(sweep), hold, identified: Box::new(identified) }
+            Ok(Given::Response { sweep: Box::new(sweep), hold, identified: Box::new(identified) })
         }
-        (None, None) => return Err(Failure::NoMachine),
-    };
-    if let Some(file) = &a.controller {
-        input("controller", sha256_hex(read_text(file)?.as_bytes()));
+        (None, None) => Err(Failure::NoMachine),
     }
-    let settings = TuneSettings {
-        sample_time_s: a.sample_time_s,
-        starts: a.starts,
-        polish: a.polish.method(),
-        ..TuneSettings::default()
-    };
-    let with = match &given {
-        Given::Model(_, Some(physics)) => {
-            let high = spec.profile.spiral.distance;
-            let amplitudes = Amplitudes { low: 0.01 * high, high, ..Amplitudes::default() };
-            Some((physics, tune_physical(physics, &spec, start.as_ref(), &settings, &amplitudes)?))
-        }
-        _ => None,
-    };
-    let (outcome, table, tuned) = match &with {
-        Some((physics, t)) => {
-            let table = GainTable::of_physics(t, &physics.names(), spec.search.seed, spec_sha256, inputs)?;
-            (t.outcome.clone(), table, t.passes())
-        }
-        None => {
-            let outcome = tune(&given.machine(), &spec, start.as_ref(), &settings)?;
-            let table = GainTable::of(&outcome, spec.search.seed, spec_sha256, inputs)?;
-            let tuned = matches!(outcome, Outcome::Tuned(_));
-            (outcome, table, tuned)
-        }
-    };
-    let (mut written, mut proof, mut gap) = (None, None, None);
-    if tuned || a.keep_infeasible {
-        table.write(&a.out)?;
-        screen.say(&format!("wrote {}", a.out.display()));
-        written = Some(a.out.as_path());
-        if !a.no_certificate {
-            let on = match (&given, &a.plant) {
-                (Given::Response { sweep, .. }, _) => On::Sweep { sweep, hold_included: a.hold_included },
-                (Given::Model(..), file) => On::Plant(file.as_deref().ok_or(Failure::NoMachine)?),
-            };
-            proof = Some(proof::beside(&a.out, &on, &a.spec, a.uncertainty.unwrap_or_default(), screen)?);
-        }
-        if a.gap {
-            gap = Some(limit::beside(&a.out, outcome.controller(), given.plant(), &spec, screen)?);
-        }
-    } else {
-        screen.say("no gain table was written: the limits are not met (--keep-infeasible writes the compromise)");
-    }
-    if let Some(file) = &a.report {
-        let physics = with.as_ref().map(|(p, t)| (p.as_ref(), t));
-        let reached = Reached { outcome: &outcome, table: &table, physics };
-        let page = report(a, &given, &spec, start.as_ref(), &settings, &reached)?;
-        write_text(file, &page)?;
-        screen.say(&format!("wrote {}", file.display()));
-    }
-    let physics = with.as_ref().map(|(physics, t)| Physics {
-        effects: physics.names(),
-        amplitudes: &t.amplitudes,
-        rounds: t.rounds,
-        before: t.before.as_ref(),
-        after: &t.after,
-    });
+}
+
+/// Tunes, and proves the table on the way.
+fn reach(
+    a: &TuneArguments,
+    given: &Given,
+    spec: &Spec,
+    start: Option<&Controller>,
+    settings: &TuneSettings,
+    inputs: &[InputDigest],
+    screen: &mut Screen,
+) -> Result<Reached, Failure> {
     let units = given.units(&a.model);
-    let text = match &with {
-        Some((physics, t)) => physical_text(physics, t, start.as_ref(), units)?,
-        None => text(&outcome, start.as_ref(), units)?,
+    let spec_source = Source::read(&a.spec)?;
+    if let Some(physics) = given.physics() {
+        let high = spec.write("tuning a plant with physics").map_err(TuneError::from)?.spiral.distance;
+        let amplitudes = Amplitudes { low: 0.01 * high, high, ..Amplitudes::default() };
+        let t = tune_physical(physics, spec, start, settings, &amplitudes)?;
+        let sha256 = spec_source.sha256();
+        let table = GainTable::of_physics(&t, &physics.names(), spec.search.seed, sha256, inputs.to_vec())?;
+        let table = table.in_units(units.position, units.command);
+        let reason =
+            "bounds are proved of linear plants; give an equivalent linear plant for each amplitude".to_owned();
+        let certificate = (!a.no_certificate).then_some(Err(reason));
+        return Ok(Reached { outcome: t.outcome.clone(), table, tuned: t.passes(), certificate, physics: Some(t) });
+    }
+    if a.no_certificate {
+        let outcome = tune(&given.machine(), spec, start, settings)?;
+        let table = GainTable::of(&outcome, spec.search.seed, spec_source.sha256(), inputs.to_vec())?;
+        let tuned = outcome.tuned().is_some();
+        let table = table.in_units(units.position, units.command);
+        return Ok(Reached { outcome, table, tuned, certificate: None, physics: None });
+    }
+    let profile = Spec::profile_path(&a.spec).map_err(TuneError::from)?.map(|p| Source::read(&p)).transpose()?;
+    let ground = match given {
+        Given::Model { plant, source, .. } => Ground::Plant { plant, source },
+        Given::Response { sweep, .. } => Ground::Sweep {
+            sweep,
+            machine: given.machine(),
+            assumption: SweepAssumption { least_damping: LEAST_DAMPING, hold_included: a.hold_included },
+        },
     };
-    let certificate = proof.as_ref();
-    let said = certificate.map_or_else(String::new, |p| format!("{}\n", p.says));
-    let far = gap.as_ref().map_or_else(String::new, |g| g.says.clone());
-    let document = Document {
-        outcome: &outcome,
-        gain_table: written,
-        certificate,
-        gap: gap.as_ref(),
-        report: a.report.as_deref(),
-        physics,
+    let job = Assurance {
+        ground,
+        spec,
+        spec_source: &spec_source,
+        profile: profile.as_ref(),
+        uncertainty: a.uncertainty.unwrap_or_default(),
+        start,
+        units: (units.position, units.command),
+        inputs,
+        gains: &a.out,
     };
-    screen.result(&document, &(text + &said + &far))?;
-    Ok(if tuned { Ending::Accepted } else { Ending::Rejected })
+    let done = tune_assured(&job, settings, &mut |words| screen.say(words))?;
+    let tuned = done.outcome.tuned().is_some();
+    Ok(Reached { outcome: done.outcome, table: done.table, tuned, certificate: done.certificate, physics: None })
 }
 
 /// A controller of nothing but a clock.
-fn at_clock(sample_time_s: f64) -> crate::controller::Controller {
+fn at_clock(sample_time_s: f64) -> Controller {
     let pid = crate::controller::Pid { kp: 1.0, ki_per_s: 0.0, kd_s: 0.0, derivative_filter_s: 0.0 };
     let (lowpass, notch) = (Vec::new(), Vec::new());
-    crate::controller::Controller { sample_time_s, output_limit: None, pid, lowpass, notch, feedforward: None }
+    Controller { sample_time_s, output_limit: None, pid, lowpass, notch, feedforward: None }
 }
 
 /// The outcome of a tuning with physics for a terminal.
 fn physical_text(
     physics: &Restored,
     t: &PhysicalTuning,
-    start: Option<&crate::controller::Controller>,
+    start: Option<&Controller>,
     units: Units<'_>,
 ) -> Result<String, Failure> {
-    let bounds = match &t.outcome {
-        Outcome::Tuned(o) => &o.at_bounds,
-        Outcome::Infeasible(i) => &i.at_bounds,
-    };
+    let bounds = t.outcome.at_bounds();
     let mut text = format!("{}\nPhysics: {}.\n\n", slot::physical_verdict(t).1, physics.names().join(", "));
     text += &limits_table(t.before.as_ref().map(|b| &b.judged), Some(&t.after.judged), units)?.text();
     text.push('\n');
@@ -239,10 +296,10 @@ fn physical_text(
 }
 
 /// Settings of the model that continues the sweep: a sweep with the hold in it has it divided out first.
-pub(super) fn model_settings(a: &TuneArguments) -> IdentifySettings {
+pub(super) fn model_settings(a: &TuneArguments, sample_time_s: f64) -> IdentifySettings {
     let asked = a.model.settings();
     let hold = match (a.hold_included, asked.hold) {
-        (true, identify::Hold::NotIncluded) => identify::Hold::Included { sample_time_s: a.sample_time_s },
+        (true, identify::Hold::NotIncluded) => identify::Hold::Included { sample_time_s },
         (_, hold) => hold,
     };
     IdentifySettings { hold, ..asked }
@@ -252,13 +309,13 @@ fn report(
     a: &TuneArguments,
     given: &Given,
     spec: &Spec,
-    start: Option<&crate::controller::Controller>,
+    start: Option<&Controller>,
     settings: &TuneSettings,
-    reached: &Reached<'_>,
+    reached: &Reached,
+    proof: Option<&Proof>,
 ) -> Result<String, Failure> {
-    let Reached { outcome, table, physics } = *reached;
     let (plant, sweep, identified, over_model) = match given {
-        Given::Model(plant, _) => (plant.as_ref(), None, None, None),
+        Given::Model { plant, .. } => (plant.as_ref(), None, None, None),
         Given::Response { sweep, hold, identified } => {
             let over_model = tune(&Machine::Model(&identified.plant), spec, start, settings)?;
             (&identified.plant, Some((sweep.as_ref(), *hold)), Some(identified.as_ref()), Some(over_model))
@@ -268,15 +325,17 @@ fn report(
     let slot = Slot {
         name: &name,
         plant,
+        units: given.units(&a.model),
         sweep,
         identified,
         spec,
         start,
-        outcome,
+        outcome: &reached.outcome,
         over_model: over_model.as_ref(),
-        table,
-        provenance: provenance(table),
-        physics,
+        table: &reached.table,
+        certificate: proof.map(|p| p.says.as_str()),
+        provenance: provenance(&reached.table),
+        physics: given.physics().zip(reached.physics.as_ref()),
     };
     Ok(slot::page(&slot)?.html())
 }
@@ -300,14 +359,11 @@ pub(super) fn provenance(table: &GainTable) -> Vec<(String, String)> {
 /// The outcome for a terminal.
 pub(super) fn text(
     outcome: &Outcome,
-    start: Option<&crate::controller::Controller>,
+    start: Option<&Controller>,
+    spec: &Spec,
     units: Units<'_>,
 ) -> Result<String, Failure> {
-    let (before, work, bounds) = match outcome {
-        Outcome::Tuned(t) => (&t.before, &t.work, &t.at_bounds),
-        Outcome::Infeasible(i) => (&i.before, &i.work, &i.at_bounds),
-    };
-    let before = before.as_ref().and_then(|b| b.first()).map(|p| &p.judged);
+    let before = outcome.before().and_then(|b| b.first()).map(|p| &p.judged);
     let after = outcome.after().first().map(|p| &p.judged);
     let mut text = format!("{}\n\n", slot::verdict(outcome).1);
     text += &limits_table(before, after, units)?.text();
@@ -316,7 +372,16 @@ pub(super) fn text(
         text += &conflicts_table(i, units)?.text();
     }
     text.push('\n');
-    text += &gains_table(start, outcome.controller(), bounds)?.text();
-    text += &format!("\n{} candidates from {} starts.\n", work.evaluations, work.starts);
+    text += &gains_table(start, outcome.controller(), outcome.at_bounds())?.text();
+    let o = outcome.objective();
+    let unit = spec.objective.unit(units.position, units.command);
+    text += &format!(
+        "\nObjective {}: {:.4e} {unit}; {} of {} polishes ended there, {} candidates.\n",
+        o.name.name(),
+        o.value,
+        o.starts_at_best,
+        o.starts,
+        outcome.work().evaluations
+    );
     Ok(text)
 }

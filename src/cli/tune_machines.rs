@@ -5,7 +5,7 @@ use super::gated::{self, Fate, Job, Row};
 use super::{Ending, Failure, Screen, load, tune::model_settings};
 use crate::document::{read_text, sha256_hex};
 use crate::gate::Gate;
-use crate::tune::{Hold, Spec, TuneError, TuneSettings};
+use crate::tune::{Hold, Spec, TuneError, TuneSettings, sample_time_s};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -31,6 +31,8 @@ pub(super) fn run(a: &TuneArguments, machines: &Path, gate: &Path, screen: &mut 
         None => None,
     };
     let spec = Spec::read(&a.spec).map_err(TuneError::from)?;
+    let settings = TuneSettings { sample_time_s: a.sample_time_s, starts: a.starts, ..TuneSettings::default() };
+    let clock = sample_time_s(&spec, start.as_ref().map(|(c, _)| c), &settings)?;
     let job = Job {
         machines,
         gate: &Gate::read(gate)?,
@@ -39,14 +41,9 @@ pub(super) fn run(a: &TuneArguments, machines: &Path, gate: &Path, screen: &mut 
         spec_sha256: sha256_hex(read_text(&a.spec)?.as_bytes()),
         start,
         reading: a.reading.settings(),
-        model: model_settings(a),
+        model: model_settings(a, clock),
         hold: if a.hold_included { Hold::Included } else { Hold::NotIncluded },
-        tuning: TuneSettings {
-            sample_time_s: a.sample_time_s,
-            starts: a.starts,
-            polish: a.polish.method(),
-            ..TuneSettings::default()
-        },
+        tuning: settings,
         overrides,
         keep_infeasible: a.keep_infeasible,
         certify: (!a.no_certificate).then_some(a.spec.as_path()),

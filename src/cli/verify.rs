@@ -28,13 +28,14 @@ pub(super) fn run(a: &VerifyArguments, screen: &mut Screen) -> Result<Ending, Fa
     let plants = a.plant.iter().map(|p| Source::read(p)).collect::<Result<Vec<Source>, VerifyError>>()?;
     let sweeps = a.frf.iter().map(|f| load::sweep(f, &a.reading, screen)).collect::<Result<Vec<Sweep>, Failure>>()?;
     let profile = Spec::profile_path(&a.spec).map_err(VerifyError::from)?;
+    let profile = profile.map(|p| Source::read(&p)).transpose()?;
     let inputs = Inputs {
         gains: &Source::read(&a.gains)?,
         plants: &plants,
         sweeps: &sweeps,
         assumption: SweepAssumption { least_damping: a.min_damping, hold_included: a.hold_included },
         spec: &Source::read(&a.spec)?,
-        profile: &Source::read(&profile)?,
+        profile: profile.as_ref(),
         word: a.word().unwrap_or(word),
         uncertainty: a.uncertainty.unwrap_or(uncertainty),
     };

@@ -52,6 +52,11 @@ impl QuickMargins {
         Self::smallest(&self.gain_crossings)
     }
 
+    /// The gain crossing at the lowest frequency.
+    pub fn lowest_gain_crossing(&self) -> Option<Event> {
+        self.gain_crossings.iter().copied().min_by(|a, b| a.w_rad_s.total_cmp(&b.w_rad_s))
+    }
+
     /// The phase crossing whose gain margin is smallest in absolute value.
     pub fn worst_phase_crossing(&self) -> Option<Event> {
         Self::smallest(&self.phase_crossings)

@@ -38,7 +38,9 @@ impl SampledPlant {
                 // ln(p/m) = 2 artanh((p - m)/(p + m)), whose cube is far below rounding.
                 let (x, y) = (p.0 + m.0, p.1 + m.1);
                 let (u, v) = (p.0 - m.0, p.1 - m.1);
-                let scale = rate / (x * x + y * y);
+                let size = x * x + y * y;
+                // Where the section is 0, as a low-pass at half the sample rate, ln C has no slope, and L none that counts.
+                let scale = if size > 0.0 { rate / size } else { 0.0 };
                 (re[j], im[j]) = ((u * x + v * y) * scale, (v * x - u * y) * scale);
             }
         }

@@ -7,7 +7,7 @@ use super::slot::Prepared;
 use super::{Context, Ready};
 use crate::controller::Controller;
 use crate::lti::{FrequencyResponse, Plant};
-use crate::tune::{Bench, Machine, Parameters, roomiest_table};
+use crate::tune::{Machine, TuningProblem, roomiest_table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -111,13 +111,13 @@ pub(super) fn group_table(
     let own: Vec<&Vec<f64>> = members.iter().map(|&i| &looks[i]).collect();
     let chosen: Vec<usize> = apart(&own, MEMBERS).into_iter().map(|i| members[i]).collect();
     let machines: Vec<Machine<'_>> = chosen.iter().flat_map(|&i| pilots[i].evidence.machines()).collect();
-    let parameters = Parameters::of(&context.guarded, Some(&context.base), context.base.sample_time_s);
-    let bench = Bench::new(&machines, &context.guarded, parameters).ok()?;
-    let mut desk = bench.desk();
-    let score = |c: &Controller, desk: &mut _| bench.score(&bench.parameters().vector(c), desk).violation;
-    let mut starts: Vec<(f64, usize)> = from.iter().enumerate().map(|(i, c)| (score(c, &mut desk), i)).collect();
+    let problem = TuningProblem::around(&machines, &context.guarded, &context.base).ok()?;
+    let mut work = problem.work();
+    let score = |c: &Controller, work: &mut _| problem.score(&problem.parameters().vector(c), work).violation;
+    let mut starts: Vec<(f64, usize)> = from.iter().enumerate().map(|(i, c)| (score(c, &mut work), i)).collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let polished = starts.iter().take(STARTS).filter_map(|(_, i)| roomiest_table(&bench, &from[*i], STEPS, &mut desk));
+    let polished =
+        starts.iter().take(STARTS).filter_map(|(_, i)| roomiest_table(&problem, &from[*i], STEPS, &mut work));
     polished.min_by(|a, b| a.1.violation.total_cmp(&b.1.violation)).map(|(c, _)| c)
 }
 

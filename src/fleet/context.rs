@@ -8,7 +8,7 @@ use crate::controller::Controller;
 use crate::document::{parse_toml, read_text, sha256_hex};
 use crate::gate::Gate;
 use crate::identify::{self, IdentifySettings};
-use crate::tune::{Hold, Spec, TuneSettings};
+use crate::tune::{Hold, Spec, SpecError, TuneSettings};
 
 /// What every slot's work needs.
 #[derive(Clone, Debug)]
@@ -42,11 +42,12 @@ impl Context {
     /// Reads everything that the document names.
     pub fn of(fleet: &Fleet) -> Result<Context, FleetError> {
         let f = &fleet.file;
-        let spec = Spec::read(&f.spec)?;
+        // The fleet keeps a guard of its own (`robust.guard`), over every case.
+        let spec = Spec::read(&f.spec)?.unguarded();
+        let profile = Spec::profile_path(&f.spec)?.ok_or(SpecError::NeedsProfile { what: "a fleet" })?;
         let text = read_text(&f.controller)?;
         let base: Controller = parse_toml(&f.controller, &text)?;
         base.check()?;
-        let profile = Spec::profile_path(&f.spec)?;
         let mut inputs = vec![
             ("fleet", fleet.sha256.clone()),
             ("spec", sha256_hex(read_text(&f.spec)?.as_bytes())),
@@ -65,7 +66,7 @@ impl Context {
         let mut words = format!("{}\n", env!("CARGO_PKG_VERSION"));
         inputs.iter().for_each(|(name, sha256)| words += &format!("{name} {sha256}\n"));
         Ok(Context {
-            guarded: guarded(&spec, f.robust.guard),
+            guarded: Spec { guard: f.robust.guard, ..spec.clone() },
             hold: if included { Hold::Included } else { Hold::NotIncluded },
             identify: IdentifySettings {
                 hold: match included {
@@ -74,7 +75,7 @@ impl Context {
                 },
                 ..IdentifySettings::default()
             },
-            search: TuneSettings { sample_time_s: base.sample_time_s, starts: STARTS, ..TuneSettings::default() },
+            search: TuneSettings { sample_time_s: Some(base.sample_time_s), starts: STARTS, ..TuneSettings::default() },
             digest: sha256_hex(words.as_bytes()),
             file: f.clone(),
             spec,
@@ -83,25 +84,4 @@ impl Context {
             inputs,
         })
     }
-}
-
-/// Every limit moved inside by a share of it.
-fn guarded(spec: &Spec, share: f64) -> Spec {
-    let mut s = spec.clone();
-    let (more, less) = (1.0 + share, 1.0 - share);
-    let m = &mut s.margins;
-    m.phase_margin_deg = m.phase_margin_deg.map(|x| x * more);
-    m.gain_margin_db = m.gain_margin_db.map(|x| x * more);
-    // Ms stays above 1.
-    m.max_sensitivity = m.max_sensitivity.map(|x| 1.0 + (x - 1.0) * less);
-    m.gain_crossover_hz = m.gain_crossover_hz.map(|[a, b]| {
-        let (from, to) = (a * more, b * less);
-        if from < to { [from, to] } else { [a, b] }
-    });
-    let l = &mut s.limits;
-    l.dft_low = l.dft_low.map(|x| x * less);
-    l.dft_high = l.dft_high.map(|x| x * less);
-    l.command_peak = l.command_peak.map(|x| x * less);
-    l.harmonics.iter_mut().for_each(|h| h.amplitude *= less);
-    s
 }

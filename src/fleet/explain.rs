@@ -157,8 +157,10 @@ impl Changed<'_> {
     fn spec(&self, spec: &Spec, factor: f64) -> Spec {
         let mut s = spec.clone();
         if self.change == Change::Noise {
-            s.profile.noise.encoder_rms /= factor;
-            s.profile.noise.windage_rms /= factor;
+            for noise in s.profile.iter_mut().map(|p| &mut p.noise) {
+                noise.encoder_rms /= factor;
+                noise.windage_rms /= factor;
+            }
         }
         s
     }
@@ -261,7 +263,9 @@ fn cause(context: &Context, slot: &Prepared, nearest: &OwnTable) -> Cause {
     let write = matches!(p.limit, What::DftLow | What::DftHigh | What::Harmonic { .. } | What::CommandPeak);
     if write {
         let mut quiet = context.spec.clone();
-        (quiet.profile.noise.encoder_rms, quiet.profile.noise.windage_rms) = (0.0, 0.0);
+        for noise in quiet.profile.iter_mut().map(|p| &mut p.noise) {
+            (noise.encoder_rms, noise.windage_rms) = (0.0, 0.0);
+        }
         let without = Ready::of(&slot.evidence, &quiet, &quiet, &context.base);
         let met = without.and_then(|mut r| prove(&mut r, &nearest.gains)).is_ok_and(|q| q.limit != p.limit || q.passes);
         return if met { Cause::Noise } else { Cause::Move };

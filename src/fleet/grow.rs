@@ -9,7 +9,7 @@
 use super::slot::Prepared;
 use super::{Context, Ready};
 use crate::controller::Controller;
-use crate::tune::{Bench, Machine, Parameters, roomiest_table};
+use crate::tune::{Machine, TuningProblem, roomiest_table};
 use rayon::prelude::*;
 
 /// Scouts a table is polished on at once: those that it serves with the least room, and those that it misses by least.
@@ -110,8 +110,7 @@ fn grow(context: &Context, left: &mut [&mut Scout<'_>], mut table: Controller) -
 
 /// The table near `start` with the most room on all machines.
 pub(super) fn polished(context: &Context, machines: &[Machine<'_>], start: &Controller) -> Option<Controller> {
-    let parameters = Parameters::of(&context.guarded, Some(&context.base), context.base.sample_time_s);
-    let bench = Bench::new(machines, &context.guarded, parameters).ok()?;
-    let (table, _) = roomiest_table(&bench, start, STEPS, &mut bench.desk())?;
+    let problem = TuningProblem::around(machines, &context.guarded, &context.base).ok()?;
+    let (table, _) = roomiest_table(&problem, start, STEPS, &mut problem.work())?;
     Some(table)
 }

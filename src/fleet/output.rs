@@ -71,8 +71,8 @@ fn figures(s: Option<&Summary>) -> [String; 5] {
         number(s.and_then(|s| s.phase_margin_deg)),
         number(s.and_then(|s| s.gain_margin_db)),
         number(s.map(|s| s.max_sensitivity)),
-        number(s.map(|s| s.dft_low)),
-        number(s.map(|s| s.dft_high)),
+        number(s.and_then(|s| s.dft_low)),
+        number(s.and_then(|s| s.dft_high)),
     ]
 }
 

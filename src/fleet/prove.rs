@@ -91,13 +91,17 @@ fn nearest(proof: &Proof, spec: &Spec) -> (f64, What, Option<f64>) {
     for l in &proof.judged.limits {
         let violation = l.violation.clamp(-UNSTABLE, 0.5 * UNSTABLE);
         if violation > worst.0 {
-            let [first, last] = spec.profile.pes.window;
             let at_hz = match l.wanted.what {
                 What::PhaseMargin | What::GainCrossover => m.gain_crossover_hz,
                 What::GainMargin => m.phase_crossover_hz,
                 What::MaxSensitivity => Some(m.max_sensitivity_hz),
-                What::Harmonic { k } => Some(k as f64 * spec.profile.pes.sample_rate_hz / (last - first) as f64),
-                What::DftLow | What::DftHigh | What::CommandPeak => None,
+                What::Harmonic { k } => spec.profile.as_ref().map(|p| {
+                    let [first, last] = p.pes.window;
+                    k as f64 * p.pes.sample_rate_hz / (last - first) as f64
+                }),
+                What::Curve { index } => proof.judged.found.curves.get(index).map(|c| c.hz),
+                What::Bandwidth => proof.judged.found.bandwidth_hz,
+                _ => None,
             };
             worst = (violation, l.wanted.what, at_hz);
         }
@@ -108,16 +112,9 @@ fn nearest(proof: &Proof, spec: &Spec) -> (f64, What, Option<f64>) {
 /// The figures; what is infinite becomes the largest number, which can be written.
 fn figures_of(proof: &Proof) -> Summary {
     let mut s = Summary::of(proof);
-    let values = [
-        &mut s.max_sensitivity,
-        &mut s.max_sensitivity_hz,
-        &mut s.modulus_margin,
-        &mut s.disk_margin,
-        &mut s.dft_low,
-        &mut s.dft_high,
-        &mut s.command_peak,
-    ];
-    for value in values {
+    let values = [&mut s.max_sensitivity, &mut s.max_sensitivity_hz, &mut s.modulus_margin, &mut s.disk_margin];
+    let figures = [&mut s.dft_low, &mut s.dft_high, &mut s.command_peak].into_iter().flatten();
+    for value in values.into_iter().chain(figures) {
         if !value.is_finite() {
             *value = f64::MAX;
         }

@@ -4,14 +4,14 @@
 
 use super::Evidence;
 use crate::controller::Controller;
-use crate::tune::{Bench, Desk, Found, Parameters, Spec, TuneError, polish_table};
+use crate::tune::{Found, Spec, TuneError, TuningProblem, TuningWork, polish_table};
 
-/// The cases of a slot on a bench.
+/// The cases of a slot as a tuning problem.
 pub struct Ready<'a> {
     pub(super) evidence: &'a Evidence,
     pub(super) spec: &'a Spec,
-    bench: Bench,
-    desk: Desk,
+    problem: TuningProblem,
+    work: TuningWork,
 }
 
 /// What one table scores in one slot by the search's grid: the largest violation of a guarded limit over all cases, and the objective.
@@ -38,10 +38,9 @@ impl<'a> Ready<'a> {
         guarded: &Spec,
         base: &Controller,
     ) -> Result<Ready<'a>, TuneError> {
-        let parameters = Parameters::of(guarded, Some(base), base.sample_time_s);
-        let bench = Bench::new(&evidence.machines(), guarded, parameters)?;
-        let desk = bench.desk();
-        Ok(Ready { evidence, spec, bench, desk })
+        let problem = TuningProblem::around(&evidence.machines(), guarded, base)?;
+        let work = problem.work();
+        Ok(Ready { evidence, spec, problem, work })
     }
 
     /// The score of a table of the fleet's shape.
@@ -58,15 +57,15 @@ impl<'a> Ready<'a> {
         if !self.shaped(gains) {
             return Quick { violation: f64::INFINITY, objective: 0.0 };
         }
-        let x = self.bench.parameters().vector(gains);
-        let s = self.bench.score_within(&x, hopeless, &mut self.desk);
+        let x = self.problem.parameters().vector(gains);
+        let s = self.problem.score_within(&x, hopeless, &mut self.work);
         Quick { violation: s.violation, objective: s.objective }
     }
 
     /// Sum of both DFT norms as measured, of the table scored last (position_unit).
     pub(super) fn dft(&self) -> f64 {
-        let found = self.desk.found(0);
-        found.dft_low + found.dft_high
+        let found = self.problem.found(0, &self.work);
+        found.dft()
     }
 
     /// The best table near `start` by the grid; none where its loop is unstable.
@@ -74,22 +73,22 @@ impl<'a> Ready<'a> {
         if !self.shaped(start) {
             return None;
         }
-        let (gains, s) = polish_table(&self.bench, start, steps, &mut self.desk)?;
+        let (gains, s) = polish_table(&self.problem, start, steps, &mut self.work)?;
         Some((gains, Quick { violation: s.violation, objective: s.objective }))
     }
 
     /// Whether gains have as many filters as the fleet's tables.
     fn shaped(&self, gains: &Controller) -> bool {
-        let base = self.bench.parameters().base();
+        let base = self.problem.parameters().base();
         gains.lowpass.len() == base.lowpass.len() && gains.notch.len() == base.notch.len()
     }
 
-    /// Whether the bench can say what the write of these gains is: they differ from the fleet's in searched numbers only.
+    /// Whether the problem can say what the write of these gains is: they differ from the fleet's in searched numbers only.
     pub(super) fn fits(&self, gains: &Controller) -> bool {
         if !self.shaped(gains) {
             return false;
         }
-        let back = self.bench.parameters().controller(&self.bench.parameters().vector(gains));
+        let back = self.problem.parameters().controller(&self.problem.parameters().vector(gains));
         let numbers = |c: &Controller| {
             let p = &c.pid;
             let mut all =
@@ -108,6 +107,6 @@ impl<'a> Ready<'a> {
     /// The write's figures of every case; none where a case is unstable.
     pub(super) fn writes(&mut self, gains: &Controller) -> Option<Vec<Found>> {
         (self.quick(gains).violation < NO_WRITE)
-            .then(|| (0..self.evidence.count()).map(|i| self.desk.found(i).clone()).collect())
+            .then(|| (0..self.evidence.count()).map(|i| self.problem.found(i, &self.work)).collect())
     }
 }

@@ -71,7 +71,7 @@ pub(super) fn rest(
             for (candidate, t) in (first..).zip(&tables) {
                 // Few slots: every table is judged exactly.
                 if let Some(p) = prove(&mut ready, &t.gains).ok().filter(|p| p.passes) {
-                    let dft = p.figures.dft_low + p.figures.dft_high;
+                    let dft = p.figures.dft();
                     serves.push(Serves { candidate, room: -p.worst, dft });
                 }
             }

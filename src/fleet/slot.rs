@@ -274,7 +274,7 @@ fn covered(context: &Context, library: &Library, look: &[f64], ready: &mut Ready
         } else if candidate == 0 || q.violation <= 1.1 * guard + NEAR_MISS {
             let p = prove(ready, &t.gains)?;
             if p.passes {
-                let dft = p.figures.dft_low + p.figures.dft_high;
+                let dft = p.figures.dft();
                 serves.push(Serves { candidate, room: -p.worst, dft });
             }
         }

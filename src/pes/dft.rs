@@ -51,6 +51,11 @@ impl WindowDft {
         &self.bins
     }
 
+    /// Samples of the window.
+    pub fn samples(&self) -> usize {
+        self.n
+    }
+
     /// Frequency of bin k (Hz).
     pub fn hz(&self, k: usize) -> f64 {
         k as f64 * self.rate_hz / self.n as f64
@@ -78,6 +83,21 @@ impl WindowDft {
             }
             let (re, im) = ((re[0] + re[1]) + (re[2] + re[3]), (im[0] + im[1]) + (im[2] + im[3]));
             amplitude.push((re * re + im * im).sqrt() / self.n as f64);
+        }
+    }
+
+    /// Slopes of a figure in the window's samples, into `out`, from its slopes in the power |X_k|²/N² of each bin.
+    pub fn slopes(&self, window: &[f64], power: &[f64], out: &mut Vec<f64>) {
+        out.clear();
+        out.resize(self.n, 0.0);
+        let scale = 2.0 / (self.n as f64 * self.n as f64);
+        let rows = self.cos.chunks_exact(self.n).zip(self.sin.chunks_exact(self.n));
+        for ((cos, sin), share) in rows.zip(power).filter(|(_, share)| **share != 0.0) {
+            let sum = |row: &[f64]| row.iter().zip(window).map(|(a, b)| a * b).sum::<f64>() * scale * share;
+            let (re, im) = (sum(cos), sum(sin));
+            for ((out, cos), sin) in out.iter_mut().zip(cos).zip(sin) {
+                *out += re * cos + im * sin;
+            }
         }
     }
 

@@ -29,7 +29,6 @@ pub mod figure;
 pub mod fleet;
 pub mod histogram;
 pub mod identified;
-pub mod limit;
 pub mod margins;
 pub mod number;
 pub mod nyquist;

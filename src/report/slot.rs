@@ -43,6 +43,8 @@ pub struct SlotView<'a> {
     pub name: &'a str,
     /// The verdict in one sentence, and whether it is good.
     pub verdict: (Verdict, String),
+    /// What the certificate says of the gain table; none without one.
+    pub certificate: Option<&'a str>,
     /// On what the limits were judged, where that is not what the curves show.
     pub judged_on: Option<&'a str>,
     /// Sections about where the plant comes from, shown first.
@@ -67,14 +69,17 @@ pub fn slot_page(view: &SlotView<'_>) -> Result<Page, ReportError> {
     let mut verdict = vec![Block::Notice(view.verdict.0, view.verdict.1.clone()), Block::Table(limits)];
     // Without it, the table's figures would seem to contradict the cards and the curves.
     verdict.extend(view.judged_on.map(|said| Block::Prose(said.to_owned())));
+    verdict.extend(view.certificate.map(|said| Block::Prose(said.to_owned())));
     let mut sections = vec![Section { heading: "Verdict".into(), blocks: verdict }];
     sections.extend(view.plant.iter().cloned());
     sections.push(loop_section(view)?);
-    sections.push(pes_section(view)?);
+    if let Some(profile) = &view.spec.profile {
+        sections.push(pes_section(view, profile)?);
+    }
     sections.extend(view.gains.iter().cloned());
     Ok(Page {
         title: format!("Servo tuning report: {}", view.name),
-        subtitle: "Margins of the open loop, simulated PES of a spiral write, gain table".into(),
+        subtitle: "Margins of the open loop, simulated PES, gain table".into(),
         cards: cards(view),
         sections,
         provenance: view.provenance.clone(),
@@ -160,7 +165,7 @@ pub(crate) fn window_words(p: &Profile) -> (f64, f64, String) {
     (at(first), at(last), format!("DFT window, servo samples {first} to {last}"))
 }
 
-fn pes_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
+fn pes_section(view: &SlotView<'_>, profile: &Profile) -> Result<Section, ReportError> {
     let heading = "PES of a spiral write".to_owned();
     let Some((write, figures)) = &view.after.write else {
         let notice = Block::Notice(Verdict::Fail, "The closed loop is unstable: there is no PES to show.".into());
@@ -170,7 +175,7 @@ fn pes_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
     let hz: Vec<f64> = figures.harmonics.iter().map(|h| h.hz).collect();
     let amplitudes = |f: &PesFigures| f.harmonics.iter().map(|h| h.amplitude).collect::<Vec<f64>>();
     let (after_bars, before_bars) = (amplitudes(figures), before.map(|(_, f)| amplitudes(f)));
-    let at = |k: usize| k as f64 * view.spec.profile.pes.sample_rate_hz / (2 * hz.len()) as f64;
+    let at = |k: usize| k as f64 * profile.pes.sample_rate_hz / (2 * hz.len()) as f64;
     let limits: Vec<(f64, f64)> =
         view.spec.limits.harmonics.iter().map(|h| (hz.get(h.k - 1).copied().unwrap_or(at(h.k)), h.amplitude)).collect();
     let bars = SpectrumBars {
@@ -183,15 +188,21 @@ fn pes_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
         until_hz: 3300.0,
     };
     let spectrum = spectrum_bars("DFT of the window", "Amplitude |X_k|/N of each harmonic.", &bars)?;
-    let mut blocks = vec![Block::Figure(record_figure(view, write, before.map(|(w, _)| w))?), Block::Figure(spectrum)];
+    let mut blocks =
+        vec![Block::Figure(record_figure(view, profile, write, before.map(|(w, _)| w))?), Block::Figure(spectrum)];
     blocks.push(Block::Table(super::pes::pes_table(figures, view.units.position)?));
     let harmonics = super::pes::harmonics_table(figures, 24, view.units.position)?;
     blocks.push(Block::Details("Harmonics".into(), vec![Block::Table(harmonics)]));
     Ok(Section { heading, blocks })
 }
 
-fn record_figure(view: &SlotView<'_>, after: &ClosedLoop, before: Option<&ClosedLoop>) -> Result<Figure, ReportError> {
-    let rate = view.spec.profile.pes.sample_rate_hz;
+fn record_figure(
+    view: &SlotView<'_>,
+    profile: &Profile,
+    after: &ClosedLoop,
+    before: Option<&ClosedLoop>,
+) -> Result<Figure, ReportError> {
+    let rate = profile.pes.sample_rate_hz;
     let servo: Vec<f64> = (0..after.pes.len()).map(|j| j as f64 / rate).collect();
     let tick: Vec<f64> = (0..after.command.len()).map(|k| k as f64 * after.sample_time_s).collect();
     let held = CurveKind::Held;
@@ -214,6 +225,6 @@ fn record_figure(view: &SlotView<'_>, after: &ClosedLoop, before: Option<&Closed
             limits: limit.as_ref().map_or(&none[..], |l| &l[..]),
         },
     ];
-    let (from, to, words) = window_words(&view.spec.profile);
+    let (from, to, words) = window_words(profile);
     time("Record of the write", "Simulated.", &panels, Some((from, to, &words)))
 }

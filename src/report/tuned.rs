@@ -5,7 +5,7 @@ use super::number::NumberFormat;
 use super::table::{Cell, Column, Table, Verdict};
 use crate::controller::Controller;
 use crate::lti::Section;
-use crate::tune::{AtBound, Infeasible, Judged, Side, What};
+use crate::tune::{AtBound, Infeasible, Judged, MET, Side, What};
 
 /// The units of one machine's position and command, for figures that carry them.
 #[derive(Clone, Copy, Debug)]
@@ -23,10 +23,15 @@ pub(super) fn figure_words<'a>(what: What, units: Units<'a>) -> (String, &'a str
         What::GainMargin => ("gain margin".into(), "dB"),
         What::MaxSensitivity => ("max sensitivity Ms".into(), "ratio"),
         What::GainCrossover => ("gain crossover".into(), "Hz"),
-        What::DftLow => ("DFT 600-1500 Hz".into(), units.position),
-        What::DftHigh => ("DFT 1500-3000 Hz".into(), units.position),
+        What::DftLow => ("DFT, low band".into(), units.position),
+        What::DftHigh => ("DFT, high band".into(), units.position),
         What::Harmonic { k } => (format!("harmonic {k}"), units.position),
         What::CommandPeak => ("command peak".into(), units.command),
+        What::CommandRms => ("command rms".into(), units.command),
+        What::Bandwidth => ("closed-loop bandwidth".into(), "Hz"),
+        What::Overshoot => ("overshoot of a step".into(), "%"),
+        What::Settling => ("settling of a step to 2 %".into(), "s"),
+        What::Curve { index } => (format!("curve {}, worst ratio", index + 1), "ratio"),
     }
 }
 
@@ -48,7 +53,7 @@ pub fn limits_table(before: Option<&Judged>, after: Option<&Judged>, units: Unit
     for (i, l) in after.limits.iter().enumerate() {
         let cell = |found: Option<f64>, violation: f64| {
             let cell = Cell::from(found);
-            if violation > 0.0 { cell.flagged(Verdict::Fail, "missed") } else { cell.flagged(Verdict::Ok, "met") }
+            if violation > MET { cell.flagged(Verdict::Fail, "missed") } else { cell.flagged(Verdict::Ok, "met") }
         };
         let was = before.and_then(|b| b.limits.get(i));
         let (name, unit) = figure_words(l.wanted.what, units);

@@ -4,7 +4,7 @@ use super::StudyError;
 use crate::document::sha256_hex;
 use crate::lti::{Plant, PlantFile};
 use crate::numeric::random::Random;
-use crate::tune::{GainTable, InputDigest, Machine, Outcome, Spec, TuneSettings, tune};
+use crate::tune::{GainTable, InputDigest, Machine, Spec, TuneSettings, tune};
 use crate::twin::{MachineClass, nominal_controller};
 use crate::verify::{
     Certificate, Inputs, Source, SweepAssumption, Uncertainty, VerifyError, VerifySettings, Word, certify,
@@ -55,7 +55,8 @@ fn prove(plant: &Source, gains: &Source, word: Word, uncertainty: Uncertainty) -
     let plants = [plant.clone()];
     let assumption = SweepAssumption { least_damping: 0.005, hold_included: false };
     let sweeps = &[];
-    let i = Inputs { gains, plants: &plants, sweeps, assumption, spec: &spec, profile: &profile, word, uncertainty };
+    let i =
+        Inputs { gains, plants: &plants, sweeps, assumption, spec: &spec, profile: Some(&profile), word, uncertainty };
     certify(&i, &VerifySettings::default())
 }
 
@@ -63,7 +64,7 @@ fn prove(plant: &Source, gains: &Source, word: Word, uncertainty: Uncertainty) -
 pub(super) fn machines() -> Result<Vec<Certified>, StudyError> {
     let start = nominal_controller()?;
     let (spec_source, profile) = spec();
-    let wanted = Spec::parse(&spec_source.text, &profile.text)?;
+    let wanted = Spec::parse(&spec_source.text, profile.text.as_str())?;
     MachineClass::ALL
         .iter()
         .map(|&class| {
@@ -83,13 +84,14 @@ pub(super) fn machines() -> Result<Vec<Certified>, StudyError> {
             let none = Uncertainty::default();
             let certificate = prove(&plant, &gains, Word::Double, none)?;
             let apart = certificate.cases[0].write.as_ref().map_or(0.0, |w| {
-                (w.dft_low - table.after.dft_low).abs().max((w.dft_high - table.after.dft_high).abs())
+                let off = |proved: f64, stated: Option<f64>| stated.map_or(f64::INFINITY, |x| (proved - x).abs());
+                off(w.dft_low, table.after.dft_low).max(off(w.dft_high, table.after.dft_high))
             });
             Ok(Certified {
                 class,
-                tuned: matches!(outcome, Outcome::Tuned(_)),
+                tuned: outcome.tuned().is_some(),
                 certificate,
-                dft_apart: apart / wanted.profile.spiral.distance,
+                dft_apart: apart / wanted.write("a study")?.spiral.distance,
                 boxed: prove(&plant, &gains, Word::Double, BOX)?,
                 short: prove(&plant, &gains, Word::Fixed { bits: 24, fraction: 18 }, none)?,
                 plant,

@@ -6,7 +6,7 @@ use super::hdd::{RATE_HZ, cases, joint};
 use crate::feedback::{ModelLoop, closed_loop_poles, margins};
 use crate::frf::Frf;
 use crate::lti::{DiscretePlant, FrequencyResponse};
-use crate::tune::{Outcome, Spec};
+use crate::tune::Spec;
 use crate::twin::plants::log_grid;
 use crate::verify::{Bounded, Stability, SweepAssumption, Uncertainty, VerifySettings, prove_sweep};
 use rayon::prelude::*;
@@ -31,7 +31,7 @@ pub(super) fn benchmark(data: &Path) -> Result<String, StudyError> {
         "One table tuned jointly on all nine ({}); limits: phase margin {} deg, gain margin {} dB, Ms {}. Each case is certified from its response alone, \
          no mode being less damped than {BENCHMARK_DAMPING}.\n\n\
          | case | points | stability | phase margin at least (deg) | gain margin at least (dB) | Ms at most | disk margin at least | limits |\n|---|---|---|---|---|---|---|---|\n",
-        if matches!(outcome, Outcome::Tuned(_)) { "every limit met" } else { "infeasible, best compromise" },
+        if outcome.tuned().is_some() { "every limit met" } else { "infeasible, best compromise" },
         m.phase_margin_deg.unwrap_or_default(),
         m.gain_margin_db.unwrap_or_default(),
         m.max_sensitivity.unwrap_or_default(),

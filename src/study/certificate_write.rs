@@ -31,7 +31,7 @@ pub fn certificate_write(data: &Path, say: &mut dyn FnMut(&str)) -> Result<Study
         Spec::parse(include_str!("../../specs/limits/paper.toml"), include_str!("../../specs/profiles/spiral.toml"))?;
     for class in MachineClass::ALL {
         let (plant, profile) = (paper_machine(class)?, paper_profile(class)?);
-        let spec = Spec { profile: profile.clone(), ..paper.clone() };
+        let spec = Spec { profile: Some(profile.clone()), ..paper.clone() };
         let outcome = tune(&Machine::Model(&plant), &spec, Some(&nominal_controller()?), &TuneSettings::default())?;
         rows += &machine(class.name(), &plant, outcome.controller(), &profile, &[1, 3], &SHARES, &mut tally)?;
         say(&format!("{}: done", class.name()));
@@ -42,7 +42,7 @@ pub fn certificate_write(data: &Path, say: &mut dyn FnMut(&str)) -> Result<Study
     say("benchmark plant: tuned");
     for case in &cases {
         let plant = model(&case.frf)?;
-        rows += &machine(&case.name, &plant, outcome.controller(), &hdd.profile, &[1], &NARROW, &mut tally)?;
+        rows += &machine(&case.name, &plant, outcome.controller(), hdd.write("a study")?, &[1], &NARROW, &mut tally)?;
         say(&format!("{}: done", case.name));
     }
     let mut study = Study::default();

@@ -39,8 +39,6 @@ pub enum StudyError {
     #[error(transparent)]
     Spec(#[from] SpecError),
     #[error(transparent)]
-    Limit(#[from] crate::tune::LimitError),
-    #[error(transparent)]
     Tune(#[from] TuneError),
     #[error(transparent)]
     Table(#[from] crate::tune::GainTableError),

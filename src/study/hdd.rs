@@ -7,7 +7,7 @@ use super::{Study, StudyError};
 use crate::controller::Controller;
 use crate::feedback::{MeasuredLoop, measured_margins};
 use crate::frf::Frf;
-use crate::lti::{DiscretePlant, FrequencyResponse, ModalForm, ModalTerm, PlantState};
+use crate::lti::{DiscretePlant, FrequencyResponse, ModalForm, ModalTerm};
 use crate::recording::read_columns;
 use crate::report::bode::{BodeCurve, BodeMarks, bode};
 use crate::report::number::NumberFormat;
@@ -33,16 +33,6 @@ pub(super) struct Case {
     pub name: String,
     /// The main actuator with the second one's loop closed, at the controller's rate, hold included.
     pub frf: Frf,
-    /// The same plant's position after one sample of a command of 1.
-    pulse: Vec<f64>,
-}
-
-/// Samples of a pulse response: 100 ms, longer than any window.
-const PULSE: usize = 5040;
-
-/// Name, response and pulse response of every case.
-pub(super) fn benchmark(data: &Path) -> Result<Vec<(String, Frf, Vec<f64>)>, StudyError> {
-    Ok(cases(data)?.into_iter().map(|c| (c.name, c.frf, c.pulse)).collect())
 }
 
 /// The nine cases from the folder of published parameters.
@@ -65,8 +55,7 @@ pub(super) fn cases(data: &Path) -> Result<Vec<Case>, StudyError> {
             let fine = sampled(&pzt, 1.0, pzt_f, damping)?;
             let at_rest = fine.at(1e-3).norm();
             let name = format!("{temperature} temperature, second actuator {:+.0} %", 100.0 * (gain - 1.0));
-            let pulse = pulse(&main, &fine, gain / at_rest);
-            cases.push(Case { name, frf: response(&main, &fine, gain / at_rest)?, pulse });
+            cases.push(Case { name, frf: response(&main, &fine, gain / at_rest)? });
         }
     }
     Ok(cases)
@@ -75,7 +64,7 @@ pub(super) fn cases(data: &Path) -> Result<Vec<Case>, StudyError> {
 /// One controller for all cases.
 pub(super) fn joint(cases: &[Case]) -> Result<Outcome, StudyError> {
     let spec = Spec::parse(include_str!("specs/hdd.toml"), include_str!("specs/hdd_profile.toml"))?;
-    let settings = TuneSettings { sample_time_s: 1.0 / RATE_HZ, ..TuneSettings::default() };
+    let settings = TuneSettings { sample_time_s: Some(1.0 / RATE_HZ), ..TuneSettings::default() };
     let machines: Vec<Machine<'_>> =
         cases.iter().map(|c| Machine::Response { frf: &c.frf, hold: Hold::Included, continuation: None }).collect();
     Ok(tune_jointly(&machines, &spec, None, &settings)?)
@@ -85,7 +74,7 @@ pub(super) fn joint(cases: &[Case]) -> Result<Outcome, StudyError> {
 pub fn hdd(data: &Path) -> Result<Study, StudyError> {
     let cases = cases(data)?;
     let spec = Spec::parse(include_str!("specs/hdd.toml"), include_str!("specs/hdd_profile.toml"))?;
-    let settings = TuneSettings { sample_time_s: 1.0 / RATE_HZ, ..TuneSettings::default() };
+    let settings = TuneSettings { sample_time_s: Some(1.0 / RATE_HZ), ..TuneSettings::default() };
     let first = Machine::Response { frf: &cases[0].frf, hold: Hold::Included, continuation: None };
     let alone = tune(&first, &spec, None, &settings)?;
     let jointly = joint(&cases)?;
@@ -119,24 +108,6 @@ fn sampled(modes: &[ModeRow], gain: f64, frequency: f64, damping: f64) -> Result
     Ok(DiscretePlant::of_modal(&form, 1.0 / RATE_HZ)?)
 }
 
-/// The main actuator's position after a pulse, the second loop closed around it as in [`response`].
-fn pulse(main: &DiscretePlant, fine: &DiscretePlant, fine_gain: f64) -> Vec<f64> {
-    let lag_pole = (-TAU * LAG.1 / RATE_HZ).exp();
-    let (mut outer, mut inner) = (PlantState::at_rest(main), PlantState::at_rest(fine));
-    let mut lag = 0.0;
-    (0..PULSE)
-        .map(|k| {
-            let seen = outer.position() - fine_gain * inner.position();
-            outer.command(if k == 0 { 1.0 } else { 0.0 });
-            inner.command(lag);
-            outer.advance(main);
-            inner.advance(fine);
-            lag = lag_pole * lag + LAG.0 * (1.0 - lag_pole) * seen;
-            seen
-        })
-        .collect()
-}
-
 /// The main actuator's response with the second loop closed, on a grid that resolves every mode.
 fn response(main: &DiscretePlant, fine: &DiscretePlant, fine_gain: f64) -> Result<Frf, StudyError> {
     let t = 1.0 / RATE_HZ;
@@ -158,8 +129,7 @@ fn response(main: &DiscretePlant, fine: &DiscretePlant, fine_gain: f64) -> Resul
 fn page(cases: &[Case], alone: &Outcome, jointly: &Outcome) -> Result<String, StudyError> {
     let (first, first_missed) = margin_table("Tuned on the first case alone", cases, alone.controller())?;
     let (second, second_missed) = margin_table("Tuned jointly on all nine", cases, jointly.controller())?;
-    let words =
-        |o: &Outcome| if matches!(o, Outcome::Tuned(_)) { "every limit met" } else { "infeasible, best compromise" };
+    let words = |o: &Outcome| if o.tuned().is_some() { "every limit met" } else { "infeasible, best compromise" };
     Ok(format!(
         "# HDD benchmark plant: nine cases\n\n\
          Made by `servotune study hdd --data DATA --out results`, DATA being the folder with `hdd_benchmark_model/`. Source: T. Atsumi, IEEJ benchmark \

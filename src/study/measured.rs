@@ -52,7 +52,8 @@ pub(super) fn tune_axis(axis: &Axis, spec: &str, profile: &str, sample_time_s: f
         model.resonance_gain = -model.resonance_gain;
     }
     let machine = Machine::Response { frf: &frf, hold: Hold::Included, continuation: Some(&model) };
-    let outcome = tune(&machine, &spec, None, &TuneSettings { sample_time_s, ..TuneSettings::default() })?;
+    let outcome =
+        tune(&machine, &spec, None, &TuneSettings { sample_time_s: Some(sample_time_s), ..TuneSettings::default() })?;
     let sections = outcome.controller().sections()?;
     let margins = measured_margins(&MeasuredLoop::new(&frf, &sections, true)?)?;
     let (name, frf, identified) = (axis.name.clone(), axis.frf.clone(), axis.identified.clone());
@@ -88,7 +89,7 @@ pub(super) fn tuned_table(tuned: &[Tuned]) -> Result<Table, StudyError> {
         table.push(vec![
             t.name.as_str().into(),
             if t.turned { "turned" } else { "as measured" }.into(),
-            if matches!(t.outcome, Outcome::Tuned(_)) { "every limit met" } else { "infeasible" }.into(),
+            if t.outcome.tuned().is_some() { "every limit met" } else { "infeasible" }.into(),
             m.gain_crossover_hz.into(),
             m.phase_margin_deg.into(),
             i.phase_margin_deg.map(|i| i.low).into(),
@@ -106,7 +107,9 @@ pub(super) fn axis_page(t: &Tuned) -> Result<String, StudyError> {
     let units = Units { position: &id.plant.position_unit, command: &id.plant.command_unit };
     let controller: &Controller = t.outcome.controller();
     let (verdict, words) = match &t.outcome {
-        Outcome::Tuned(_) => (Verdict::Ok, "Every limit is met on the measured response."),
+        Outcome::Tuned(_) | Outcome::TunedWithoutGuard(_) => {
+            (Verdict::Ok, "Every limit is met on the measured response.")
+        }
         Outcome::Infeasible(_) => (Verdict::Fail, "The limits are not met; the best compromise is shown."),
     };
     let after = t.outcome.after().first().map(|p| &p.judged);

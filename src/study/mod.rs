@@ -16,14 +16,12 @@ mod gate;
 mod gate_seeds;
 mod hdd;
 mod ladder;
-mod limit;
 mod line;
 mod measured;
 mod mirror;
 mod mismatch;
 mod motor;
 mod plants;
-mod polish;
 mod prediction;
 mod recordings;
 
@@ -37,13 +35,11 @@ pub use gate::gate;
 pub use gate_seeds::gate_seeds;
 pub use hdd::hdd;
 pub use ladder::ladder;
-pub use limit::limits;
 pub use line::line_study;
 pub use mirror::mirror;
 pub use mismatch::mismatch;
 pub use motor::motor;
 pub use plants::plants;
-pub use polish::polishes;
 pub use prediction::prediction;
 pub use recordings::recordings;
 

@@ -17,6 +17,11 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GainTable {
+    /// Units of the gains: command_unit per position_unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    position_unit: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    command_unit: Option<String>,
     sample_time_s: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     output_limit: Option<f64>,
@@ -57,9 +62,12 @@ pub struct Summary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delay_margin_s: Option<f64>,
     pub disk_margin: f64,
-    pub dft_low: f64,
-    pub dft_high: f64,
-    pub command_peak: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dft_low: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dft_high: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command_peak: Option<f64>,
     #[serde(default)]
     pub gain_crossings: Vec<CrossingRow>,
     #[serde(default)]
@@ -146,6 +154,11 @@ pub enum GainTableError {
 const SAME: f64 = 1e-12;
 
 impl Summary {
+    /// Sum of both DFT norms (position_unit), 0 without a write.
+    pub fn dft(&self) -> f64 {
+        self.dft_low.unwrap_or(0.0) + self.dft_high.unwrap_or(0.0)
+    }
+
     /// The figures of a judgement.
     pub fn of(proof: &Proof) -> Summary {
         let (m, f) = (&proof.margins, &proof.judged.found);
@@ -171,23 +184,40 @@ impl Summary {
 }
 
 impl GainTable {
-    /// The table of an outcome; of several machines the one with the largest DFT is written.
+    /// The table of an outcome; of several machines the figures are those of the one nearest to its limits.
     pub fn of(
         outcome: &Outcome,
         seed: u64,
         spec_sha256: String,
         inputs: Vec<InputDigest>,
     ) -> Result<GainTable, GainTableError> {
-        let (before, work, feasible) = match outcome {
-            Outcome::Tuned(t) => (&t.before, &t.work, true),
-            Outcome::Infeasible(i) => (&i.before, &i.work, false),
-        };
-        let size = |p: &Proof| p.judged.found.dft_low + p.judged.found.dft_high;
-        let worst =
-            (0..outcome.after().len()).max_by(|&a, &b| size(&outcome.after()[a]).total_cmp(&size(&outcome.after()[b])));
-        let worst = worst.unwrap_or(0);
+        let miss = |i: usize| outcome.after()[i].judged.worst();
+        let worst = (0..outcome.after().len()).max_by(|&a, &b| miss(a).total_cmp(&miss(b))).unwrap_or(0);
+        GainTable::of_machine(worst, outcome, seed, spec_sha256, inputs)
+    }
+
+    /// The same with the figures of the first machine, where the others are members of a box around it.
+    pub fn of_first(
+        outcome: &Outcome,
+        seed: u64,
+        spec_sha256: String,
+        inputs: Vec<InputDigest>,
+    ) -> Result<GainTable, GainTableError> {
+        GainTable::of_machine(0, outcome, seed, spec_sha256, inputs)
+    }
+
+    fn of_machine(
+        worst: usize,
+        outcome: &Outcome,
+        seed: u64,
+        spec_sha256: String,
+        inputs: Vec<InputDigest>,
+    ) -> Result<GainTable, GainTableError> {
+        let (before, work, feasible) = (outcome.before(), outcome.work(), outcome.tuned().is_some());
         let c = outcome.controller().clone();
         Ok(GainTable {
+            position_unit: None,
+            command_unit: None,
             section: c.sections()?.chain,
             sample_time_s: c.sample_time_s,
             output_limit: c.output_limit,
@@ -195,7 +225,7 @@ impl GainTable {
             lowpass: c.lowpass,
             notch: c.notch,
             feedforward: c.feedforward,
-            before: before.as_ref().and_then(|b| b.get(worst)).map(Summary::of),
+            before: before.and_then(|b| b.get(worst)).map(Summary::of),
             after: Summary::of(&outcome.after()[worst]),
             provenance: Provenance {
                 program: env!("CARGO_PKG_VERSION").into(),
@@ -240,6 +270,8 @@ impl GainTable {
     ) -> Result<GainTable, GainTableError> {
         let c = controller.clone();
         Ok(GainTable {
+            position_unit: None,
+            command_unit: None,
             section: c.sections()?.chain,
             sample_time_s: c.sample_time_s,
             output_limit: c.output_limit,
@@ -251,6 +283,17 @@ impl GainTable {
             after,
             provenance,
         })
+    }
+
+    /// The same table with the units of its machine.
+    pub fn in_units(mut self, position: &str, command: &str) -> GainTable {
+        (self.position_unit, self.command_unit) = (Some(position.to_owned()), Some(command.to_owned()));
+        self
+    }
+
+    /// Units of position and command, where the table has them.
+    pub fn units(&self) -> Option<(&str, &str)> {
+        self.position_unit.as_deref().zip(self.command_unit.as_deref())
     }
 
     /// The controller of the table.

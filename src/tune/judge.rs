@@ -1,12 +1,14 @@
 //! The exact judgement of one controller on one machine, independent of the search's shortcuts.
 
+use super::exact_loop::exact_loop;
 use super::machine::{curve, measured_loop};
 use super::requirements::{Found, Judged, Requirement};
+use super::step_figures::{overshoot, settling_s};
 use super::{Machine, Spec, TuneError};
 use crate::controller::Controller;
-use crate::feedback::{Margins, ModelLoop, margins};
-use crate::lti::DiscretePlant;
-use crate::pes::{HIGH_BAND_HZ, LOW_BAND_HZ, SpectralPes, SpectralWork, figures, simulate};
+use crate::feedback::{Margins, ModelLoop};
+use crate::lti::{DiscretePlant, FrequencyResponse, Plant};
+use crate::pes::{Profile, SpectralPes, SpectralWork, StepScene, StepWork, WindowDft, simulate};
 use serde::Serialize;
 
 /// One controller on one machine: all margins, and every requirement judged.
@@ -18,49 +20,122 @@ pub struct Proof {
     pub judged: Judged,
 }
 
-/// Judges a controller: [`margins`] on the loop, and the whole write simulated, or read off the spectrum of a response.
+/// Judges a controller: margins, curves and bandwidth refined on the loop; the whole write and a step simulated, or the write read off the
+/// spectrum of a response.
 pub fn judge(machine: &Machine<'_>, controller: &Controller, spec: &Spec) -> Result<Proof, TuneError> {
     let wanted = Requirement::list(&spec.margins, &spec.limits);
+    let (margins, mut found) = judge_loop(machine, controller, spec)?;
+    if let Some(profile) = &spec.profile {
+        match machine {
+            Machine::Model(plant) => simulated(plant, controller, spec, profile, &mut found)?,
+            Machine::Response { frf, hold, continuation } => {
+                let harmonics: Vec<usize> = spec.limits.harmonics.iter().map(|h| h.k).collect();
+                let bins = bins(spec, profile, &harmonics);
+                let plant = curve(frf, *hold, *continuation, controller.sample_time_s)?;
+                let s = SpectralPes::new(profile, &plant, controller, bins, true)?;
+                let mut amplitude = Vec::new();
+                let chain = controller.sections()?.chain;
+                found.command_peak = Some(s.write(&chain, &mut SpectralWork::default(), &mut amplitude));
+                bands(s.dft(), &amplitude, spec, &mut found);
+            }
+        }
+    }
+    let model = match machine {
+        Machine::Model(plant) => Some(*plant),
+        Machine::Response { continuation, .. } => *continuation,
+    };
+    if let Some(plant) = model {
+        stepped(plant, controller, spec, &mut found)?;
+    }
+    if let (Some(d), None, Some(_)) = (&spec.disturbance, &spec.profile, spec.limits.command_rms) {
+        found.command_rms = Some(super::machine::command_rms(machine, controller, d)?);
+    }
+    Ok(Proof { margins, judged: Judged::of(&wanted, found) })
+}
+
+/// The figures of the loop alone.
+pub(super) fn judge_loop(m: &Machine<'_>, controller: &Controller, spec: &Spec) -> Result<(Margins, Found), TuneError> {
     let sections = controller.sections()?;
-    let mut found = Found::default();
-    let margins = match machine {
+    let (limits, curves) = (&spec.margins, &spec.limits.curve);
+    Ok(match m {
         Machine::Model(plant) => {
             let sampled = DiscretePlant::of(plant, controller.sample_time_s)?;
-            let write = simulate(plant, controller, &spec.profile)?;
-            let f = figures(&write.pes, &spec.profile);
-            (found.dft_low, found.dft_high) = (f.dft_low, f.dft_high);
-            let of = |k: usize| f.harmonics.iter().find(|h| h.k == k).map_or(0.0, |h| h.amplitude);
-            found.harmonics = spec.limits.harmonics.iter().map(|h| of(h.k)).collect();
-            found.command_peak = write.command.iter().fold(0.0, |a, u| u.abs().max(a));
-            margins(&ModelLoop::new(&sampled, &sections)?)
+            exact_loop(&ModelLoop::new(&sampled, &sections)?, &|w| sampled.at(w), limits, curves)
         }
         Machine::Response { frf, hold, continuation } => {
-            let loop_ = measured_loop(frf, *hold, &sections)?;
-            let bins =
-                super::machine::bins(&spec.profile, &spec.limits.harmonics.iter().map(|h| h.k).collect::<Vec<_>>());
             let plant = curve(frf, *hold, *continuation, controller.sample_time_s)?;
-            let s = SpectralPes::new(&spec.profile, &plant, controller, bins, true)?;
-            let mut amplitude = Vec::new();
-            found.command_peak = s.write(&sections.chain, &mut SpectralWork::default(), &mut amplitude);
-            found.dft_low = s.dft().band(&amplitude, LOW_BAND_HZ);
-            found.dft_high = s.dft().band(&amplitude, HIGH_BAND_HZ);
-            let of = |k: usize| s.dft().bins().iter().position(|b| *b == k).map_or(0.0, |i| amplitude[i]);
-            found.harmonics = spec.limits.harmonics.iter().map(|h| of(h.k)).collect();
-            margins(&loop_)
+            exact_loop(&measured_loop(frf, *hold, &sections)?, &|w| plant.at(w), limits, curves)
         }
+    })
+}
+
+/// The figures of the whole write, as `simulate` gives them, over the bands of the spec.
+fn simulated(
+    plant: &Plant,
+    c: &Controller,
+    spec: &Spec,
+    profile: &Profile,
+    found: &mut Found,
+) -> Result<(), TuneError> {
+    let write = simulate(plant, c, profile)?;
+    let start = profile.first_servo_sample();
+    let [first, last] = profile.pes.window;
+    let window = &write.pes[start + first..start + last];
+    let harmonics: Vec<usize> = spec.limits.harmonics.iter().map(|h| h.k).collect();
+    let dft = WindowDft::new(window.len(), profile.pes.sample_rate_hz, bins(spec, profile, &harmonics));
+    let mut amplitude = Vec::new();
+    dft.amplitudes(window, &mut amplitude);
+    bands(&dft, &amplitude, spec, found);
+    found.command_peak = Some(write.command.iter().fold(0.0, |a, u| u.abs().max(a)));
+    let power = write.command.iter().map(|u| u * u).sum::<f64>() / write.command.len().max(1) as f64;
+    found.command_rms = spec.limits.command_rms.map(|_| power.sqrt());
+    Ok(())
+}
+
+/// Norms over the first two bands and the limited harmonics; none of a band without a bin.
+fn bands(dft: &WindowDft, amplitude: &[f64], spec: &Spec, found: &mut Found) {
+    let norm = |i: usize| {
+        let band = *spec.objective.bands_hz.get(i)?;
+        dft.inside(band).next().map(|_| dft.band(amplitude, band))
     };
-    found.unstable_poles = margins.unstable_poles;
-    found.phase_margin_deg = margins.phase_margin_deg;
-    found.gain_margin_db = margins.gain_margin_db;
-    found.max_sensitivity = margins.max_sensitivity;
-    found.gain_crossover_hz = margins.gain_crossover_hz;
-    Ok(Proof { margins, judged: Judged::of(&wanted, found) })
+    (found.dft_low, found.dft_high) = (norm(0), norm(1));
+    let of = |k: usize| dft.bins().iter().position(|b| *b == k).map_or(0.0, |i| amplitude[i]);
+    found.harmonics = spec.limits.harmonics.iter().map(|h| of(h.k)).collect();
+}
+
+/// The bins of the first two bands and the limited harmonics, ascending.
+pub(super) fn bins(spec: &Spec, profile: &Profile, harmonics: &[usize]) -> Vec<usize> {
+    let [first, last] = profile.pes.window;
+    let n = last - first;
+    let inside = |k: usize| {
+        let hz = k as f64 * profile.pes.sample_rate_hz / n as f64;
+        let mut bands = spec.objective.bands_hz.iter();
+        bands.any(|[low, high]| (*low..=*high).contains(&hz)) || harmonics.contains(&k)
+    };
+    (1..=n / 2).filter(|&k| inside(k)).collect()
+}
+
+/// Overshoot and settling of a step of the reference, where a limit asks for them.
+fn stepped(plant: &Plant, c: &Controller, spec: &Spec, found: &mut Found) -> Result<(), TuneError> {
+    let l = &spec.limits;
+    if l.overshoot_percent.is_none() && l.settling_s.is_none() {
+        return Ok(());
+    }
+    let t = c.sample_time_s;
+    let samples = super::record_figures::step_samples(spec, t);
+    let scene = StepScene::new(&DiscretePlant::of(plant, t)?, samples);
+    let mut work = StepWork::default();
+    scene.run(&c.sections()?.chain, c.feedforward.as_ref(), c.output_limit, samples, &mut work);
+    found.overshoot_percent = l.overshoot_percent.map(|_| overshoot(&work.position).1);
+    found.settling_s = l.settling_s.map(|_| settling_s(&work.position, t));
+    Ok(())
 }
 
 /// How many times later the way back comes where a loop may be slow.
 const LASTING: f64 = 16.0;
 
-/// The weighted sum of both DFT norms on a measured response with the way back much later; none for a model, whose write is simulated.
+/// The weighted sum of the DFT norms on a measured response with the way back much later; none for a model, whose write is simulated, and where
+/// the objective is another.
 ///
 /// A loop that forgets slowly still sees the move before, which the ordinary period takes for part of the write.
 pub(super) fn lasting_objective(
@@ -69,11 +144,13 @@ pub(super) fn lasting_objective(
     spec: &Spec,
 ) -> Result<Option<f64>, TuneError> {
     let Machine::Response { frf, hold, continuation } = m else { return Ok(None) };
+    let Some(profile) = spec.profile.as_ref().filter(|_| spec.objective.minimise == super::Minimise::Dft) else {
+        return Ok(None);
+    };
     let plant = curve(frf, *hold, *continuation, controller.sample_time_s)?;
-    let bins = super::machine::bins(&spec.profile, &[]);
-    let s = SpectralPes::lasting(&spec.profile, &plant, controller, bins, false, LASTING)?;
+    let s = SpectralPes::lasting(profile, &plant, controller, bins(spec, profile, &[]), false, LASTING)?;
     let mut amplitude = Vec::new();
     s.write(&controller.sections()?.chain, &mut SpectralWork::default(), &mut amplitude);
-    let [low, high] = super::bench::weights(&spec.limits);
-    Ok(Some(low * s.dft().band(&amplitude, LOW_BAND_HZ) + high * s.dft().band(&amplitude, HIGH_BAND_HZ)))
+    let weights = super::record_figures::band_weights(spec);
+    Ok(Some(spec.objective.bands_hz.iter().zip(weights).map(|(b, w)| w * s.dft().band(&amplitude, *b)).sum()))
 }

@@ -1,16 +1,22 @@
 //! What is tuned: a plant model or a measured response, prepared once for thousands of candidates.
 
-use super::TuneError;
+use super::frequency_sum::FrequencySum;
+use super::limits::has_bin;
+use super::linear::{SECTION_STEP, SectionSlope};
+use super::objective::Minimise;
+use super::record_figures::{Asked, RecordFigure};
+use super::requirements::{Requirement, What};
+use super::step_figures::{envelope_from, overshoot, worst_outside};
+use super::write_figures::{WriteBuffers, WriteSource};
+use super::{Spec, TuneError};
 use crate::controller::Controller;
 use crate::feedback::{LoopOnGrid, MeasuredLoop, Pulls, ResponseCurve, SampledPlant, hold};
 use crate::frf::Frf;
-use crate::lti::{DiscretePlant, Plant, Section, Sections};
-use crate::pes::{
-    ExpectedNoise, HIGH_BAND_HZ, LOW_BAND_HZ, NoiseWork, Profile, QuickScene, QuickWork, Scene, SpectralPes,
-    SpectralWork, WindowDft,
-};
+use crate::lti::{DiscretePlant, FrequencyResponse, Plant, Section, Sections};
+use crate::pes::{Slopes, StepScene, StepWork};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// Whether a measured response already contains the zero-order hold of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +63,17 @@ impl Machine<'_> {
             Machine::Response { .. } => Route::Response,
         }
     }
+
+    /// |P| at an angular frequency (rad/s), hold left out; of a response the nearest point.
+    pub fn gain(&self, w: f64) -> f64 {
+        match self {
+            Machine::Model(plant) => plant.at(w).norm(),
+            Machine::Response { frf, .. } => {
+                let at = frf.w_rad_s().partition_point(|x| *x < w).min(frf.w_rad_s().len() - 1);
+                frf.value()[at].norm()
+            }
+        }
+    }
 }
 
 /// Points of a sweep below half the sample rate that a search needs at least.
@@ -84,172 +101,238 @@ pub(super) fn measured_loop<'a>(frf: &Frf, taken: Hold, sections: &'a Sections) 
     Ok(MeasuredLoop::new(frf, sections, taken == Hold::Included)?)
 }
 
-/// A machine made ready: its response on the grid, its write, the bins that count.
+/// A machine made ready: its response on the grid, its records, its sums over frequency.
 #[derive(Clone, Debug)]
 pub(super) struct Prepared {
     pub sampled: SampledPlant,
-    source: Source,
+    plant: PlantAt,
+    write: Option<WriteSource>,
+    step: Option<StepScene>,
+    /// Power of the position and of the command under the disturbance.
+    disturbance: Option<[FrequencySum; 2]>,
 }
 
 #[derive(Clone, Debug)]
-enum Source {
-    Model { scene: Box<QuickScene>, dft: WindowDft, noise: Option<Box<ExpectedNoise>>, peak: bool },
-    Response(Box<SpectralPes>),
+enum PlantAt {
+    Model(Box<DiscretePlant>),
+    Curve(Box<ResponseCurve>),
 }
 
 /// Buffers for one machine and one thread.
 #[derive(Clone, Debug)]
 pub(super) struct Buffers {
     pub on: LoopOnGrid,
-    simulation: QuickWork,
-    noise: NoiseWork,
-    spectral: SpectralWork,
-    amplitude: Vec<f64>,
-}
-
-impl Buffers {
-    /// Amplitudes of the bins of the write seen last.
-    pub fn amplitude(&self) -> &[f64] {
-        &self.amplitude
-    }
-}
-
-/// The figures of one write that a search needs.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct PesScore {
-    pub dft_low: f64,
-    pub dft_high: f64,
-    pub harmonics: Vec<f64>,
-    pub command_peak: f64,
-}
-
-/// How the figures of one write change with each parameter.
-#[derive(Clone, Debug, Default)]
-pub(super) struct PesSlopes {
-    pub dft_low: Vec<f64>,
-    pub dft_high: Vec<f64>,
-    pub harmonics: Vec<Vec<f64>>,
+    /// Figures of the candidate seen last, in the order of [`Asked::figures`].
+    pub figures: Vec<f64>,
+    /// Slopes of each figure in every parameter, where asked for.
+    pub slopes: Vec<Vec<f64>>,
+    write: WriteBuffers,
+    step: StepWork,
+    weights: Vec<f64>,
+    sections: Slopes,
+    pulls: Pulls,
 }
 
 impl Prepared {
-    /// `harmonics`: the limited ones; `peak`: whether the command's peak counts, which needs the whole write.
-    pub fn of(
-        machine: &Machine<'_>,
-        profile: &Profile,
-        harmonics: &[usize],
-        peak: bool,
-        base: &Controller,
-    ) -> Result<Prepared, TuneError> {
+    /// `asked`: the figures of records that count.
+    pub fn of(machine: &Machine<'_>, spec: &Spec, asked: &Asked, base: &Controller) -> Result<Prepared, TuneError> {
         let t = base.sample_time_s;
-        let bins = bins(profile, harmonics);
-        match machine {
+        let model = |what: &'static str| TuneError::NeedsModel { what };
+        let (sampled, plant, stepped) = match machine {
             Machine::Model(plant) => {
                 if let Some(p) = plant.physics.first() {
                     return Err(TuneError::Physics { effect: p.effect.clone() });
                 }
                 let plant = DiscretePlant::of(plant, t)?;
-                // The search sees the write without noise and the noise by its expected power; one draw it would learn by heart.
-                let mut still = profile.clone();
-                (still.noise.encoder_rms, still.noise.windage_rms) = (0.0, 0.0);
-                let scene = if peak { Scene::new(&still, &plant)? } else { Scene::of_window(&still, &plant)? };
-                let [first, last] = profile.pes.window;
-                let dft = WindowDft::new(last - first, profile.pes.sample_rate_hz, bins);
-                let sampled = SampledPlant::of_model(&plant);
-                let noise = ExpectedNoise::of(profile, t, plant.integrators(), &plant, &dft).map(Box::new);
-                let source = Source::Model { scene: Box::new(QuickScene::of(scene, &plant)), dft, noise, peak };
-                Ok(Prepared { sampled, source })
+                (SampledPlant::of_model(&plant), PlantAt::Model(Box::new(plant.clone())), Some(plant))
             }
             Machine::Response { frf, hold, continuation } => {
                 let curve = curve(frf, *hold, *continuation, t)?;
-                let source = Source::Response(Box::new(SpectralPes::new(profile, &curve, base, bins, peak)?));
-                Ok(Prepared { sampled: curve.sampled(), source })
+                let model = continuation.map(|p| DiscretePlant::of(p, t)).transpose()?;
+                (curve.sampled(), PlantAt::Curve(Box::new(curve)), model)
             }
+        };
+        let step = match (asked.step_samples, &stepped) {
+            (0, _) => None,
+            (samples, Some(plant)) => Some(StepScene::new(plant, samples)),
+            (_, None) => return Err(model("overshoot and settling of a step")),
+        };
+        let of_write = |f| {
+            matches!(f, RecordFigure::Band(_) | RecordFigure::Harmonic(_) | RecordFigure::CommandPeak)
+                || f == RecordFigure::CommandRms && spec.profile.is_some()
+                || f == RecordFigure::Objective && asked.minimise.of_write()
+        };
+        let write = if asked.any(of_write) {
+            let profile = spec.write("a figure of the PES")?;
+            let [first, last] = profile.pes.window;
+            for band in asked.bands_hz.iter().filter(|_| asked.minimise == Minimise::Dft) {
+                if !has_bin(*band, last - first, profile.pes.sample_rate_hz) {
+                    let (samples, rate_hz) = (last - first, profile.pes.sample_rate_hz);
+                    let key = "objective.bands_hz".to_owned();
+                    return Err(super::SpecError::EmptyBand { key, band: *band, samples, rate_hz }.into());
+                }
+            }
+            Some(match &plant {
+                PlantAt::Model(plant) => WriteSource::model(profile, plant, &sampled, asked)?,
+                PlantAt::Curve(curve) => {
+                    if asked.any(|f| f == RecordFigure::CommandRms) {
+                        return Err(model("the command's rms over a write"));
+                    }
+                    WriteSource::response(profile, curve, base, asked)?
+                }
+            })
+        } else {
+            None
+        };
+        let summed = asked.minimise == Minimise::Disturbance
+            || asked.any(|f| f == RecordFigure::CommandRms) && spec.profile.is_none();
+        let disturbance = match (&spec.disturbance, summed) {
+            (Some(d), true) => {
+                let density = |hz: f64| d.two_sided(hz, t);
+                Some([
+                    FrequencySum::of(&sampled, |hz, i| density(hz) * sampled.value(i).norm_sqr(), |_, _| 0.0),
+                    FrequencySum::of(&sampled, |_, _| 0.0, |hz, _| density(hz)),
+                ])
+            }
+            (None, true) => return Err(super::SpecError::NeedsDisturbance.into()),
+            _ => None,
+        };
+        Ok(Prepared { sampled, plant, write, step, disturbance })
+    }
+
+    /// The plant with its hold at `w` (rad/s).
+    pub fn at(&self, w: f64) -> Complex<f64> {
+        match &self.plant {
+            PlantAt::Model(p) => p.at(w),
+            PlantAt::Curve(c) => c.at(w),
         }
+    }
+
+    /// Where the loop ends (rad/s): at half the sample rate, or with the sweep.
+    pub fn end_rad_s(&self) -> f64 {
+        let last = self.sampled.w_rad_s().last().copied().unwrap_or(0.0);
+        last.min(PI / self.sampled.sample_time_s()) * (1.0 + 1e-12)
     }
 
     /// Buffers for this machine.
     pub fn buffers(&self) -> Buffers {
         Buffers {
             on: LoopOnGrid::default(),
-            simulation: QuickWork::default(),
-            noise: NoiseWork::default(),
-            spectral: SpectralWork::default(),
-            amplitude: Vec::new(),
+            figures: Vec::new(),
+            slopes: Vec::new(),
+            write: WriteBuffers::default(),
+            step: StepWork::default(),
+            weights: Vec::new(),
+            sections: Slopes::default(),
+            pulls: Pulls::default(),
         }
     }
 
-    /// The bins that are looked at.
-    pub fn dft(&self) -> &WindowDft {
-        match &self.source {
-            Source::Model { dft, .. } => dft,
-            Source::Response(s) => s.dft(),
+    /// All figures of records and sums of one candidate, into the buffers; the loop has been judged before.
+    pub fn records(&self, c: &Controller, chain: &[Section], asked: &Asked, aimed: &[Requirement], b: &mut Buffers) {
+        b.figures.clear();
+        b.figures.resize(asked.figures.len(), f64::NAN);
+        if let Some(w) = &self.write {
+            w.figures(c, chain, asked, &b.on, &mut b.write, &mut b.figures);
         }
-    }
-
-    /// Simulates the write with these sections, or reads it off the spectrum.
-    pub fn write(&self, c: &Controller, chain: &[Section], b: &mut Buffers, harmonics: &[usize], out: &mut PesScore) {
-        let dft = match &self.source {
-            Source::Model { scene, dft, noise, peak } => {
-                out.command_peak = scene.run(chain, c.feedforward.as_ref(), c.output_limit, &mut b.simulation);
-                dft.amplitudes(&b.simulation.window, &mut b.amplitude);
-                if let Some(noise) = noise {
-                    noise.add(chain, &mut b.noise, &mut b.amplitude);
-                    out.command_peak += if *peak { noise.command(&mut b.noise) } else { 0.0 };
-                }
-                dft
+        for (at, sum) in self.summed(asked) {
+            b.figures[at] = sum.power(&b.on).sqrt();
+        }
+        if let Some(scene) = &self.step {
+            scene.run(chain, c.feedforward.as_ref(), c.output_limit, asked.step_samples, &mut b.step);
+            if let Some(at) = asked.place(RecordFigure::Overshoot) {
+                b.figures[at] = overshoot(&b.step.position).1;
             }
-            Source::Response(s) => {
-                out.command_peak = s.write(chain, &mut b.spectral, &mut b.amplitude);
-                s.dft()
+            if let Some(at) = asked.place(RecordFigure::Envelope) {
+                let from = envelope_from(settling(aimed), c.sample_time_s);
+                b.figures[at] = worst_outside(&b.step.position, from).1;
             }
-        };
-        out.dft_low = dft.band(&b.amplitude, LOW_BAND_HZ);
-        out.dft_high = dft.band(&b.amplitude, HIGH_BAND_HZ);
-        out.harmonics.clear();
-        let at = |k: &usize| dft.bins().iter().position(|b| b == k).map_or(0.0, |i| b.amplitude[i]);
-        out.harmonics.extend(harmonics.iter().map(at));
-    }
-
-    /// Whether the slopes of the write come from one backward pass: it is read off the spectrum, and its command does not count.
-    pub fn has_slopes(&self) -> bool {
-        matches!(&self.source, Source::Response(s) if !s.has_command())
-    }
-
-    /// The pulls of sections given at -h and +h, on the lines of the write; left as they are where they are those of `done`, another machine.
-    pub fn pull(&self, done: Option<&Prepared>, sections: &[[Section; 2]], h: f64, pulls: &mut Pulls) {
-        let Source::Response(s) = &self.source else { return };
-        if !matches!(done.map(|d| &d.source), Some(Source::Response(other)) if s.same_lines(other)) {
-            s.lines().pull(sections, h, pulls);
         }
     }
 
-    /// Slopes of the write that the buffers have seen last, whose figures are `at`; only where [`Prepared::has_slopes`].
-    pub fn slopes(&self, at: &PesScore, pulls: &Pulls, b: &mut Buffers, harmonics: &[usize], out: &mut PesSlopes) {
-        let Source::Response(s) = &self.source else { return };
-        let Buffers { spectral, amplitude, .. } = b;
-        // d norm = sum of power changes over twice the norm; of a norm of 0 nothing is known.
-        let share = |norm: f64| if norm > 0.0 { 0.5 / norm } else { 0.0 };
-        let dft = s.dft();
-        let low = dft.inside(LOW_BAND_HZ).map(|i| (i, share(at.dft_low)));
-        s.slopes(low, pulls, spectral, &mut out.dft_low);
-        let high = dft.inside(HIGH_BAND_HZ).map(|i| (i, share(at.dft_high)));
-        s.slopes(high, pulls, spectral, &mut out.dft_high);
-        out.harmonics.resize_with(harmonics.len(), Vec::new);
-        for (k, out) in harmonics.iter().zip(&mut out.harmonics) {
-            let bin = dft.bins().iter().position(|b| b == k).map(|i| (i, share(amplitude[i])));
-            s.slopes(bin.into_iter(), pulls, spectral, out);
+    /// Slopes of the figures that are `wanted` in every parameter, into the buffers; the candidate is the one seen last.
+    #[allow(clippy::too_many_arguments, reason = "one call site's locals")]
+    pub fn record_slopes(
+        &self,
+        c: &Controller,
+        chain: &[Section],
+        slopes: &[SectionSlope],
+        asked: &Asked,
+        aimed: &[Requirement],
+        wanted: &[bool],
+        b: &mut Buffers,
+    ) {
+        b.slopes.resize_with(asked.figures.len(), Vec::new);
+        b.slopes.iter_mut().for_each(Vec::clear);
+        if !wanted.contains(&true) {
+            return;
+        }
+        if let Some(w) = &self.write {
+            w.slopes(c, chain, slopes, asked, &self.sampled, &b.on, wanted, &b.figures, &mut b.write, &mut b.slopes);
+        }
+        let place = |f| asked.place(f).filter(|at| wanted[*at]);
+        if self.summed(asked).any(|(at, _)| wanted[at]) {
+            let around: Vec<[Section; 2]> = slopes.iter().map(|s| s.around).collect();
+            self.sampled.pull(&around, SECTION_STEP, &mut b.pulls);
+        }
+        for (at, sum) in self.summed(asked).filter(|(at, _)| wanted[*at]) {
+            sum.slopes(&b.on, &b.pulls, &mut b.slopes[at]);
+            let twice = 2.0 * b.figures[at].max(f64::MIN_POSITIVE);
+            b.slopes[at].iter_mut().for_each(|d| *d /= twice);
+        }
+        if let Some(scene) = &self.step {
+            let one_hot = |at: usize, sample: usize, weight: f64, b: &mut Buffers| {
+                b.weights.clear();
+                b.weights.resize(sample + 1, 0.0);
+                b.weights[sample] = weight;
+                scene.backward(chain, &b.weights, &[], &mut b.step, &mut b.sections);
+                in_parameters(&b.sections, slopes, &mut b.slopes[at]);
+            };
+            if let Some(at) = place(RecordFigure::Overshoot) {
+                let sample = overshoot(&b.step.position).0;
+                one_hot(at, sample, 100.0, b);
+            }
+            if let Some(at) = place(RecordFigure::Envelope) {
+                let from = envelope_from(settling(aimed), c.sample_time_s);
+                let (sample, _, slope) = worst_outside(&b.step.position, from);
+                one_hot(at, sample, slope, b);
+            }
         }
     }
 }
 
-/// The bins of both bands and the limited harmonics, ascending.
-pub(super) fn bins(profile: &Profile, harmonics: &[usize]) -> Vec<usize> {
-    let [first, last] = profile.pes.window;
-    let n = last - first;
-    let hz = |k: usize| k as f64 * profile.pes.sample_rate_hz / n as f64;
-    let inside = |k: usize| {
-        let within = |[low, high]: [f64; 2]| (low..=high).contains(&hz(k));
-        within(LOW_BAND_HZ) || within(HIGH_BAND_HZ) || harmonics.contains(&k)
+impl Prepared {
+    /// The figures that are sums over frequency, by their place.
+    fn summed(&self, asked: &Asked) -> impl Iterator<Item = (usize, &FrequencySum)> {
+        let position = (asked.minimise == Minimise::Disturbance).then_some(0);
+        let command = asked.place(RecordFigure::CommandRms).filter(|_| self.write.is_none());
+        let sums = self.disturbance.as_ref();
+        [position, command].into_iter().enumerate().filter_map(move |(i, at)| Some((at?, &sums?[i])))
+    }
+}
+
+/// The settling limit that is aimed at (s).
+fn settling(aimed: &[Requirement]) -> f64 {
+    aimed.iter().find(|w| w.what == What::Settling).map_or(f64::INFINITY, |w| w.limit)
+}
+
+/// Slopes in parameters from slopes in coefficients.
+pub(super) fn in_parameters(sections: &Slopes, slopes: &[SectionSlope], out: &mut Vec<f64>) {
+    out.clear();
+    out.extend(slopes.iter().map(|s| {
+        let of = &sections.sections[s.section];
+        of.iter().zip(&s.of).map(|(a, b)| a * b).sum::<f64>()
+    }));
+}
+
+/// Expected root mean square of the command under a disturbance at the plant's input (command_unit).
+pub(super) fn command_rms(m: &Machine<'_>, c: &Controller, d: &super::Disturbance) -> Result<f64, TuneError> {
+    let t = c.sample_time_s;
+    let sampled = match m {
+        Machine::Model(plant) => SampledPlant::of_model(&DiscretePlant::of(plant, t)?),
+        Machine::Response { frf, hold, continuation } => curve(frf, *hold, *continuation, t)?.sampled(),
     };
-    (1..=n / 2).filter(|&k| inside(k)).collect()
+    let mut on = LoopOnGrid::default();
+    sampled.close(&c.sections()?.chain, &mut on);
+    Ok(FrequencySum::of(&sampled, |_, _| 0.0, |hz, _| d.two_sided(hz, t)).power(&on).sqrt())
 }

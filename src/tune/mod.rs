@@ -1,48 +1,60 @@
-//! Tuning: the smallest DFT of the PES under margins, limits, bounds and command effort.
+//! Tuning: the smallest objective under margins, curves, limits on write and step, ranges and command effort.
 //!
 //! In: machines (models or measured responses), `spec.toml`, optionally the controller to start from. Out: an [`Outcome`]:
 //! the tuned controller, or the limits in conflict and the smallest relaxation; a gain table that ties it to its inputs.
 //! Convention: requirements are wanted ([`Requirement`]), then found ([`Found`]), then judged ([`Judged`]); spec: `specs/tuning.md`.
 
-mod bench;
+mod bounds;
 mod confidence;
-mod convex_concave;
+mod ending;
+mod exact_loop;
+mod frequency_sum;
 mod from_table;
 mod gain_table;
 mod judge;
-mod limit;
+mod limits;
 mod linear;
+mod loop_rows;
 mod machine;
 mod neighbours;
+mod objective;
 mod outcome;
 mod parameters;
 mod pareto;
 mod physical;
 mod polish;
+mod problem;
 mod quadratic;
+mod record_figures;
 mod requirements;
 mod search;
 mod spec;
+mod spec_error;
 mod starts;
+mod step_figures;
+mod structure;
+mod tune_error;
 mod tuning;
+mod write_figures;
 
-pub use bench::{Bench, Desk, Score};
+pub use bounds::{Bounds, Ranges};
 pub use confidence::margin_intervals;
 pub use from_table::{polish_table, roomiest_table};
 pub use gain_table::{CrossingRow, GainTable, GainTableError, InputDigest, Provenance, Summary};
 pub use judge::{Proof, judge};
-pub use limit::{
-    Bound, Figures, GainsBound, GainsSettings, Limit, LimitError, LimitPlant, LimitSettings, LimitWork, Standing,
-    StructureBound, StructureSettings, Verdict, gains_bound, limit, standing, structure_bound,
-};
+pub use limits::{CurveLimit, HarmonicLimit, Limits, MarginLimits, Response};
 pub use machine::{Hold, Machine, Route};
-pub use outcome::{AtBound, Infeasible, Outcome, RelaxedLimit, Tuned, Work};
+pub use objective::{Disturbance, Minimise, Objective};
+pub use outcome::{AtBound, Infeasible, Outcome, Reached, RelaxedLimit, Tuned, Work};
 pub use parameters::{Parameter, Parameters};
 pub use pareto::{ParetoPoint, ParetoSettings, pareto};
 pub use physical::{
     PhysicalProof, PhysicalTuning, TUNED_AMPLITUDES, equivalent_responses, judge_physical, tune_physical,
 };
-pub use polish::PolishMethod;
-pub use requirements::{Found, Judged, JudgedLimit, Requirement, Side, What};
-pub use spec::{Bounds, HarmonicLimit, Limits, MarginLimits, Search, Spec, SpecError};
-pub use tuning::{TuneError, TuneSettings, tune, tune_jointly};
+pub use problem::{Score, TuningProblem, TuningWork};
+pub use requirements::{CurveFound, Found, Judged, JudgedLimit, MET, Requirement, Side, What};
+pub use spec::{GUARD, Search, Spec};
+pub use spec_error::SpecError;
+pub use structure::{Kind, Setting, Structure};
+pub use tune_error::TuneError;
+pub use tuning::{TuneSettings, ranges, sample_time_s, tune, tune_from, tune_jointly};

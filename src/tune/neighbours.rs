@@ -5,80 +5,73 @@
 //! and then by index, so the result has the same bytes for any number of threads.
 
 use super::polish::Polished;
-use super::search::{order, quadratic, walk_back};
-use super::{Bench, Parameter};
+use super::search::{Effort, Found, order, refine, walk_back};
+use super::{Parameter, TuningProblem};
 use crate::numeric::random::Random;
 use rayon::prelude::*;
 
 /// The error of the search's figures for a candidate and its objective, as a share.
 pub(super) type Exact<'a> = dyn Fn(&[f64], f64) -> f64 + 'a;
 
-/// Neighbours a round for each notch, rounds for each notch at most, and rounds without a better end after which it is over.
-const TRIES: usize = 16;
-const ROUNDS: usize = 10;
-const PATIENCE: usize = 8;
+/// Neighbours a round, and a further one for each notch.
+const TRIES: usize = 12;
+/// Rounds without a better end after which it is over, where the best has repeated and where it has not.
+const PATIENCE: usize = 2;
+const LONG_PATIENCE: usize = 6;
+/// The same while no end meets the limits.
+const HOPELESS_PATIENCE: usize = 3;
+/// Polishes that must have ended at the best before it counts as repeated, and the share of the first round's that may end the search at once.
+const REPEATS: usize = 4;
+const SHARE: f64 = 0.3;
 /// Ends whose neighbours are tried.
 const PARENTS: usize = 8;
 /// Ends whose marks are closer than this (ln of a parameter) count as one.
 const SAME: f64 = 0.2;
-/// Gain of the objective (ln) or of the violation that counts as better.
-const BETTER: f64 = 1e-3;
+/// Gain of the objective (ln) or of the violation that counts as better; ends within it are at the best.
+pub(super) const BETTER: f64 = 1e-3;
 /// Error beyond which an end is one of the search's figures, not of the machine; what is smaller the back-off repairs.
 const FALSE: f64 = 0.05;
 /// Spread of a neighbour (ln of a parameter): of all numbers, and of the one notch that is moved.
 const SHAKE: f64 = 0.15;
 const NOTCH_SHAKE: f64 = 0.5;
 
-/// Improves ends, best first, for a search of so many notches; out: what it cost in candidates.
+/// Improves the ends, best first, until the best repeats.
 ///
 /// Ends that the grid takes for good and the exact judgement refuses come last: their neighbours would all be refused with them.
-pub(super) fn improve(
-    bench: &Bench,
-    ends: &mut Vec<Polished>,
-    notches: usize,
-    polish_steps: usize,
-    seed: u64,
-    exact: &Exact<'_>,
-) -> usize {
-    // One notch has few optima, which the starts find (`results/limit.md`).
-    if notches < 2 {
-        return 0;
-    }
-    let mut evaluations = 0;
+pub(super) fn improve(problem: &TuningProblem, found: &mut Found, effort: &Effort, seed: u64, exact: &Exact<'_>) {
     let mut waited = 0;
     let mut judged = Judged::default();
-    judged.parents(bench, ends, exact);
-    for round in 0..ROUNDS * notches {
-        let parents = judged.parents(bench, ends, exact);
+    judged.parents(problem, &mut found.ends, exact);
+    let tries = TRIES + TRIES * problem.parameters().free().iter().filter_map(notch).fold(0, |n, f| n.max(f + 1));
+    for round in 0..effort.rounds {
+        let parents = judged.parents(problem, &mut found.ends, exact);
         let Some(best) = parents.first().map(|p| p.score) else { break };
-        let tries = TRIES * notches;
-        let found: Vec<(Option<Polished>, usize)> = (0..tries)
+        let repeated = found.at_best(BETTER);
+        let settled = repeated >= REPEATS && repeated as f64 >= SHARE * found.feasible_starts as f64;
+        let patience = if best.violation > 0.0 { HOPELESS_PATIENCE } else { LONG_PATIENCE };
+        if round == 0 && settled || waited >= patience || repeated >= REPEATS && waited >= PATIENCE {
+            break;
+        }
+        let ends: Vec<(Option<Polished>, usize)> = (0..tries)
             .into_par_iter()
             .map(|i| {
-                let mut desk = bench.desk();
+                let mut work = problem.work();
                 let mut random = Random::stream(seed, FIRST_STREAM + (round * tries + i) as u64);
-                let x = walk_back(bench, neighbour(bench, &parents, i, &mut random), &mut desk);
-                (quadratic(bench, &x, polish_steps, &mut desk), desk.evaluations)
+                let x = walk_back(problem, neighbour(problem, &parents, i, &mut random), &mut work);
+                (refine(problem, &x, effort.polish_steps, &mut work), work.evaluations)
             })
             .collect();
-        for (end, cost) in found {
-            evaluations += cost;
-            ends.extend(end);
-        }
-        ends.sort_by(|a, b| order(&a.score, &b.score));
-        let now = judged.parents(bench, ends, exact).first().map(|p| p.score);
+        ends.into_iter().for_each(|end| found.take(end));
+        found.ends.sort_by(|a, b| order(&a.score, &b.score));
+        let now = judged.parents(problem, &mut found.ends, exact).first().map(|p| p.score);
         let better = now.is_some_and(|now| match (best.violation > 0.0, now.violation > 0.0) {
             (true, true) => best.violation - now.violation > BETTER,
             (true, false) => true,
             _ => best.objective - now.objective > BETTER,
         });
         waited = if better { 0 } else { waited + 1 };
-        if waited >= PATIENCE {
-            break;
-        }
     }
-    ends.extend(judged.refused);
-    evaluations
+    found.ends.extend(judged.refused);
 }
 
 /// Streams of random numbers from here on belong to neighbours.
@@ -93,12 +86,12 @@ struct Judged {
 
 impl Judged {
     /// The best ends that differ, whatever the order of their notches, and that are sound; the others are taken out of `ends`.
-    fn parents(&mut self, bench: &Bench, ends: &mut Vec<Polished>, exact: &Exact<'_>) -> Vec<Polished> {
+    fn parents(&mut self, problem: &TuningProblem, ends: &mut Vec<Polished>, exact: &Exact<'_>) -> Vec<Polished> {
         let mut chosen: Vec<(Vec<f64>, Polished)> = Vec::with_capacity(PARENTS);
         let mut i = 0;
         while i < ends.len() && chosen.len() < PARENTS {
             let end = &ends[i];
-            let mark = mark(bench, &end.x);
+            let mark = mark(problem, &end.x);
             if chosen.iter().any(|(c, _)| c.iter().zip(&mark).all(|(a, b)| (a - b).abs() < SAME)) {
                 i += 1;
                 continue;
@@ -119,10 +112,10 @@ impl Judged {
 }
 
 /// The best ends first, of those that are alike only one, the others behind: who judges them in order meets ends that differ.
-pub(super) fn spread(bench: &Bench, ends: Vec<Polished>) -> Vec<Polished> {
+pub(super) fn spread(problem: &TuningProblem, ends: Vec<Polished>) -> Vec<Polished> {
     let (mut first, mut others): (Vec<(Vec<f64>, Polished)>, Vec<Polished>) = (Vec::new(), Vec::new());
     for e in ends {
-        let mark = mark(bench, &e.x);
+        let mark = mark(problem, &e.x);
         if first.iter().any(|(c, _)| c.iter().zip(&mark).all(|(a, b)| (a - b).abs() < SAME)) {
             others.push(e);
         } else {
@@ -133,8 +126,8 @@ pub(super) fn spread(bench: &Bench, ends: Vec<Polished>) -> Vec<Polished> {
 }
 
 /// What tells one optimum from another: gains, corners, and the centres of notches in ascending order.
-fn mark(bench: &Bench, x: &[f64]) -> Vec<f64> {
-    let free = bench.parameters().free();
+fn mark(problem: &TuningProblem, x: &[f64]) -> Vec<f64> {
+    let free = problem.parameters().free();
     let mut centres: Vec<f64> =
         x.iter().zip(free).filter(|(_, p)| matches!(p, Parameter::NotchFrequency { .. })).map(|(x, _)| *x).collect();
     centres.sort_by(f64::total_cmp);
@@ -143,8 +136,12 @@ fn mark(bench: &Bench, x: &[f64]) -> Vec<f64> {
 }
 
 /// A neighbour of one of the parents; the better ones have more of them.
-fn neighbour(bench: &Bench, parents: &[Polished], i: usize, random: &mut Random) -> Vec<f64> {
-    let p = bench.parameters();
+fn neighbour(problem: &TuningProblem, parents: &[Polished], i: usize, random: &mut Random) -> Vec<f64> {
+    let p = problem.parameters();
+    if i % 5 == 4 {
+        // Somewhere else altogether: what nobody looked at yet.
+        return super::starts::further(problem, random);
+    }
     let share = random.uniform();
     let parent = ((share * share) * parents.len() as f64) as usize;
     let mut x = parents[parent.min(parents.len() - 1)].x.clone();
@@ -156,7 +153,7 @@ fn neighbour(bench: &Bench, parents: &[Polished], i: usize, random: &mut Random)
         all
     });
     let pick = |random: &mut Random| filters.get((random.uniform() * filters.len() as f64) as usize).copied();
-    match i % 4 {
+    match i % 5 {
         // One notch anywhere.
         0 => {
             let chosen = pick(random);
@@ -191,7 +188,7 @@ fn neighbour(bench: &Bench, parents: &[Polished], i: usize, random: &mut Random)
         _ => {}
     }
     // Every number a little, or in a plain neighbour more.
-    let plain = i % 4 == 3 || filters.is_empty();
+    let plain = i % 5 == 3 || filters.is_empty();
     let shake = if plain { SHAKE * 4f64.powf(random.uniform()) } else { 0.1 * SHAKE };
     for (x, [from, to]) in x.iter_mut().zip(p.bounds()) {
         *x = (*x + shake * random.normal()).clamp(*from, *to);

@@ -1,7 +1,7 @@
 //! What tuning says: a controller that meets every limit, or the limits in conflict and what would have to give.
 
 use super::judge::Proof;
-use super::{Parameter, Route, Side, What};
+use super::{Minimise, Parameter, Ranges, Route, Side, What};
 use crate::controller::Controller;
 use serde::Serialize;
 
@@ -9,8 +9,10 @@ use serde::Serialize;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "verdict", rename_all = "snake_case")]
 pub enum Outcome {
-    /// Every limit is met.
+    /// Every limit is met with the spec's guard.
     Tuned(Tuned),
+    /// Every limit is met, not all of them with the guard.
+    TunedWithoutGuard(Tuned),
     /// The search found nothing that meets every limit.
     Infeasible(Infeasible),
 }
@@ -24,8 +26,13 @@ pub struct Tuned {
     pub before: Option<Vec<Proof>>,
     /// The tuned controller, machine by machine.
     pub after: Vec<Proof>,
-    /// Parameters that ended on a bound: the box, not the machine, sets them.
+    /// What was made smallest, on the worst machine.
+    #[serde(rename = "minimised")]
+    pub objective: Reached,
+    /// Parameters that ended on a bound: the range, not the machine, sets them.
     pub at_bounds: Vec<AtBound>,
+    /// Ranges that were searched.
+    pub ranges: Ranges,
     /// What it cost.
     pub work: Work,
 }
@@ -39,6 +46,9 @@ pub struct Infeasible {
     pub before: Option<Vec<Proof>>,
     /// The compromise, machine by machine.
     pub after: Vec<Proof>,
+    /// What was made smallest, under the compromise.
+    #[serde(rename = "minimised")]
+    pub objective: Reached,
     /// The limits that the compromise misses by (nearly) the same share: lifting one costs another.
     pub conflicts: Vec<RelaxedLimit>,
     /// The smallest common share by which the limits in conflict must give.
@@ -47,8 +57,23 @@ pub struct Infeasible {
     pub confirmed: bool,
     /// Bounds that the compromise lies on: widening one may also help.
     pub at_bounds: Vec<AtBound>,
+    /// Ranges that were searched.
+    pub ranges: Ranges,
     /// What it cost.
     pub work: Work,
+}
+
+/// The objective of a result.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Reached {
+    /// What was made smallest.
+    pub name: Minimise,
+    /// Its value, in the unit of [`super::Objective::unit`].
+    pub value: f64,
+    /// Polishes of the search.
+    pub starts: usize,
+    /// Polishes that ended within a thousandth of the best.
+    pub starts_at_best: usize,
 }
 
 /// One limit in conflict.
@@ -84,21 +109,29 @@ pub struct AtBound {
 pub struct Work {
     /// Over a model or on the measured response.
     pub route: Route,
-    /// Starts searched.
+    /// Polishes of the search.
     pub starts: usize,
     /// Candidates scored, derivatives included.
     pub evaluations: usize,
-    /// Starts whose search ended with every limit met.
+    /// Polishes that ended with every limit met.
     pub feasible_starts: usize,
     /// Rounds in which the exact judgement moved a limit inside.
     pub back_offs: usize,
 }
 
 impl Outcome {
+    /// The tuned result; none where the limits are missed.
+    pub fn tuned(&self) -> Option<&Tuned> {
+        match self {
+            Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => Some(t),
+            Outcome::Infeasible(_) => None,
+        }
+    }
+
     /// The controller, tuned or compromise.
     pub fn controller(&self) -> &Controller {
         match self {
-            Outcome::Tuned(t) => &t.controller,
+            Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => &t.controller,
             Outcome::Infeasible(i) => &i.controller,
         }
     }
@@ -106,8 +139,40 @@ impl Outcome {
     /// The exact judgement of that controller, machine by machine.
     pub fn after(&self) -> &[Proof] {
         match self {
-            Outcome::Tuned(t) => &t.after,
+            Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => &t.after,
             Outcome::Infeasible(i) => &i.after,
+        }
+    }
+
+    /// The start controller's judgement, machine by machine.
+    pub fn before(&self) -> Option<&[Proof]> {
+        match self {
+            Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => t.before.as_deref(),
+            Outcome::Infeasible(i) => i.before.as_deref(),
+        }
+    }
+
+    /// What was made smallest.
+    pub fn objective(&self) -> &Reached {
+        match self {
+            Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => &t.objective,
+            Outcome::Infeasible(i) => &i.objective,
+        }
+    }
+
+    /// Parameters on a bound.
+    pub fn at_bounds(&self) -> &[AtBound] {
+        match self {
+            Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => &t.at_bounds,
+            Outcome::Infeasible(i) => &i.at_bounds,
+        }
+    }
+
+    /// What it cost.
+    pub fn work(&self) -> &Work {
+        match self {
+            Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => &t.work,
+            Outcome::Infeasible(i) => &i.work,
         }
     }
 }

@@ -1,11 +1,16 @@
-//! The decision vector: which numbers of a controller are free, between which bounds, and the way there and back.
+//! The decision vector: which numbers of a controller are free, in which ranges, and the way there and back.
 //!
 //! Every free number is searched as its logarithm: gains and frequencies matter by ratio, and none may change its sign.
+//! A cascade (`p_pi`) is searched in its own gains: position gain a (1/s), velocity gain b, velocity integral c; with velocity fed
+//! forward it is the PID with kp = a b + c, ki = a c, kd = b (Ellis, Control System Design Guide, ch. 17).
 
+use super::bounds::Ranges;
 use super::spec::Spec;
+use super::structure::{Kind, Setting};
 use crate::controller::{Controller, Lowpass, Notch, Pid};
 use crate::lti::Section;
 use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// One free number of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -15,13 +20,20 @@ pub enum Parameter {
     Kp,
     Ki,
     Kd,
+    /// Position gain of the cascade (1/s).
+    PositionGain,
+    /// Velocity gain of the cascade (command_unit s per position_unit).
+    VelocityGain,
+    /// Integral gain of the cascade's velocity loop (command_unit per position_unit).
+    VelocityIntegral,
+    DerivativeFilter,
     LowpassFrequency {
         filter: usize,
     },
     NotchFrequency {
         filter: usize,
     },
-    /// Zero damping over pole damping, the gain at the centre.
+    /// Zero damping over pole damping, the gain at the centre: below 1 for a notch, above 1 for a peak filter.
     NotchDepth {
         filter: usize,
     },
@@ -33,25 +45,31 @@ pub enum Parameter {
 impl std::fmt::Display for Parameter {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Parameter::Kp => f.write_str("pid.kp"),
-            Parameter::Ki => f.write_str("pid.ki_per_s"),
-            Parameter::Kd => f.write_str("pid.kd_s"),
-            Parameter::LowpassFrequency { filter } => write!(f, "lowpass[{filter}].frequency_hz"),
-            Parameter::NotchFrequency { filter } => write!(f, "notch[{filter}].frequency_hz"),
-            Parameter::NotchDepth { filter } => {
-                write!(f, "notch[{filter}].zero_damping_ratio / pole_damping_ratio")
-            }
-            Parameter::NotchPoleDamping { filter } => write!(f, "notch[{filter}].pole_damping_ratio"),
+            Parameter::Kp => f.write_str("kp"),
+            Parameter::Ki => f.write_str("ki"),
+            Parameter::Kd => f.write_str("kd"),
+            Parameter::PositionGain => f.write_str("position gain"),
+            Parameter::VelocityGain => f.write_str("velocity gain"),
+            Parameter::VelocityIntegral => f.write_str("velocity integral gain"),
+            Parameter::DerivativeFilter => f.write_str("derivative filter"),
+            Parameter::LowpassFrequency { filter } => write!(f, "low-pass {} corner", filter + 1),
+            Parameter::NotchFrequency { filter } => write!(f, "notch {} centre", filter + 1),
+            Parameter::NotchDepth { filter } => write!(f, "notch {} depth", filter + 1),
+            Parameter::NotchPoleDamping { filter } => write!(f, "notch {} pole damping", filter + 1),
         }
     }
 }
 
-/// Bounds of a notch's depth: from 40 dB deep to no notch at all.
+/// Range of a notch's depth: from 40 dB deep to no notch at all.
 pub const NOTCH_DEPTH: [f64; 2] = [0.01, 1.0];
-/// Bounds of a notch's pole damping: narrower would miss a mode that drifts by 3 %, wider eats phase a decade below.
+/// Range of a notch's pole damping: narrower would miss a mode that drifts by 3 %, wider eats phase a decade below.
 pub const NOTCH_POLE_DAMPING: [f64; 2] = [0.05, 1.0];
-/// Derivative filter where no start controller names one (s), the value of the contract's example.
-pub const DERIVATIVE_FILTER_S: f64 = 12e-6;
+/// Range of a peak filter's height (gain at its centre) and of its pole damping.
+const PEAK_HEIGHT: [f64; 2] = [1.0, 30.0];
+const PEAK_POLE_DAMPING: [f64; 2] = [0.002, 0.1];
+/// Derivative filter where neither start controller nor spec names one, as a share of the sample time; the range of a lead's.
+const DERIVATIVE_FILTER: f64 = 0.3;
+const LEAD_FILTER: [f64; 2] = [0.1, 100.0];
 /// Damping of a low-pass where no start controller names one.
 pub const LOWPASS_DAMPING: f64 = 0.7;
 /// Centres may not come closer to half the sample rate than this share of it: the prewarping ends there.
@@ -62,49 +80,96 @@ pub(super) const BELOW_HALF_RATE: f64 = 0.99;
 pub struct Parameters {
     /// The controller that the free numbers are put into.
     base: Controller,
+    kind: Kind,
     free: Vec<Parameter>,
-    /// Logarithms of the bounds, [from, to].
+    /// Logarithms of the ranges, [from, to].
     bounds: Vec<[f64; 2]>,
+    ranges: Ranges,
 }
 
 impl Parameters {
-    /// The search of a spec around `start`, or around the defaults at `sample_time_s`.
+    /// The search of a spec around `start`, or around the defaults at `sample_time_s`, in these ranges.
     ///
-    /// The first `search.lowpasses` low-passes and `search.notches` notches are set by the search, further ones of
-    /// `start` stay as they are. Derivative filter, low-pass damping, feed-forward and output limit stay `start`'s.
-    pub fn of(spec: &Spec, start: Option<&Controller>, sample_time_s: f64) -> Parameters {
-        let (s, b) = (&spec.search, &spec.search.bounds);
+    /// The first `search.lowpasses` low-passes and `search.notches` notches are set by the search, then `structure.peaks` peak filters among the
+    /// notches; further ones of `start` stay as they are. Low-pass damping, feed-forward and output limit stay `start`'s.
+    pub fn of(spec: &Spec, start: Option<&Controller>, sample_time_s: f64, ranges: &Ranges) -> Parameters {
+        let (s, r) = (&spec.search, *ranges);
+        let t = start.map_or(sample_time_s, |c| c.sample_time_s);
         let mut base = start.cloned().unwrap_or(Controller {
             sample_time_s,
             output_limit: None,
             pid: Pid {
-                kp: b.kp[0],
-                ki_per_s: b.ki_per_s[0],
-                kd_s: b.kd_s[0],
-                derivative_filter_s: DERIVATIVE_FILTER_S,
+                kp: r.kp[0],
+                ki_per_s: r.ki_per_s[0],
+                kd_s: r.kd_s[0],
+                derivative_filter_s: DERIVATIVE_FILTER * t,
             },
             lowpass: vec![],
             notch: vec![],
             feedforward: None,
         });
-        let end_hz = BELOW_HALF_RATE * 0.5 / base.sample_time_s;
+        let end_hz = BELOW_HALF_RATE * 0.5 / t;
         let frequency = |[from, to]: [f64; 2]| [from.min(end_hz), to.min(end_hz)];
-        let (lowpass_hz, notch_hz) = (frequency(b.lowpass_hz), frequency(b.notch_hz));
+        let (lowpass_hz, notch_hz) = (frequency(r.lowpass_hz), frequency(r.notch_hz));
         while base.lowpass.len() < s.lowpasses {
             base.lowpass.push(Lowpass { frequency_hz: lowpass_hz[1], damping_ratio: LOWPASS_DAMPING });
         }
+        let flat = |frequency_hz: f64, damping: f64| Notch {
+            frequency_hz,
+            zero_damping_ratio: damping,
+            pole_damping_ratio: damping,
+        };
         while base.notch.len() < s.notches {
-            let pole_damping_ratio = 0.3;
-            base.notch.push(Notch {
-                frequency_hz: notch_hz[1],
-                zero_damping_ratio: pole_damping_ratio,
-                pole_damping_ratio,
-            });
+            base.notch.push(flat(notch_hz[1], 0.3));
         }
-        let mut p = Parameters { base, free: Vec::new(), bounds: Vec::new() };
-        p.add(Parameter::Kp, b.kp);
-        p.add(Parameter::Ki, b.ki_per_s);
-        p.add(Parameter::Kd, b.kd_s);
+        let orders = strongest_orders(spec);
+        for i in 0..spec.structure.peaks {
+            let at = s.notches + i;
+            let hz = orders.get(i).copied().filter(|hz| *hz < end_hz);
+            if base.notch.len() <= at {
+                base.notch.push(flat(hz.unwrap_or(0.3 * r.crossover_hz[0]), 0.02));
+            }
+            if let Some(hz) = hz {
+                base.notch[at].frequency_hz = hz;
+            }
+        }
+        let structure = &spec.structure;
+        let kind = structure.controller;
+        let mut p = Parameters { base, kind, free: Vec::new(), bounds: Vec::new(), ranges: r };
+        match kind {
+            Kind::Pid => {
+                p.add(Parameter::Kp, r.kp);
+                p.add(Parameter::Ki, r.ki_per_s);
+                p.add(Parameter::Kd, r.kd_s);
+            }
+            Kind::Pi => {
+                p.base.pid.kd_s = 0.0;
+                p.add(Parameter::Kp, r.kp);
+                p.add(Parameter::Ki, r.ki_per_s);
+            }
+            Kind::PPi => {
+                p.base.pid.derivative_filter_s = 0.0;
+                let [low, high] = r.crossover_hz;
+                p.add(Parameter::PositionGain, [0.02 * TAU * low, TAU * high]);
+                p.add(Parameter::VelocityGain, r.kd_s);
+                p.add(Parameter::VelocityIntegral, [1e-3 * r.kp[0], r.kp[1]]);
+            }
+            Kind::Lead => {
+                p.base.pid.ki_per_s = 0.0;
+                p.add(Parameter::Kp, r.kp);
+                p.add(Parameter::Kd, r.kd_s);
+            }
+        }
+        let filter = match (structure.derivative_filter_s, kind) {
+            (_, Kind::Pi | Kind::PPi) => None,
+            (None, Kind::Lead) if start.is_none() => Some(LEAD_FILTER.map(|share| share * t)),
+            (None, _) => None,
+            (Some(Setting::Fixed(x)), _) => Some([x, x]),
+            (Some(Setting::Range(range)), _) => Some(range),
+        };
+        if let Some(range) = filter {
+            p.add(Parameter::DerivativeFilter, range);
+        }
         for filter in 0..s.lowpasses {
             p.add(Parameter::LowpassFrequency { filter }, lowpass_hz);
         }
@@ -113,29 +178,42 @@ impl Parameters {
             p.add(Parameter::NotchDepth { filter }, NOTCH_DEPTH);
             p.add(Parameter::NotchPoleDamping { filter }, NOTCH_POLE_DAMPING);
         }
+        for i in 0..structure.peaks {
+            let filter = s.notches + i;
+            if orders.get(i).is_none() {
+                let [low, high] = r.crossover_hz;
+                p.add(Parameter::NotchFrequency { filter }, [0.05 * low, high]);
+            }
+            p.add(Parameter::NotchDepth { filter }, PEAK_HEIGHT);
+            p.add(Parameter::NotchPoleDamping { filter }, PEAK_POLE_DAMPING);
+        }
         p
     }
 
     fn add(&mut self, parameter: Parameter, [from, to]: [f64; 2]) {
         if from == to {
-            *Self::raw(&mut self.base, parameter) = from;
+            if let Some(number) = Self::raw(&mut self.base, parameter) {
+                *number = from;
+            }
         } else {
             self.free.push(parameter);
             self.bounds.push([from.ln(), to.ln()]);
         }
     }
 
-    /// Where the number stands; the depth of a notch is stored as its zero damping and set by [`Self::put`].
-    fn raw(c: &mut Controller, parameter: Parameter) -> &mut f64 {
-        match parameter {
+    /// Where the number stands; none for those of a cascade. The depth of a notch is stored as its zero damping and set by [`Self::put`].
+    fn raw(c: &mut Controller, parameter: Parameter) -> Option<&mut f64> {
+        Some(match parameter {
             Parameter::Kp => &mut c.pid.kp,
             Parameter::Ki => &mut c.pid.ki_per_s,
             Parameter::Kd => &mut c.pid.kd_s,
+            Parameter::DerivativeFilter => &mut c.pid.derivative_filter_s,
             Parameter::LowpassFrequency { filter } => &mut c.lowpass[filter].frequency_hz,
             Parameter::NotchFrequency { filter } => &mut c.notch[filter].frequency_hz,
             Parameter::NotchDepth { filter } => &mut c.notch[filter].zero_damping_ratio,
             Parameter::NotchPoleDamping { filter } => &mut c.notch[filter].pole_damping_ratio,
-        }
+            Parameter::PositionGain | Parameter::VelocityGain | Parameter::VelocityIntegral => return None,
+        })
     }
 
     /// The free numbers, in the order of the vector.
@@ -143,9 +221,14 @@ impl Parameters {
         &self.free
     }
 
-    /// Logarithms of the bounds.
+    /// Logarithms of the ranges.
     pub fn bounds(&self) -> &[[f64; 2]] {
         &self.bounds
+    }
+
+    /// The ranges that the search was given.
+    pub fn ranges(&self) -> &Ranges {
+        &self.ranges
     }
 
     /// The controller that carries the fixed numbers.
@@ -153,25 +236,73 @@ impl Parameters {
         &self.base
     }
 
-    /// The vector of a controller of this shape, moved into the bounds.
+    /// The kind of controller.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Position gain, velocity gain and velocity integral of a cascade with these PID gains: kp = a b + c, ki = a c, kd = b. Gains
+    /// without real corners are moved to the nearest ones that have them.
+    fn cascade(pid: &Pid) -> [f64; 3] {
+        let b = pid.kd_s.max(f64::MIN_POSITIVE);
+        let half = 0.5 * pid.kp / b;
+        let root = (half * half - pid.ki_per_s / b).max(0.0).sqrt();
+        // The velocity loop's integral corner is the slower of the two.
+        let a = half + root;
+        [a, b, (pid.kp - a * b).max(f64::MIN_POSITIVE)]
+    }
+
+    /// The vector of a controller of this shape, moved into the ranges.
     pub fn vector(&self, c: &Controller) -> Vec<f64> {
+        let outside = self.vector_outside(c);
+        outside.iter().zip(&self.bounds).map(|(x, [from, to])| x.clamp(*from, *to)).collect()
+    }
+
+    /// The same, wherever it lies.
+    pub(super) fn vector_outside(&self, c: &Controller) -> Vec<f64> {
+        let [position, velocity, integral] = Self::cascade(&c.pid);
         let of = |parameter: &Parameter| match *parameter {
             Parameter::Kp => c.pid.kp,
             Parameter::Ki => c.pid.ki_per_s,
             Parameter::Kd => c.pid.kd_s,
+            Parameter::PositionGain => position,
+            Parameter::VelocityGain => velocity,
+            Parameter::VelocityIntegral => integral,
+            Parameter::DerivativeFilter => c.pid.derivative_filter_s,
             Parameter::LowpassFrequency { filter } => c.lowpass[filter].frequency_hz,
             Parameter::NotchFrequency { filter } => c.notch[filter].frequency_hz,
             Parameter::NotchDepth { filter } => c.notch[filter].zero_damping_ratio / c.notch[filter].pole_damping_ratio,
             Parameter::NotchPoleDamping { filter } => c.notch[filter].pole_damping_ratio,
         };
-        let clamped = |(p, [from, to]): (&Parameter, &[f64; 2])| of(p).max(f64::MIN_POSITIVE).ln().clamp(*from, *to);
-        self.free.iter().zip(&self.bounds).map(clamped).collect()
+        self.free.iter().map(|p| of(p).max(f64::MIN_POSITIVE).ln()).collect()
+    }
+
+    /// Whether a controller has the filters that the vector sets.
+    pub fn fits(&self, c: &Controller) -> bool {
+        c.sample_time_s == self.base.sample_time_s
+            && c.lowpass.len() == self.base.lowpass.len()
+            && c.notch.len() == self.base.notch.len()
     }
 
     /// Puts the vector into `c`, a copy of [`Parameters::base`], without allocating.
     pub fn put(&self, x: &[f64], c: &mut Controller) {
-        for (i, &parameter) in self.free.iter().enumerate() {
-            *Self::raw(c, parameter) = x[i].exp();
+        let mut cascade = [0.0; 3];
+        for (x, &parameter) in x.iter().zip(&self.free) {
+            let value = x.exp();
+            match parameter {
+                Parameter::PositionGain => cascade[0] = value,
+                Parameter::VelocityGain => cascade[1] = value,
+                Parameter::VelocityIntegral => cascade[2] = value,
+                _ => {
+                    if let Some(number) = Self::raw(c, parameter) {
+                        *number = value;
+                    }
+                }
+            }
+        }
+        if self.kind == Kind::PPi {
+            let [a, b, i] = cascade;
+            (c.pid.kp, c.pid.ki_per_s, c.pid.kd_s) = (a * b + i, a * i, b);
         }
         for (x, parameter) in x.iter().zip(&self.free) {
             if let Parameter::NotchDepth { filter } = *parameter {
@@ -191,13 +322,41 @@ impl Parameters {
     /// Index of the section that parameter `i` acts on, in the firmware's order.
     pub fn section_of(&self, i: usize) -> usize {
         match self.free[i] {
-            Parameter::Kp | Parameter::Ki | Parameter::Kd => 0,
             Parameter::LowpassFrequency { filter } => 1 + filter,
             Parameter::NotchFrequency { filter }
             | Parameter::NotchDepth { filter }
             | Parameter::NotchPoleDamping { filter } => 1 + self.base.lowpass.len() + filter,
+            _ => 0,
         }
     }
+
+    /// Whether parameter `i` is one of the gains that set the loop's size.
+    pub(super) fn is_gain(&self, i: usize) -> bool {
+        matches!(
+            self.free[i],
+            Parameter::Kp | Parameter::Ki | Parameter::Kd | Parameter::VelocityGain | Parameter::VelocityIntegral
+        )
+    }
+
+    /// ln ki and its slope over the vector, for the objective `integral`; none without an integral gain.
+    pub(super) fn ln_integral(&self, c: &Controller) -> Option<(f64, Vec<f64>)> {
+        if c.pid.ki_per_s <= 0.0 {
+            return None;
+        }
+        let slope = |p: &Parameter| match p {
+            Parameter::Ki | Parameter::PositionGain | Parameter::VelocityIntegral => 1.0,
+            _ => 0.0,
+        };
+        Some((c.pid.ki_per_s.ln(), self.free.iter().map(slope).collect()))
+    }
+}
+
+/// Frequencies (Hz) of the profile's run-out orders, the strongest first.
+fn strongest_orders(spec: &Spec) -> Vec<f64> {
+    let Some(noise) = spec.profile.as_ref().map(|p| &p.noise) else { return Vec::new() };
+    let mut orders: Vec<_> = noise.runout.iter().filter(|r| r.amplitude > 0.0).collect();
+    orders.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude).then(a.order.cmp(&b.order)));
+    orders.iter().map(|r| f64::from(r.order) * noise.spindle_hz).filter(|hz| *hz > 0.0).collect()
 }
 
 /// The firmware's sections of a controller, into `chain`, without allocating; false where the numbers make no filter.

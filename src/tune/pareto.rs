@@ -1,9 +1,9 @@
-//! The front of margin against DFT: the same machines tuned again and again while one margin is tightened.
+//! The front of margin against objective: the same machines tuned again and again while one margin is tightened.
 //!
-//! In: machines, a spec, the range of Ms. Out: one point for each Ms, its DFT norms the worst machine's. Every point is tuned as
+//! In: machines, a spec, the range of Ms. Out: one point for each Ms, its objective the worst machine's. Every point is tuned as
 //! `tune` does it and judged exactly; a point that another beats in both is left out. Spec: `specs/performance_limit.md`.
 
-use super::{Machine, Outcome, Spec, TuneError, TuneSettings, tune_jointly};
+use super::{Machine, Outcome, Spec, TuneError, TuneSettings, tune_from};
 use crate::controller::Controller;
 use serde::Serialize;
 
@@ -29,17 +29,17 @@ pub struct ParetoPoint {
     pub allowed: f64,
     /// Whether every limit is met with it.
     pub feasible: bool,
-    /// On the front: no other feasible point has both a smaller Ms and a smaller weighted sum.
+    /// On the front: no other feasible point has both a smaller Ms and a smaller objective.
     pub on_front: bool,
     /// Ms found, worst machine (ratio).
     pub max_sensitivity: f64,
     /// Smallest phase margin found (deg).
     pub phase_margin_deg: Option<f64>,
     /// Largest norm over 600 to 1500 Hz (position_unit).
-    pub dft_low: f64,
+    pub dft_low: Option<f64>,
     /// Largest norm over 1500 to 3000 Hz (position_unit).
-    pub dft_high: f64,
-    /// Largest weighted sum of both, as tuning minimises it.
+    pub dft_high: Option<f64>,
+    /// The objective, as tuning minimises it.
     pub objective: f64,
     /// The gains.
     pub controller: Controller,
@@ -64,31 +64,34 @@ pub fn pareto(
         return Err(TuneError::Setting { key: "max_sensitivity from", found: from, expected });
     }
     let count = front.points.max(2);
-    let mut all = Vec::with_capacity(count);
-    let mut last: Option<Controller> = None;
-    for i in (0..count).rev() {
+    let asked = |i: usize| {
         let allowed = from * (to / from).powf(i as f64 / (count - 1) as f64);
         let mut asked = spec.clone();
         asked.margins.max_sensitivity = Some(allowed);
-        // The DFT limits only weigh here: a front that stopped at them would hide what lies beyond.
-        let tuned = |begin: Option<&Controller>| -> Result<ParetoPoint, TuneError> {
-            let outcome = tune_jointly(machines, &asked, begin, settings)?;
-            Ok(point(allowed, matches!(outcome, Outcome::Tuned(_)), &outcome, spec))
-        };
-        // A search from good gains looks near them only.
-        let mut best = tuned(start)?;
-        if let Some(before) = &last {
-            let other = tuned(Some(before))?;
-            if (other.feasible, -other.objective) > (best.feasible, -best.objective) {
-                best = other;
-            }
-        }
-        if best.feasible {
-            last = Some(best.controller.clone());
-        }
-        all.push(best);
+        (allowed, asked)
+    };
+    let mut all: Vec<ParetoPoint> = Vec::with_capacity(count);
+    let mut near: Vec<Controller> = Vec::new();
+    for i in (0..count).rev() {
+        let (allowed, asked) = asked(i);
+        let outcome = tune_from(machines, &asked, start, &near, settings)?;
+        let p = point(allowed, &outcome);
+        // The next point, with less room, starts from this one's table as well as afresh.
+        near = if p.feasible { vec![p.controller.clone()] } else { Vec::new() };
+        all.push(p);
     }
     all.reverse();
+    // A table that meets a smaller Ms meets a larger one: no point may be worse than the one before it.
+    for i in 1..count {
+        if all[i - 1].feasible && !(all[i].feasible && all[i].objective <= all[i - 1].objective) {
+            let (allowed, asked) = asked(i);
+            let before = all[i - 1].clone();
+            let again = tune_from(machines, &asked, start, std::slice::from_ref(&before.controller), settings)?;
+            let again = point(allowed, &again);
+            let better = again.feasible && again.objective <= before.objective;
+            all[i] = if better { again } else { ParetoPoint { allowed, ..before } };
+        }
+    }
     for i in 0..all.len() {
         let (ms, objective) = (all[i].max_sensitivity, all[i].objective);
         let beaten = all.iter().enumerate().any(|(j, o)| {
@@ -105,19 +108,19 @@ pub fn pareto(
 /// Two figures this near (as a share) are the same.
 const SAME: f64 = 1e-4;
 
-fn point(allowed: f64, feasible: bool, outcome: &Outcome, spec: &Spec) -> ParetoPoint {
+fn point(allowed: f64, outcome: &Outcome) -> ParetoPoint {
     let found: Vec<_> = outcome.after().iter().map(|p| &p.judged.found).collect();
-    let [low, high] = super::bench::weights(&spec.limits);
     let largest = |of: &dyn Fn(&super::Found) -> f64| found.iter().map(|f| of(f)).fold(0.0, f64::max);
+    let norm = |of: &dyn Fn(&super::Found) -> Option<f64>| found.iter().filter_map(|f| of(f)).reduce(f64::max);
     ParetoPoint {
         allowed,
-        feasible,
+        feasible: outcome.tuned().is_some(),
         on_front: false,
         max_sensitivity: largest(&|f| f.max_sensitivity),
         phase_margin_deg: found.iter().filter_map(|f| f.phase_margin_deg).reduce(f64::min),
-        dft_low: largest(&|f| f.dft_low),
-        dft_high: largest(&|f| f.dft_high),
-        objective: largest(&|f| low * f.dft_low + high * f.dft_high),
+        dft_low: norm(&|f| f.dft_low),
+        dft_high: norm(&|f| f.dft_high),
+        objective: outcome.objective().value,
         controller: outcome.controller().clone(),
     }
 }

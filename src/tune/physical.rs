@@ -78,30 +78,41 @@ pub fn judge_physical(
     let linear = margins(&ModelLoop::new(&sampled, &sections)?);
     let plant = DescribedPlant::new(physics, linear_crossover_hz(&linear, &sections))?;
     let described = described_margins(&plant, &sections, amplitudes)?;
-    let write = simulate_physical(physics, controller, &spec.profile)?;
-    let f = figures(&write.pes, &spec.profile);
+    let profile = spec.write("tuning a plant with physics")?;
+    if let Some(what) = beyond(spec) {
+        return Err(TuneError::PhysicsLimit { what });
+    }
+    let write = simulate_physical(physics, controller, profile)?;
+    let f = figures(&write.pes, profile);
     let of = |k: usize| f.harmonics.iter().find(|h| h.k == k).map_or(0.0, |h| h.amplitude);
     let found = Found {
         unstable_poles: described.worst.unstable_poles,
         phase_margin_deg: described.worst.phase_margin_deg,
         gain_margin_db: described.worst.gain_margin_db,
         max_sensitivity: described.worst.max_sensitivity,
-        gain_crossover_hz: farthest_crossover(&described, spec.margins.gain_crossover_hz),
-        dft_low: f.dft_low,
-        dft_high: f.dft_high,
+        gain_crossover_hz: described.worst.gain_crossover_hz,
+        gain_crossings_hz: crossings(&described),
+        dft_low: Some(f.dft_low),
+        dft_high: Some(f.dft_high),
         harmonics: spec.limits.harmonics.iter().map(|h| of(h.k)).collect(),
-        command_peak: write.command.iter().fold(0.0, |a, u| u.abs().max(a)),
+        command_peak: Some(write.command.iter().fold(0.0, |a, u| u.abs().max(a))),
+        ..Found::default()
     };
     let judged = Judged::of(&Requirement::list(&spec.margins, &spec.limits), found);
     Ok(PhysicalProof { margins: described, linear, judged })
 }
 
-/// Of the crossovers over the amplitudes the one farthest from the wanted band; without a band the one of the worst phase.
-fn farthest_crossover(m: &DescribedMargins, band: Option<[f64; 2]>) -> Option<f64> {
-    let Some([from, to]) = band else { return m.worst.gain_crossover_hz };
-    let off = |hz: f64| (from / hz).max(hz / to);
+/// Lowest and highest of the crossovers over the amplitudes (Hz).
+fn crossings(m: &DescribedMargins) -> Option<[f64; 2]> {
     let all = m.by_amplitude.iter().filter_map(|r| r.gain_crossover_hz);
-    all.max_by(|a, b| off(*a).total_cmp(&off(*b)))
+    all.fold(None, |ends: Option<[f64; 2]>, hz| Some(ends.map_or([hz, hz], |[a, b]| [a.min(hz), b.max(hz)])))
+}
+
+/// The first limit of a spec that is not judged on a plant with physics.
+fn beyond(spec: &Spec) -> Option<What> {
+    Requirement::list(&spec.margins, &spec.limits).into_iter().map(|r| r.what).find(|what| {
+        matches!(what, What::Bandwidth | What::CommandRms | What::Overshoot | What::Settling | What::Curve { .. })
+    })
 }
 
 impl PhysicalProof {
@@ -134,7 +145,7 @@ const BEYOND: f64 = 1.2;
 impl PhysicalTuning {
     /// Every limit is met, physics and all amplitudes included.
     pub fn passes(&self) -> bool {
-        matches!(self.outcome, Outcome::Tuned(_)) && self.after.judged.passes()
+        self.outcome.tuned().is_some() && self.after.judged.passes()
     }
 }
 
@@ -167,7 +178,7 @@ pub fn tune_physical(
     let amplitudes_carried = carried.list().into_iter().take(responses.len()).collect();
     let mut best = PhysicalTuning { outcome, amplitudes: amplitudes_carried, before, after, rounds: 1 };
     let mut aimed = spec.clone();
-    while best.rounds < ROUNDS && matches!(best.outcome, Outcome::Tuned(_)) && !best.after.judged.passes() {
+    while best.rounds < ROUNDS && best.outcome.tuned().is_some() && !best.after.judged.passes() {
         best.rounds += 1;
         aim_inside(&mut aimed, &best.after.judged);
         if aimed.check().is_err() {
@@ -185,14 +196,16 @@ pub fn tune_physical(
         }
         // Judged by the limits as they were asked for, not as they were aimed at.
         best.outcome = match outcome {
-            Outcome::Tuned(t) => Outcome::Tuned(t),
-            Outcome::Infeasible(i) => Outcome::Tuned(super::Tuned {
+            Outcome::Infeasible(i) => Outcome::TunedWithoutGuard(super::Tuned {
                 controller: i.controller,
                 before: None,
                 after: i.after,
+                objective: i.objective,
                 at_bounds: i.at_bounds,
+                ranges: i.ranges,
                 work: i.work,
             }),
+            tuned => tuned,
         };
         best.after = after;
     }
@@ -201,7 +214,7 @@ pub fn tune_physical(
 
 /// Moves each limit that was missed by the miss and a little more.
 fn aim_inside(spec: &mut Spec, judged: &Judged) {
-    for l in judged.limits.iter().filter(|l| l.violation > 0.0) {
+    for l in judged.limits.iter().filter(|l| !l.met()) {
         let Some(found) = l.found else { continue };
         let moved = |now: f64| now + BEYOND * (l.wanted.limit - found);
         let (m, limits) = (&mut spec.margins, &mut spec.limits);
@@ -223,6 +236,8 @@ fn aim_inside(spec: &mut Spec, judged: &Judged) {
                     h.amplitude = moved(h.amplitude);
                 }
             }
+            // Refused before the search.
+            (What::Bandwidth | What::CommandRms | What::Overshoot | What::Settling | What::Curve { .. }, _) => {}
         }
     }
 }

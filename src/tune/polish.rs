@@ -3,20 +3,11 @@
 //! Exact penalty on the largest violation; Hessian of the Lagrangian by damped BFGS; a second-order correction where the
 //! limits bend away (Nocedal & Wright, Numerical Optimization, ch. 18). Worst case over machines through one bound for all.
 
-use super::bench::UNSTABLE;
-use super::linear::{Linear, Row, linearise, rows};
+use super::linear::{Linear, linearise};
+use super::loop_rows::Row;
+use super::problem::UNSTABLE;
 use super::quadratic::Quadratic;
-use super::{Bench, Desk, Score};
-
-/// How a candidate is polished.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PolishMethod {
-    /// Sequential quadratic programming over gains and filters.
-    #[default]
-    Quadratic,
-    /// The same, begun from convex-concave steps of the gains as well, and followed by them in turn; the best is kept.
-    ConvexConcave,
-}
+use super::{Score, TuningProblem, TuningWork};
 
 /// What the polish is after.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,10 +52,16 @@ struct Step {
 }
 
 /// Polishes from `x` within the bounds, `steps` linearisations at most.
-pub(super) fn polish(bench: &Bench, x: &[f64], goal: Goal, steps: usize, desk: &mut Desk) -> Option<Polished> {
+pub(super) fn polish(
+    problem: &TuningProblem,
+    x: &[f64],
+    goal: Goal,
+    steps: usize,
+    work: &mut TuningWork,
+) -> Option<Polished> {
     let n = x.len();
     let mut x = x.to_vec();
-    let mut here = linearise(bench, &x, desk)?;
+    let mut here = linearise(problem, &x, work)?;
     let mut hessian = identity(n);
     let (mut radius, mut price) = (FIRST_RADIUS, PRICE);
     let merit = |s: &Score, price: f64| match goal {
@@ -79,26 +76,26 @@ pub(super) fn polish(bench: &Bench, x: &[f64], goal: Goal, steps: usize, desk: &
         if goal == Goal::Reach && here.score.violation <= 0.0 {
             break;
         }
-        let mut step = plan(bench, &x, &here, &hessian, radius, price, goal, None);
+        let mut step = plan(problem, &x, &here, &hessian, radius, price, goal, None);
         if goal == Goal::Best && step.violation_left > 1e-9 && price < HIGHEST_PRICE {
             // The price may be too low to pay for feasibility: try whether a higher one buys some.
             price *= 4.0;
-            step = plan(bench, &x, &here, &hessian, radius, price, goal, None);
+            step = plan(problem, &x, &here, &hessian, radius, price, goal, None);
         }
         if step.promised <= worthless {
             break;
         }
         let now = merit(&here.score, price);
         let mut trial: Vec<f64> = x.iter().zip(&step.d).map(|(x, d)| x + d).collect();
-        inside(bench, &mut trial);
-        let mut score = bench.score(&trial, desk);
+        inside(problem, &mut trial);
+        let mut score = problem.score(&trial, work);
         if merit(&score, price) >= now && score.violation < UNSTABLE && score.violation > here.score.violation.max(0.0)
         {
-            let bent = rows(bench, desk);
-            let again = plan(bench, &x, &here, &hessian, radius, price, goal, Some((&bent, &step.d)));
+            let bent = work.rows.clone();
+            let again = plan(problem, &x, &here, &hessian, radius, price, goal, Some((&bent, &step.d)));
             let mut second: Vec<f64> = x.iter().zip(&again.d).map(|(x, d)| x + d).collect();
-            inside(bench, &mut second);
-            let better = bench.score(&second, desk);
+            inside(problem, &mut second);
+            let better = problem.score(&second, work);
             if merit(&better, price) < now {
                 (trial, score) = (second, better);
             }
@@ -106,7 +103,7 @@ pub(super) fn polish(bench: &Bench, x: &[f64], goal: Goal, steps: usize, desk: &
         let ratio = (now - merit(&score, price)) / step.promised;
         if ratio > 1e-4 {
             taken += 1;
-            let Some(there) = linearise(bench, &trial, desk) else { break };
+            let Some(there) = linearise(problem, &trial, work) else { break };
             let d: Vec<f64> = trial.iter().zip(&x).map(|(a, b)| a - b).collect();
             if goal == Goal::Best {
                 update(&mut hessian, &d, &lagrangian_change(&here, &there, &step));
@@ -131,8 +128,8 @@ fn identity(n: usize) -> Vec<f64> {
     (0..n * n).map(|i| if i % (n + 1) == 0 { 1.0 } else { 0.0 }).collect()
 }
 
-fn inside(bench: &Bench, x: &mut [f64]) {
-    for (x, [from, to]) in x.iter_mut().zip(bench.parameters().bounds()) {
+fn inside(problem: &TuningProblem, x: &mut [f64]) {
+    for (x, [from, to]) in x.iter_mut().zip(problem.parameters().bounds()) {
         *x = x.clamp(*from, *to);
     }
 }
@@ -140,7 +137,7 @@ fn inside(bench: &Bench, x: &mut [f64]) {
 /// The step over d, the bound s of all objectives and the violation t.
 #[allow(clippy::too_many_arguments, reason = "one call site's locals, named; a struct would hide them")]
 fn plan(
-    bench: &Bench,
+    problem: &TuningProblem,
     x: &[f64],
     here: &Linear,
     hessian: &[f64],
@@ -180,16 +177,16 @@ fn plan(
         row[..n].copy_from_slice(&r.gradient);
         (row[n], row[n + 1]) = (0.0, -1.0);
         let bend = bent.and_then(|(there, d)| {
-            let value = there.iter().find(|other| r.same(other))?.value;
-            Some((value - r.value - dot(&r.gradient, d)).max(0.0))
+            let value = there.iter().find(|other| r.row.same(other))?.value;
+            Some((value - r.row.value - dot(&r.gradient, d)).max(0.0))
         });
-        p.row(&row, -r.value - bend.unwrap_or(0.0));
+        p.row(&row, -r.row.value - bend.unwrap_or(0.0));
     }
     row.fill(0.0);
     row[n + 1] = -1.0;
     p.row(&row, if goal == Goal::Room { MOST_ROOM } else { 0.0 });
     row.fill(0.0);
-    for (j, (x, [from, to])) in x.iter().zip(bench.parameters().bounds()).enumerate() {
+    for (j, (x, [from, to])) in x.iter().zip(problem.parameters().bounds()).enumerate() {
         row[j] = 1.0;
         p.row(&row, radius.min(to - x).max(0.0));
         row[j] = -1.0;
@@ -199,7 +196,7 @@ fn plan(
     let (z, multiplier) = p.solve();
     let d = z[..n].to_vec();
     let least = if goal == Goal::Room { -MOST_ROOM } else { 0.0 };
-    let left = here.rows.iter().map(|r| r.value + dot(&r.gradient, &d)).fold(least, f64::max);
+    let left = here.rows.iter().map(|r| r.row.value + dot(&r.gradient, &d)).fold(least, f64::max);
     let curved: f64 = 0.5 * (0..n).map(|j| d[j] * dot(&p.h[j * size..j * size + n], &d)).sum::<f64>();
     let promised = match goal {
         Goal::Best => {
@@ -231,7 +228,7 @@ fn lagrangian_change(here: &Linear, there: &Linear, step: &Step) -> Vec<f64> {
         add(*share, &before.1, &after.1);
     }
     for (share, before) in step.multiplier.iter().zip(&here.rows) {
-        if let Some(after) = there.rows.iter().find(|r| before.same(r)) {
+        if let Some(after) = there.rows.iter().find(|r| before.row.same(&r.row)) {
             add(*share, &before.gradient, &after.gradient);
         }
     }

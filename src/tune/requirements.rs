@@ -1,6 +1,8 @@
 //! Requirements: wanted, found, judged. Three types, so that none can be taken for another.
+//!
+//! A limit is met within [`MET`] of itself, here and nowhere else.
 
-use super::spec::{Limits, MarginLimits};
+use super::{Limits, MarginLimits};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -12,11 +14,22 @@ pub enum What {
     PhaseMargin,
     GainMargin,
     MaxSensitivity,
+    /// The lowest gain crossing for "at least", the highest for "at most".
     GainCrossover,
+    Bandwidth,
     DftLow,
     DftHigh,
-    Harmonic { k: usize },
+    Harmonic {
+        k: usize,
+    },
     CommandPeak,
+    CommandRms,
+    Overshoot,
+    Settling,
+    /// The largest ratio of a magnitude to its curve (of the curve to the magnitude for "at least"), by index in `limits.curve`.
+    Curve {
+        index: usize,
+    },
 }
 
 /// Which side of the limit is good.
@@ -51,16 +64,44 @@ pub struct Found {
     pub gain_margin_db: Option<f64>,
     /// Ms (ratio).
     pub max_sensitivity: f64,
-    /// None without a gain crossing.
+    /// The crossing with the smallest phase margin; none without a gain crossing.
     pub gain_crossover_hz: Option<f64>,
-    /// Norm over 600 to 1500 Hz (position_unit).
-    pub dft_low: f64,
-    /// Norm over 1500 to 3000 Hz (position_unit).
-    pub dft_high: f64,
+    /// Lowest and highest gain crossing outside `phase_stabilised_hz`; none without one.
+    pub gain_crossings_hz: Option<[f64; 2]>,
+    /// Where |T| first falls below -3 dB; none where it never does.
+    pub bandwidth_hz: Option<f64>,
+    /// Norm over the first band (position_unit); none without a write.
+    pub dft_low: Option<f64>,
+    /// Norm over the second band (position_unit).
+    pub dft_high: Option<f64>,
     /// Amplitudes of the limited harmonics, in the order of the spec (position_unit).
     pub harmonics: Vec<f64>,
-    /// Largest |command| (command_unit).
-    pub command_peak: f64,
+    /// Largest |command| (command_unit); none without a write.
+    pub command_peak: Option<f64>,
+    /// Root mean square of the command (command_unit); none where no limit asks for it.
+    pub command_rms: Option<f64>,
+    /// Overshoot of a step (%); none where no limit asks for it.
+    pub overshoot_percent: Option<f64>,
+    /// Settling time of a step to 2 % (s); infinite beyond the simulated horizon, none where no limit asks for it.
+    pub settling_s: Option<f64>,
+    /// Largest ratio to each curve, in the order of the spec, and where (Hz).
+    pub curves: Vec<CurveFound>,
+}
+
+impl Found {
+    /// Sum of both DFT norms (position_unit), 0 without a write.
+    pub fn dft(&self) -> f64 {
+        self.dft_low.unwrap_or(0.0) + self.dft_high.unwrap_or(0.0)
+    }
+}
+
+/// How near a magnitude comes to its curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct CurveFound {
+    /// Largest ratio; above 1 the curve is broken.
+    pub ratio: f64,
+    /// Where (Hz).
+    pub hz: f64,
 }
 
 /// Judged: one requirement with what was found.
@@ -88,17 +129,35 @@ pub struct Judged {
 /// Violation of a requirement that nothing was found for: as bad as a limit missed by the whole of itself.
 const NOTHING: f64 = 1.0;
 
+/// A limit is met within this share of itself: less than anybody can measure, more than rounding of any two ways to one figure.
+pub const MET: f64 = 1e-6;
+
 impl What {
     /// The unit in which limit and found value stand.
     pub fn unit(self) -> &'static str {
         match self {
             What::PhaseMargin => "deg",
             What::GainMargin => "dB",
-            What::MaxSensitivity => "ratio",
-            What::GainCrossover => "Hz",
+            What::MaxSensitivity | What::Curve { .. } => "ratio",
+            What::GainCrossover | What::Bandwidth => "Hz",
             What::DftLow | What::DftHigh | What::Harmonic { .. } => "position_unit",
-            What::CommandPeak => "command_unit",
+            What::CommandPeak | What::CommandRms => "command_unit",
+            What::Overshoot => "%",
+            What::Settling => "s",
         }
+    }
+
+    /// Whether it is read off the loop's curve, rather than off a record.
+    pub fn of_loop(self) -> bool {
+        matches!(
+            self,
+            What::PhaseMargin
+                | What::GainMargin
+                | What::MaxSensitivity
+                | What::GainCrossover
+                | What::Bandwidth
+                | What::Curve { .. }
+        )
     }
 }
 
@@ -109,10 +168,15 @@ impl fmt::Display for What {
             What::GainMargin => f.write_str("gain_margin_db"),
             What::MaxSensitivity => f.write_str("max_sensitivity"),
             What::GainCrossover => f.write_str("gain_crossover_hz"),
+            What::Bandwidth => f.write_str("bandwidth_hz"),
             What::DftLow => f.write_str("dft_low"),
             What::DftHigh => f.write_str("dft_high"),
             What::Harmonic { k } => write!(f, "harmonic {k}"),
             What::CommandPeak => f.write_str("command_peak"),
+            What::CommandRms => f.write_str("command_rms"),
+            What::Overshoot => f.write_str("overshoot_percent"),
+            What::Settling => f.write_str("settling_s"),
+            What::Curve { index } => write!(f, "curve {}", index + 1),
         }
     }
 }
@@ -129,11 +193,27 @@ impl Requirement {
         if let Some([from, to]) = m.gain_crossover_hz {
             all.extend([at_least(What::GainCrossover, from), at_most(What::GainCrossover, to)]);
         }
+        all.extend(m.bandwidth_hz.map(|x| at_least(What::Bandwidth, x)));
         all.extend(l.dft_low.map(|x| at_most(What::DftLow, x)));
         all.extend(l.dft_high.map(|x| at_most(What::DftHigh, x)));
         all.extend(l.harmonics.iter().map(|h| at_most(What::Harmonic { k: h.k }, h.amplitude)));
         all.extend(l.command_peak.map(|x| at_most(What::CommandPeak, x)));
+        all.extend(l.command_rms.map(|x| at_most(What::CommandRms, x)));
+        all.extend(l.overshoot_percent.map(|x| at_most(What::Overshoot, x)));
+        all.extend(l.settling_s.map(|x| at_most(What::Settling, x)));
+        all.extend((0..l.curve.len()).map(|index| at_most(What::Curve { index }, 1.0)));
         all
+    }
+
+    /// The same limit with this share of itself kept as room.
+    pub fn inside(&self, share: f64) -> Requirement {
+        let factor = if self.side == Side::AtLeast { 1.0 + share } else { 1.0 - share };
+        let mut limit = self.limit * factor;
+        if self.what == What::MaxSensitivity {
+            // |S| reaches 1 in every sampled loop; a limit there could not be met by any.
+            limit = limit.max(1.0 + 0.5 * (self.limit - 1.0));
+        }
+        Requirement { limit, ..*self }
     }
 
     /// How far `found` misses the limit, as a share of it; at most 0 where it is met.
@@ -155,20 +235,32 @@ impl Requirement {
     }
 
     /// The figure that this requirement speaks of; `harmonic` counts the harmonics met so far.
-    fn found_in(&self, found: &Found, harmonic: &mut usize) -> Option<f64> {
+    pub(super) fn found_in(&self, found: &Found, harmonic: &mut usize) -> Option<f64> {
         match self.what {
             What::PhaseMargin => found.phase_margin_deg,
             What::GainMargin => found.gain_margin_db,
             What::MaxSensitivity => Some(found.max_sensitivity),
-            What::GainCrossover => found.gain_crossover_hz,
-            What::DftLow => Some(found.dft_low),
-            What::DftHigh => Some(found.dft_high),
+            What::GainCrossover => found.gain_crossings_hz.map(|ends| ends[usize::from(self.side == Side::AtMost)]),
+            What::Bandwidth => found.bandwidth_hz,
+            What::DftLow => found.dft_low,
+            What::DftHigh => found.dft_high,
             What::Harmonic { .. } => {
                 *harmonic += 1;
                 found.harmonics.get(*harmonic - 1).copied()
             }
-            What::CommandPeak => Some(found.command_peak),
+            What::CommandPeak => found.command_peak,
+            What::CommandRms => found.command_rms,
+            What::Overshoot => found.overshoot_percent,
+            What::Settling => found.settling_s,
+            What::Curve { index } => found.curves.get(index).map(|c| c.ratio),
         }
+    }
+}
+
+impl JudgedLimit {
+    /// Whether the limit is met, within [`MET`] of itself.
+    pub fn met(&self) -> bool {
+        self.violation <= MET
     }
 }
 
@@ -189,7 +281,7 @@ impl Judged {
 
     /// The loop is stable and every limit is met.
     pub fn passes(&self) -> bool {
-        self.found.unstable_poles == 0 && self.limits.iter().all(|l| l.violation <= 0.0)
+        self.found.unstable_poles == 0 && self.limits.iter().all(JudgedLimit::met)
     }
 
     /// The largest violation; infinite for an unstable loop.

@@ -1,73 +1,73 @@
-//! spec.toml: what tuning must reach, and where it may search.
+//! spec.toml, both editions: what tuning must reach, what it makes smallest, and where it may search.
+//!
+//! In: the document, the profile and the disturbance density that it names. Out: a checked [`Spec`]; every refusal names the key.
+//! Spec: `specs/tuning.md`.
 
-use crate::document::{DocumentError, parse_toml, read_toml};
-use crate::pes::{Profile, ProfileError};
+use super::objective::{Disturbance, Minimise, Objective};
+use super::structure::Structure;
+use super::{Bounds, Limits, MarginLimits, SpecError};
+use crate::document::{parse_toml, read_text, read_toml};
+use crate::pes::Profile;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
-/// What tuning must reach, with the write it is judged on.
+/// What tuning must reach, and what it makes smallest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spec {
-    /// The write.
-    pub profile: Profile,
+    /// The spiral write; none where neither a limit nor the objective speaks of one.
+    pub profile: Option<Profile>,
+    /// Sample time of the controller (s), where the spec states it.
+    pub sample_time_s: Option<f64>,
+    /// Relative room that every limit keeps on the nominal machine.
+    pub guard: f64,
+    /// Further room (share of the limit), in the order of [`super::Requirement::list`], that a proof has asked for; not in the file.
+    pub further_room: Vec<f64>,
+    /// What is made smallest.
+    pub objective: Objective,
+    /// Disturbance at the plant's input, where the spec states one.
+    pub disturbance: Option<Disturbance>,
     /// Frequency-domain requirements.
     pub margins: MarginLimits,
-    /// Requirements on the PES and the command.
+    /// Requirements on curves, PES, step and command.
     pub limits: Limits,
+    /// Form of the controller.
+    pub structure: Structure,
     /// The search.
     pub search: Search,
 }
 
 /// The document as it stands in the file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SpecFile {
-    profile: PathBuf,
+    profile: Option<PathBuf>,
+    sample_time_s: Option<f64>,
+    guard: Option<f64>,
+    objective: Option<ObjectiveFile>,
+    disturbance: Option<DisturbanceFile>,
     #[serde(default)]
     margins: MarginLimits,
     #[serde(default)]
     limits: Limits,
     #[serde(default)]
+    structure: Structure,
+    #[serde(default)]
     search: Search,
 }
 
-/// Frequency-domain requirements, each optional.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct MarginLimits {
-    /// At least (deg).
-    pub phase_margin_deg: Option<f64>,
-    /// At least (dB).
-    pub gain_margin_db: Option<f64>,
-    /// At most (ratio), above 1.
-    pub max_sensitivity: Option<f64>,
-    /// From, to (Hz).
-    pub gain_crossover_hz: Option<[f64; 2]>,
-}
-
-/// Requirements on the PES and the command, each optional, each "at most".
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Limits {
-    /// Norm over 600 to 1500 Hz (position_unit).
-    pub dft_low: Option<f64>,
-    /// Norm over 1500 to 3000 Hz (position_unit).
-    pub dft_high: Option<f64>,
-    /// Amplitudes of single harmonics.
-    pub harmonics: Vec<HarmonicLimit>,
-    /// Largest |command| over the whole write, noise included (command_unit).
-    pub command_peak: Option<f64>,
-}
-
-/// Limit of one harmonic.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct HarmonicLimit {
-    /// Harmonic of the window, 1 to N/2.
-    pub k: usize,
-    /// |X_k|/N at most (position_unit).
-    pub amplitude: f64,
+struct ObjectiveFile {
+    minimise: Option<Minimise>,
+    bands_hz: Option<Vec<[f64; 2]>>,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DisturbanceFile {
+    rms: Option<f64>,
+    corner_hz: Option<f64>,
+    psd: Option<PathBuf>,
 }
 
 /// Where the search looks.
@@ -80,158 +80,147 @@ pub struct Search {
     pub notches: usize,
     /// Low-passes that the search sets, 0 to 3.
     pub lowpasses: usize,
-    /// Boxes of the parameters.
+    /// Ranges of the parameters.
     pub bounds: Bounds,
 }
 
-/// Boxes of the parameters, [from, to]; from = to fixes one. A key left out has the default of [`Bounds::default`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Bounds {
-    /// Proportional gain (command_unit per position_unit).
-    pub kp: [f64; 2],
-    /// Integral gain; [0, 0] switches it off.
-    pub ki_per_s: [f64; 2],
-    /// Derivative gain; [0, 0] switches it off.
-    pub kd_s: [f64; 2],
-    /// Corner of a low-pass (Hz).
-    pub lowpass_hz: [f64; 2],
-    /// Centre of a notch (Hz).
-    pub notch_hz: [f64; 2],
-}
-
-impl Default for Bounds {
-    fn default() -> Self {
-        Bounds {
-            kp: [1e-3, 10.0],
-            ki_per_s: [0.1, 1e4],
-            kd_s: [1e-6, 0.1],
-            lowpass_hz: [2000.0, 12_000.0],
-            notch_hz: [500.0, 6000.0],
-        }
-    }
-}
-
-/// Why a document is no spec.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "each field is named in the message")]
-pub enum SpecError {
-    /// The document cannot be read.
-    #[error(transparent)]
-    Document(#[from] DocumentError),
-    /// A number is out of its range.
-    #[error("{key} = {found}: expected {expected}")]
-    Range { key: &'static str, found: f64, expected: &'static str },
-    /// A pair is no interval.
-    #[error("{key} = [{from}, {to}]: expected {expected}")]
-    Interval { key: &'static str, from: f64, to: f64, expected: &'static str },
-    /// A harmonic is not one of the window.
-    #[error("limits.harmonics: k = {k}, but the window of {samples} samples has harmonics 1 to {last}")]
-    Harmonic { k: usize, samples: usize, last: usize },
-    /// A harmonic is limited twice.
-    #[error("limits.harmonics: k = {k} stands twice; expected each harmonic once")]
-    Twice { k: usize },
-    /// The write is none.
-    #[error("profile: {0}")]
-    Profile(#[from] ProfileError),
-    /// What is wrong stands in this file.
-    #[error("{}: {source}", file.display())]
-    File { file: PathBuf, source: Box<SpecError> },
-}
-
-/// Most notches, and most low-passes, that a search sets.
+/// Relative room that every limit keeps where the spec says nothing.
+pub const GUARD: f64 = 0.02;
+/// Most notches, low-passes and peak filters that a search sets.
 pub(super) const FILTERS: usize = 3;
 
 /// What the files should be.
-const A_SPEC: &str = "a spec: the path of a `profile`, then [margins], [limits] and [search]";
+const A_SPEC: &str =
+    "a spec: [margins], [limits], [objective] and [search], and where it judges a write the path of a `profile`";
 const A_PROFILE: &str = "a profile of the move that is judged";
 
 impl Spec {
-    /// The spec in a file; the profile's path is relative to the file's folder.
+    /// The spec in a file; the paths in it are relative to the file's folder.
     pub fn read(file: &Path) -> Result<Spec, SpecError> {
         let document: SpecFile = read_toml(file).map_err(|e| e.expecting(A_SPEC))?;
         let folder = file.parent().unwrap_or(Path::new("."));
-        let profile = read_toml(&folder.join(&document.profile)).map_err(|e| e.expecting(A_PROFILE))?;
-        let spec = Spec { profile, margins: document.margins, limits: document.limits, search: document.search };
-        spec.check().map_err(|source| {
-            let file =
-                if matches!(source, SpecError::Profile(_)) { Spec::profile_path(file) } else { Ok(file.to_owned()) };
-            file.map_or_else(|e| e, |file| SpecError::File { file, source: Box::new(source) })
+        let profile = match &document.profile {
+            Some(p) => Some(read_toml(&folder.join(p)).map_err(|e| e.expecting(A_PROFILE))?),
+            None => None,
+        };
+        let of_spec = |source: SpecError| SpecError::File { file: file.to_owned(), source: Box::new(source) };
+        let density = |path: &Path| Ok(Some(read_text(&folder.join(path))?));
+        let spec = document.resolve(profile, density).map_err(of_spec)?;
+        spec.check().map_err(|source| match (&source, Spec::profile_path(file)) {
+            (SpecError::Profile(_), Ok(Some(file))) => SpecError::File { file, source: Box::new(source) },
+            _ => of_spec(source),
         })?;
         Ok(spec)
     }
 
-    /// The spec in a text whose profile stands in another one; its `profile` key names that one in errors.
-    pub fn parse(text: &str, profile: &str) -> Result<Spec, SpecError> {
+    /// The spec in a text whose profile stands in another one; its `profile` key names that one in errors. A density in a file of its own cannot be
+    /// read this way.
+    pub fn parse<'a>(text: &str, profile: impl Into<Option<&'a str>>) -> Result<Spec, SpecError> {
         let document: SpecFile = parse_toml(Path::new("spec"), text)?;
-        let profile = parse_toml(&document.profile, profile)?;
-        let spec = Spec { profile, margins: document.margins, limits: document.limits, search: document.search };
+        let profile = match (&document.profile, profile.into()) {
+            (Some(path), Some(text)) => Some(parse_toml(path, text)?),
+            (Some(path), None) => return Err(SpecError::NoProfileText { path: path.clone() }),
+            (None, _) => None,
+        };
+        let spec = document.resolve(profile, |_| Ok(None))?;
         spec.check()?;
         Ok(spec)
     }
 
-    /// The profile's path as a spec file names it, resolved against the file's folder.
-    pub fn profile_path(file: &Path) -> Result<PathBuf, SpecError> {
+    /// The profile's path as a spec file names it, resolved against the file's folder; none where it names none.
+    pub fn profile_path(file: &Path) -> Result<Option<PathBuf>, SpecError> {
         let document: SpecFile = read_toml(file).map_err(|e| e.expecting(A_SPEC))?;
-        Ok(file.parent().unwrap_or(Path::new(".")).join(document.profile))
+        Ok(document.profile.map(|p| file.parent().unwrap_or(Path::new(".")).join(p)))
+    }
+
+    /// The profile, or the refusal of what cannot do without one.
+    pub fn write(&self, what: &'static str) -> Result<&Profile, SpecError> {
+        self.profile.as_ref().ok_or(SpecError::NeedsProfile { what })
+    }
+
+    /// The same limits without their guard, for whoever keeps room of his own.
+    pub fn unguarded(&self) -> Spec {
+        Spec { guard: 0.0, further_room: Vec::new(), ..self.clone() }
     }
 
     /// Refuses numbers that are no requirement; the key in the error is the one of the file.
     pub fn check(&self) -> Result<(), SpecError> {
-        self.profile.check()?;
-        let m = &self.margins;
-        at_least_zero("margins.phase_margin_deg", m.phase_margin_deg, 180.0, "above 0 and below 180 deg")?;
-        at_least_zero("margins.gain_margin_db", m.gain_margin_db, f64::INFINITY, "a finite number above 0 dB")?;
-        if let Some(found) = m.max_sensitivity
-            && !(found.is_finite() && found > 1.0)
-        {
-            let expected = "a finite number above 1; |S| reaches 1 in every sampled loop";
-            return Err(SpecError::Range { key: "margins.max_sensitivity", found, expected });
+        if let Some(p) = &self.profile {
+            p.check()?;
         }
-        if let Some(range) = m.gain_crossover_hz {
-            interval("margins.gain_crossover_hz", range, false)?;
+        range("guard", self.guard, (0.0..0.5).contains(&self.guard), "a share of at least 0 and below 0.5")?;
+        if let Some(t) = self.sample_time_s {
+            range("sample_time_s", t, t > 0.0 && t.is_finite(), "a finite time above 0 s")?;
         }
-        let l = &self.limits;
-        let above = "a finite number above 0";
-        at_least_zero("limits.dft_low", l.dft_low, f64::INFINITY, above)?;
-        at_least_zero("limits.dft_high", l.dft_high, f64::INFINITY, above)?;
-        at_least_zero("limits.command_peak", l.command_peak, f64::INFINITY, above)?;
-        let [first, last] = self.profile.pes.window;
-        let samples = last - first;
-        for (i, h) in l.harmonics.iter().enumerate() {
-            at_least_zero("limits.harmonics.amplitude", Some(h.amplitude), f64::INFINITY, above)?;
-            if h.k == 0 || h.k > samples / 2 {
-                return Err(SpecError::Harmonic { k: h.k, samples, last: samples / 2 });
-            }
-            if l.harmonics[..i].iter().any(|other| other.k == h.k) {
-                return Err(SpecError::Twice { k: h.k });
-            }
+        self.objective.check()?;
+        if let Some(d) = &self.disturbance {
+            d.check()?;
+        }
+        self.margins.check()?;
+        self.limits.check(self.profile.as_ref(), &self.objective.bands_hz)?;
+        self.structure.check()?;
+        let of_write = self.objective.minimise.of_write();
+        if of_write && self.profile.is_none() {
+            return Err(SpecError::NeedsProfile { what: self.objective.minimise.name() });
+        }
+        if self.objective.minimise == Minimise::Disturbance && self.disturbance.is_none() {
+            return Err(SpecError::NeedsDisturbance);
         }
         let s = &self.search;
-        for (key, count) in [("search.notches", s.notches), ("search.lowpasses", s.lowpasses)] {
-            if count > FILTERS {
-                return Err(SpecError::Range { key, found: count as f64, expected: "0 to 3" });
+        let counts = [
+            ("search.notches", s.notches),
+            ("search.lowpasses", s.lowpasses),
+            ("structure.peaks", self.structure.peaks),
+        ];
+        for (key, count) in counts {
+            range(key, count as f64, count <= FILTERS, "0 to 3")?;
+        }
+        s.bounds.check()
+    }
+}
+
+impl SpecFile {
+    fn resolve(
+        self,
+        profile: Option<Profile>,
+        density: impl Fn(&Path) -> Result<Option<String>, SpecError>,
+    ) -> Result<Spec, SpecError> {
+        let disturbance = match self.disturbance {
+            None => None,
+            Some(DisturbanceFile { rms: Some(rms), corner_hz: Some(corner_hz), psd: None }) => {
+                Some(Disturbance::Coloured { rms, corner_hz })
             }
-        }
-        let b = &s.bounds;
-        interval("search.bounds.kp", b.kp, false)?;
-        interval("search.bounds.ki_per_s", b.ki_per_s, true)?;
-        interval("search.bounds.kd_s", b.kd_s, true)?;
-        interval("search.bounds.lowpass_hz", b.lowpass_hz, false)?;
-        interval("search.bounds.notch_hz", b.notch_hz, false)
+            Some(DisturbanceFile { rms: None, corner_hz: None, psd: Some(path) }) => match density(&path)? {
+                Some(text) => Some(Disturbance::density(&path, &text)?),
+                None => return Err(SpecError::NoDensityText { path }),
+            },
+            Some(_) => return Err(SpecError::Disturbance),
+        };
+        let asked = self.objective.as_ref().and_then(|o| o.minimise);
+        let minimise = asked.unwrap_or_else(|| Minimise::usual(profile.is_some(), disturbance.is_some()));
+        let bands_hz = self.objective.and_then(|o| o.bands_hz).unwrap_or_else(Objective::usual_bands);
+        Ok(Spec {
+            profile,
+            sample_time_s: self.sample_time_s,
+            guard: self.guard.unwrap_or(GUARD),
+            further_room: Vec::new(),
+            objective: Objective { minimise, bands_hz },
+            disturbance,
+            margins: self.margins,
+            limits: self.limits,
+            structure: self.structure,
+            search: self.search,
+        })
     }
 }
 
-fn at_least_zero(key: &'static str, value: Option<f64>, below: f64, expected: &'static str) -> Result<(), SpecError> {
-    match value {
-        Some(found) if !(found.is_finite() && found > 0.0 && found < below) => {
-            Err(SpecError::Range { key, found, expected })
-        }
-        _ => Ok(()),
-    }
+/// Refuses a number out of its range by its key.
+pub(super) fn range(key: &'static str, found: f64, good: bool, expected: &'static str) -> Result<(), SpecError> {
+    if good { Ok(()) } else { Err(SpecError::Range { key, found, expected }) }
 }
 
-fn interval(key: &'static str, [from, to]: [f64; 2], off: bool) -> Result<(), SpecError> {
+/// Refuses what is no interval of numbers above 0; `off` allows [0, 0].
+pub(super) fn interval(key: &'static str, [from, to]: [f64; 2], off: bool) -> Result<(), SpecError> {
     let good = from.is_finite() && to.is_finite() && 0.0 < from && from <= to;
     if good || (off && from == 0.0 && to == 0.0) {
         return Ok(());

@@ -1,15 +1,18 @@
-//! Where the search starts: the given controller, loops shaped by rule, loops shaped by seeded strata.
+//! Where the search starts: given controllers, loops shaped by rule, loops shaped by seeded strata.
 //!
 //! A loop is shaped by what an engineer would choose (crossover, lead, integral corner, filters); the gains follow from
 //! |L| = 1 at the crossover. Nearly every start is then stable, where random gains nearly never are.
 
-use super::{Bench, Parameter};
+use super::{Parameter, TuningProblem};
 use crate::controller::Controller;
 use crate::feedback::SampledPlant;
 use crate::lti::{FrequencyResponse, Sections};
 use crate::numeric::random::Random;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
+
+/// Numbers that a loop is shaped by, each from 0 to 1.
+const SHARES: usize = 11;
 
 /// What a shaped loop is made from.
 #[derive(Clone, Copy, Debug)]
@@ -23,24 +26,16 @@ struct Shape {
     lowpass: f64,
     notch_depth: f64,
     notch_damping: f64,
+    /// Where other numbers lie between their bounds (ln).
+    other: f64,
+    /// Where each notch lies between its bounds (ln); none lays it on the plant's modes.
+    notch: [Option<f64>; 4],
 }
 
-/// Crossovers tried where the spec names none (Hz): below the first mode of any positioner of this kind, up to its modes.
-const CROSSOVER_HZ: [f64; 2] = [100.0, 1500.0];
-
-/// `count` decision vectors: first the base controller if `given`, then two by rule, then strata under `seed`.
-pub(super) fn starts(
-    bench: &Bench,
-    crossover_hz: Option<[f64; 2]>,
-    given: bool,
-    seed: u64,
-    count: usize,
-) -> Vec<Vec<f64>> {
-    let [low, high] = crossover_hz.unwrap_or(CROSSOVER_HZ);
-    let mut all = Vec::with_capacity(count);
-    if given {
-        all.push(bench.parameters.vector(bench.parameters.base()));
-    }
+/// `count` decision vectors or more: the given ones, two by rule, then strata under `seed`.
+pub(super) fn starts(problem: &TuningProblem, given: &[Vec<f64>], seed: u64, count: usize) -> Vec<Vec<f64>> {
+    let [low, high] = problem.parameters.ranges().crossover_hz;
+    let mut all = given.to_vec();
     let plain = Shape {
         crossover_hz: (low * high).sqrt(),
         lead: 1.3,
@@ -48,12 +43,14 @@ pub(super) fn starts(
         lowpass: 0.8,
         notch_depth: 0.2,
         notch_damping: 0.3,
+        other: 0.5,
+        notch: [None; 4],
     };
     for crossover_hz in [plain.crossover_hz, (low * low * high).cbrt()] {
-        all.push(shaped(bench, 0, &Shape { crossover_hz, ..plain }, &|m, i| worst_mode(m, crossover_hz, i)));
+        all.push(shaped(problem, 0, &Shape { crossover_hz, ..plain }));
     }
     let mut random = Random::stream(seed, 11);
-    let n = count.saturating_sub(all.len());
+    let n = (count + given.len()).saturating_sub(all.len());
     // One stratum of every quantity is used exactly once (Latin hypercube, McKay, Beckman & Conover 1979).
     let mut column = || -> Vec<f64> {
         let mut order: Vec<usize> = (0..n).collect();
@@ -62,37 +59,41 @@ pub(super) fn starts(
         }
         order.into_iter().map(|i| (i as f64 + random.uniform()) / n as f64).collect()
     };
-    let columns: Vec<Vec<f64>> = (0..10).map(|_| column()).collect();
-    #[allow(clippy::needless_range_loop, reason = "i is the stratum, an index into every column")]
+    let columns: [Vec<f64>; SHARES] = std::array::from_fn(|_| column());
     for i in 0..n {
-        let between = |c: usize, from: f64, to: f64| from + (to - from) * columns[c][i];
-        let shape = Shape {
-            crossover_hz: low * (high / low).powf(columns[0][i]),
-            lead: 10f64.powf(between(1, -0.3, 1.5)),
-            integral: 10f64.powf(between(2, 0.5, 1.7)),
-            lowpass: columns[3][i],
-            notch_depth: 10f64.powf(between(4, -1.3, -0.05)),
-            notch_damping: 10f64.powf(between(5, -1.1, -0.1)),
-        };
-        let machine = i % bench.machines.len();
         // Every other start lays its notches on modes, the rest anywhere between their bounds.
-        let on_modes = i % 2 == 0;
-        all.push(shaped(bench, machine, &shape, &|m, k| {
-            if on_modes { worst_mode(m, shape.crossover_hz, k) } else { NotchAt::Share(columns[6 + k % 4][i]) }
-        }));
+        let shape = Shape::of(problem, &std::array::from_fn(|c| columns[c][i]), i % 2 == 0);
+        all.push(shaped(problem, i % problem.machines.len(), &shape));
     }
-    all.truncate(count.max(1));
     all
 }
 
-enum NotchAt {
-    Hz(f64),
-    /// 0 to 1 between the bounds (ln).
-    Share(f64),
+/// One more shaped loop.
+pub(super) fn further(problem: &TuningProblem, random: &mut Random) -> Vec<f64> {
+    let shares = std::array::from_fn(|_| random.uniform());
+    let on_modes = random.uniform() < 0.5;
+    shaped(problem, 0, &Shape::of(problem, &shares, on_modes))
 }
 
-/// The `k`-th highest peak of |P| w², the plant with its inertia taken out, above half the crossover.
-fn worst_mode(m: &SampledPlant, crossover_hz: f64, k: usize) -> NotchAt {
+impl Shape {
+    fn of(problem: &TuningProblem, share: &[f64; SHARES], on_modes: bool) -> Shape {
+        let [low, high] = problem.parameters.ranges().crossover_hz;
+        let between = |c: usize, from: f64, to: f64| from + (to - from) * share[c];
+        Shape {
+            crossover_hz: low * (high / low).powf(share[0]),
+            lead: 10f64.powf(between(1, -0.7, 1.5)),
+            integral: 10f64.powf(between(2, 0.3, 2.2)),
+            lowpass: share[3],
+            notch_depth: 10f64.powf(between(4, -1.5, -0.05)),
+            notch_damping: 10f64.powf(between(5, -1.3, -0.1)),
+            other: share[6],
+            notch: std::array::from_fn(|k| if on_modes { None } else { Some(share[7 + k]) }),
+        }
+    }
+}
+
+/// The `k`-th highest peak of |P| w², the plant with its inertia taken out, above half the crossover (Hz).
+fn worst_mode(m: &SampledPlant, crossover_hz: f64, k: usize) -> Option<f64> {
     let w = m.w_rad_s();
     let size = |i: usize| m.value(i).norm() * w[i] * w[i];
     let mut peaks: Vec<(f64, f64)> = (1..w.len() - 1)
@@ -100,28 +101,40 @@ fn worst_mode(m: &SampledPlant, crossover_hz: f64, k: usize) -> NotchAt {
         .map(|i| (size(i), w[i]))
         .collect();
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    peaks.get(k).map_or(NotchAt::Share((k as f64 + 1.0) / 4.0), |p| NotchAt::Hz(p.1 / TAU))
+    peaks.get(k).map(|p| p.1 / TAU)
 }
 
 /// The decision vector of a shaped loop on one machine.
-fn shaped(bench: &Bench, machine: usize, s: &Shape, notch: &dyn Fn(&SampledPlant, usize) -> NotchAt) -> Vec<f64> {
-    let p = bench.parameters();
-    let m = &bench.machines[machine].sampled;
+fn shaped(problem: &TuningProblem, machine: usize, s: &Shape) -> Vec<f64> {
+    let p = problem.parameters();
+    let m = &problem.machines[machine].sampled;
     let mut c = p.base().clone();
     for (parameter, [from, to]) in p.free().iter().zip(p.bounds()) {
         let share = |x: f64| (from + (to - from) * x).exp();
         match *parameter {
             Parameter::LowpassFrequency { filter } => c.lowpass[filter].frequency_hz = share(s.lowpass),
+            Parameter::DerivativeFilter => c.pid.derivative_filter_s = share(s.other),
             Parameter::NotchFrequency { filter } => {
-                let hz = match notch(m, filter) {
-                    NotchAt::Hz(hz) => hz.clamp(from.exp(), to.exp()),
-                    NotchAt::Share(x) => share(x),
+                let at = s.notch[filter % s.notch.len()];
+                let mode = || worst_mode(m, s.crossover_hz, filter).map(|hz| hz.clamp(from.exp(), to.exp()));
+                let hz = match at {
+                    Some(x) => share(x),
+                    None => mode().unwrap_or_else(|| share((filter as f64 + 1.0) / 4.0)),
                 };
                 c.notch[filter].frequency_hz = hz;
-                c.notch[filter].pole_damping_ratio = s.notch_damping;
-                c.notch[filter].zero_damping_ratio = s.notch_damping * s.notch_depth;
+            }
+            Parameter::NotchPoleDamping { filter } => {
+                // A range beyond a notch's own is a peak filter's.
+                let damping = if to.exp() > 0.5 { s.notch_damping } else { share(s.other) };
+                c.notch[filter].pole_damping_ratio = damping.clamp(from.exp(), to.exp());
             }
             _ => {}
+        }
+    }
+    for (parameter, [from, to]) in p.free().iter().zip(p.bounds()) {
+        if let Parameter::NotchDepth { filter } = *parameter {
+            let depth = if *to > 0.0 { (from + 0.3 * (to - from) * s.other).exp() } else { s.notch_depth };
+            c.notch[filter].zero_damping_ratio = depth * c.notch[filter].pole_damping_ratio;
         }
     }
     let w = s.crossover_hz * TAU;
@@ -131,6 +144,8 @@ fn shaped(bench: &Bench, machine: usize, s: &Shape, notch: &dyn Fn(&SampledPlant
         pid: crate::controller::Pid { kp: 1.0, ki_per_s: w / s.integral, kd_s: s.lead / w, ..c.pid },
         ..c
     };
+    // Kinds without an integral or a derivative drop it here.
+    let unit = p.controller(&p.vector_outside(&unit));
     let mut chain = Vec::new();
     super::parameters::chain_of(&unit, &mut chain);
     let response = Sections { chain, sample_time_s: unit.sample_time_s }.at(w);

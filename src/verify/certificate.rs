@@ -82,7 +82,8 @@ pub struct Certificate {
     /// SHA-256 of the spec's and of the profile's bytes.
     pub spec_sha256: String,
     /// See above.
-    pub profile_sha256: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile_sha256: Option<String>,
     /// How the firmware holds the coefficients that are certified.
     pub word: Word,
     /// What was uncertain.
@@ -115,7 +116,8 @@ impl Source {
         Ok(Source { file: file.into(), text: read_text(file)? })
     }
 
-    fn sha256(&self) -> String {
+    /// SHA-256 of its bytes.
+    pub fn sha256(&self) -> String {
         sha256_hex(self.text.as_bytes())
     }
 }
@@ -134,7 +136,7 @@ pub struct Inputs<'a> {
     /// The spec, and the profile that it names.
     pub spec: &'a Source,
     /// See above.
-    pub profile: &'a Source,
+    pub profile: Option<&'a Source>,
     /// How the firmware holds the coefficients.
     pub word: Word,
     /// Box around every plant.
@@ -158,9 +160,9 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
     let c = table.controller();
     let in_table = |source: VerifyError| source.of(&i.gains.file);
     c.check().map_err(|e| in_table(crate::tune::GainTableError::from(e).into()))?;
-    let spec = Spec::parse(&i.spec.text, &i.profile.text).map_err(|e| match e {
+    let spec = Spec::parse(&i.spec.text, i.profile.map(|p| p.text.as_str())).map_err(|e| match e {
         SpecError::Document(_) => e.into(),
-        SpecError::Profile(_) => VerifyError::from(e).of(&i.profile.file),
+        SpecError::Profile(_) => VerifyError::from(e).of(i.profile.map_or(&i.spec.file, |p| &p.file)),
         _ => VerifyError::from(e).of(&i.spec.file),
     })?;
     let spec_sha256 = i.spec.sha256();
@@ -182,30 +184,31 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
             return Err(VerifyError::Physics { file: file.clone(), effect: p.effect.clone() });
         }
         let bounds = prove_loop(&plant, &held, t, &i.uncertainty, settings).map_err(in_table)?;
-        let figures = write(&plant, &held, &c, &spec.profile);
+        let profile = spec.profile.as_ref();
+        let figures = profile.map(|p| write(&plant, &held, &c, p));
         // The table states figures of its own coefficients on the plant as it stands.
         unfit.push(if plain {
-            table::figures(&table.after, &bounds, Some(&figures))
+            table::figures(&table.after, &bounds, figures.as_ref())
         } else {
             let bounds = prove_loop(&plant, table.sections(), t, &none, settings)?;
-            let figures = write(&plant, table.sections(), &c, &spec.profile);
-            table::figures(&table.after, &bounds, Some(&figures))
+            let figures = profile.map(|p| write(&plant, table.sections(), &c, p));
+            table::figures(&table.after, &bounds, figures.as_ref())
         });
-        let write_box = i.uncertainty.any().then(|| {
+        let write_box = profile.filter(|_| i.uncertainty.any()).map(|profile| {
             let stable = bounds.stability == Stability::Stable;
             let boxed = BoxedLoop {
                 plant: &plant,
                 sections: &held,
                 controller: &c,
-                profile: &spec.profile,
+                profile,
                 uncertainty: &i.uncertainty,
                 max_sensitivity: bounds.max_sensitivity.high.filter(|_| stable),
             };
             bound_write(&boxed, &bins, &BoxSettings::default())
         });
-        let limits = limits(&wanted, &bounds, Some(&figures), write_box.as_ref());
+        let limits = limits(&wanted, &bounds, figures.as_ref(), write_box.as_ref());
         let (sha256, sweep_again) = (source.sha256(), vec![]);
-        cases.push(CaseProof { sha256, bounds, write: Some(figures), write_box, limits, sweep_again });
+        cases.push(CaseProof { sha256, bounds, write: figures, write_box, limits, sweep_again });
     }
     // Without a limit on Ms, a hidden mode that brings L this near to -1 is one to look for.
     let away = 1.0 / spec.margins.max_sensitivity.unwrap_or(MS_UNSAID);
@@ -233,7 +236,7 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
         program: env!("CARGO_PKG_VERSION").into(),
         gains_sha256: i.gains.sha256(),
         spec_sha256,
-        profile_sha256: i.profile.sha256(),
+        profile_sha256: i.profile.map(Source::sha256),
         word: i.word,
         uncertainty: i.uncertainty,
         sweep: (!i.sweeps.is_empty()).then_some(i.assumption),
@@ -334,6 +337,11 @@ fn limits(wanted: &[Requirement], b: &Bounds, w: Option<&WriteFigures>, over: Op
 }
 
 impl Certificate {
+    /// The same certificate for a table that says the same in other bytes, as with the gate's words added.
+    pub fn of_text(self, table: &GainTable) -> Result<Certificate, VerifyError> {
+        Ok(Certificate { gains_sha256: sha256_hex(table.text()?.as_bytes()), ..self })
+    }
+
     /// The document's text, JSON.
     pub fn text(&self) -> Result<String, VerifyError> {
         Ok(serde_json::to_string_pretty(self)? + "\n")

@@ -2,7 +2,7 @@
 
 use crate::document::DocumentError;
 use crate::lti::LtiError;
-use crate::tune::{GainTableError, SpecError};
+use crate::tune::{GainTableError, SpecError, TuneError};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -16,6 +16,11 @@ pub enum VerifyError {
     Table(#[from] GainTableError),
     #[error(transparent)]
     Spec(#[from] SpecError),
+    #[error(transparent)]
+    Tune(#[from] TuneError),
+    /// No tuning was run.
+    #[error("no tuning was run")]
+    NoRound,
     #[error(transparent)]
     Plant(#[from] LtiError),
     #[error("{}: {source}", file.display())]

@@ -4,6 +4,7 @@
 //! a refusal that says what to measure again. Shared with the rest are the readers of files and the seeded generator only.
 //! Convention: L = P C, negative feedback; spec: `specs/certificate.md`.
 
+mod assured;
 mod bounds;
 mod cascade;
 mod certificate;
@@ -32,6 +33,7 @@ mod write;
 mod write_box;
 mod write_piece;
 
+pub use assured::{Assurance, Assured, Ground, tune_assured};
 pub use bounds::{Bounded, Bounds, ProvenCrossing, Stability};
 pub use certificate::{CaseProof, Certificate, Inputs, ProvenLimit, SCHEMA, Source, Verdict, certify, choices};
 pub use error::VerifyError;

@@ -131,9 +131,9 @@ pub(super) fn figures(s: &Summary, b: &Bounds, write: Option<&WriteFigures>) -> 
     }
     if let Some(w) = write {
         let around = |x: f64, e: f64| Bounded { low: Some(x - e), high: Some(x + e), hz: None };
-        check("dft_low", Some(s.dft_low), around(w.dft_low, w.error));
-        check("dft_high", Some(s.dft_high), around(w.dft_high, w.error));
-        check("command_peak", Some(s.command_peak), around(w.command_peak, w.command_error()));
+        check("dft_low", s.dft_low, around(w.dft_low, w.error));
+        check("dft_high", s.dft_high, around(w.dft_high, w.error));
+        check("command_peak", s.command_peak, around(w.command_peak, w.command_error()));
     }
     let places = |all: &[ProvenCrossing], rows: &[CrossingRow]| {
         let at = |c: &ProvenCrossing, r: &CrossingRow| {

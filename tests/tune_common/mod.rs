@@ -5,7 +5,7 @@ use servotune::controller::{Controller, Lowpass, Notch, Pid};
 use servotune::frf::Frf;
 use servotune::lti::{Body, FrequencyResponse, Mode, Plant};
 use servotune::pes::{Noise, PesClock, Profile, Spiral};
-use servotune::tune::{Limits, MarginLimits, Search, Spec};
+use servotune::tune::{Bounds, Limits, MarginLimits, Minimise, Objective, Search, Spec, Structure};
 use std::f64::consts::TAU;
 
 /// The body of the paper's eq. (20), its delay, its first mode and two above it.
@@ -49,15 +49,33 @@ pub fn paper_profile() -> Profile {
 
 pub fn paper_spec() -> Spec {
     Spec {
-        profile: paper_profile(),
+        profile: Some(paper_profile()),
+        sample_time_s: Some(39.6e-6),
+        guard: 0.0,
+        further_room: vec![],
+        objective: Objective { minimise: Minimise::Dft, bands_hz: Objective::usual_bands() },
+        disturbance: None,
+        structure: Structure::default(),
         margins: MarginLimits {
             phase_margin_deg: Some(35.0),
             gain_margin_db: Some(5.0),
             max_sensitivity: Some(2.2),
             gain_crossover_hz: Some([400.0, 900.0]),
+            ..MarginLimits::default()
         },
-        limits: Limits { dft_low: Some(0.02), dft_high: Some(0.02), harmonics: vec![], command_peak: Some(2.0) },
-        search: Search { seed: 1, notches: 1, lowpasses: 1, bounds: Default::default() },
+        limits: Limits { dft_low: Some(0.02), dft_high: Some(0.02), command_peak: Some(2.0), ..Limits::default() },
+        search: Search {
+            seed: 1,
+            notches: 1,
+            lowpasses: 1,
+            bounds: Bounds {
+                kp: Some([1e-3, 10.0]),
+                ki_per_s: Some([0.1, 1e4]),
+                kd_s: Some([1e-6, 0.1]),
+                lowpass_hz: Some([2000.0, 12_000.0]),
+                notch_hz: Some([500.0, 6000.0]),
+            },
+        },
     }
 }
 

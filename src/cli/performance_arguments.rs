@@ -1,47 +1,8 @@
-//! The words of `limit`, `pareto`, `budget` and `next-sweep`.
+//! The words of `pareto`, `budget` and `next-sweep`.
 
 use super::sweep_arguments::ReadingArguments;
 use clap::Args;
 use std::path::PathBuf;
-
-/// How low the DFT of the PES can go under any linear controller, and how far gains are from it
-#[derive(Debug, Args)]
-#[command(after_help = "Examples:
-  servotune limit --plant specs/machines/healthy.toml --spec specs/limits/paper.toml
-  servotune limit --plant specs/machines/tunable.toml --spec specs/limits/paper.toml --gains gains.toml --out limit.json
-
-The bound holds for every linear time-invariant feedback whose |S| stays within max_sensitivity, whose gain crossings all lie within
-gain_crossover_hz and whose loop forgets within the write (specs/performance_limit.md); phase and gain margin are left out, which only
-lowers it. Ends with 1 where the spec's limits are proven impossible.")]
-pub(super) struct LimitArguments {
-    /// Plant model (plant.toml)
-    #[arg(long, value_name = "PLANT")]
-    pub plant: PathBuf,
-    /// Limits and write (spec.toml)
-    #[arg(long, value_name = "SPEC")]
-    pub spec: PathBuf,
-    /// Gains to be compared (gains.toml or controller.toml)
-    #[arg(long, value_name = "GAINS")]
-    pub gains: Option<PathBuf>,
-    /// Document to write (limit.json)
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-    /// Search the spec's structure from this many starts for the best gains it has: evidence, no bound; 0 leaves it out
-    #[arg(long, value_name = "STARTS", default_value_t = 24)]
-    pub search: usize,
-    /// Sum of the sensitivity's impulse response that loops of the class may have left beyond the write
-    #[arg(long, value_name = "SUM", default_value_t = 0.05, value_parser = not_negative)]
-    pub tail: f64,
-    /// Rounds of cuts at most; every round's bound is one
-    #[arg(long, value_name = "N", default_value_t = 12, value_parser = at_least_one)]
-    pub rounds: usize,
-    /// Rounds for each band alone; 0 leaves these two bounds out
-    #[arg(long, value_name = "N", default_value_t = 4)]
-    pub alone: usize,
-    /// Sample time where no gains give one (s)
-    #[arg(long, value_name = "SECONDS", default_value_t = 39.6e-6)]
-    pub sample_time_s: f64,
-}
 
 /// The front of margin against DFT over one or several machines, with its picture
 #[derive(Debug, Args)]
@@ -72,9 +33,9 @@ pub(super) struct ParetoArguments {
     /// Largest Ms tried (ratio)
     #[arg(long, value_name = "MS", default_value_t = 3.0)]
     pub to: f64,
-    /// Sample time where no start controller gives one (s)
-    #[arg(long, value_name = "SECONDS", default_value_t = 39.6e-6)]
-    pub sample_time_s: f64,
+    /// Sample time of the controller where neither a start controller nor the spec says it (s)
+    #[arg(long, value_name = "SECONDS")]
+    pub sample_time_s: Option<f64>,
 }
 
 /// Where the PES comes from, by source, and what it would be under gains never run

@@ -1,0 +1,227 @@
+//! Tuning whose table is proved: search, proof, and again with as much more room as the proof lacked.
+//!
+//! In: a machine with its files, a spec, the box that the table is to hold over. Out: the outcome, its gain table and the certificate of that
+//! table. The search carries the corners of the box along; what the bounds add to them becomes room in the next round.
+//! Spec: `specs/certificate.md`.
+
+use super::{
+    Certificate, Inputs, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, Verdict, VerifyError, VerifySettings,
+    Word, certify,
+};
+use crate::controller::Controller;
+use crate::frf::Sweep;
+use crate::lti::{Body, Plant};
+use crate::tune::{GainTable, InputDigest, Machine, Outcome, Requirement, Spec, TuneSettings, tune_from};
+
+/// What a table is tuned and proved on.
+#[derive(Clone, Copy, Debug)]
+pub enum Ground<'a> {
+    /// A plant model and its file.
+    Plant {
+        /// The model.
+        plant: &'a Plant,
+        /// The file that the certificate names.
+        source: &'a Source,
+    },
+    /// A sweep, with the machine made from it.
+    Sweep {
+        /// The sweep.
+        sweep: &'a Sweep,
+        /// As it is tuned on.
+        machine: Machine<'a>,
+        /// How it was taken.
+        assumption: SweepAssumption,
+    },
+}
+
+/// A tuning that is to be proved.
+#[derive(Clone, Debug)]
+pub struct Assurance<'a> {
+    /// The machine.
+    pub ground: Ground<'a>,
+    /// Limits and objective.
+    pub spec: &'a Spec,
+    /// The spec's file, and the profile's.
+    pub spec_source: &'a Source,
+    /// See above.
+    pub profile: Option<&'a Source>,
+    /// Box around the plant; of a sweep the gain alone.
+    pub uncertainty: Uncertainty,
+    /// Controller to start from.
+    pub start: Option<&'a Controller>,
+    /// Units of position and command.
+    pub units: (&'a str, &'a str),
+    /// Digests of the inputs, for the table.
+    pub inputs: &'a [InputDigest],
+    /// The table's file, named in errors.
+    pub gains: &'a std::path::Path,
+}
+
+/// A tuned table with its certificate.
+#[derive(Clone, Debug)]
+pub struct Assured {
+    /// What the search says.
+    pub outcome: Outcome,
+    /// The table.
+    pub table: GainTable,
+    /// Its certificate; none where the limits are missed, and the reason where nothing can be proved.
+    pub certificate: Option<Result<Certificate, String>>,
+    /// Tunings.
+    pub rounds: usize,
+}
+
+/// Tunings at most.
+const ROUNDS: usize = 6;
+/// How far beyond what a bound lacks the next round keeps room.
+const BEYOND: f64 = 1.15;
+/// Most room that is asked for, as a share of a limit.
+const MOST: f64 = 0.6;
+/// Share of a later round's starts: the last table is near.
+const LATER: usize = 4;
+
+/// Tunes, proves, and tunes again with more room until the table is proved or a limit cannot have that much; `said` is told each round.
+pub fn tune_assured(
+    job: &Assurance<'_>,
+    settings: &TuneSettings,
+    said: &mut dyn FnMut(&str),
+) -> Result<Assured, VerifyError> {
+    let corners: Vec<Plant> = match &job.ground {
+        Ground::Plant { plant, .. } => corners(plant, &job.uncertainty),
+        Ground::Sweep { .. } => Vec::new(),
+    };
+    let machines: Vec<Machine<'_>> = match &job.ground {
+        Ground::Plant { plant, .. } => {
+            std::iter::once(Machine::Model(plant)).chain(corners.iter().map(Machine::Model)).collect()
+        }
+        Ground::Sweep { machine, .. } => vec![*machine],
+    };
+    let settings = TuneSettings { nominal_first: true, ..*settings };
+    let later = TuneSettings { starts: settings.starts.div_ceil(LATER), rounds: 2, ..settings };
+    let wanted = Requirement::list(&job.spec.margins, &job.spec.limits);
+    let mut spec = job.spec.clone();
+    let mut near: Vec<Controller> = Vec::new();
+    let mut best: Option<Assured> = None;
+    for round in 1..=ROUNDS {
+        let outcome = tune_from(&machines, &spec, job.start, &near, if round == 1 { &settings } else { &later })?;
+        let inputs = job.inputs.to_vec();
+        let sha256 = job.spec_source.sha256();
+        let table = GainTable::of_first(&outcome, spec.search.seed, sha256, inputs)?.in_units(job.units.0, job.units.1);
+        if outcome.tuned().is_none() || (best.is_some() && !matches!(outcome, Outcome::Tuned(_))) {
+            // That much room is not to be had: the table before stands, with what is proved of it.
+            return Ok(best.unwrap_or(Assured { outcome, table, certificate: None, rounds: round }));
+        }
+        let certificate = prove(job, &table);
+        let now = Assured { outcome, table, certificate: Some(certificate.map_err(|e| e.to_string())), rounds: round };
+        let Some(Ok(c)) = &now.certificate else { return Ok(now) };
+        let (lacking, grown) = room(c, &wanted, spec.guard, &mut spec.further_room);
+        if c.proved || !grown {
+            return Ok(if c.proved { now } else { better(best, now) });
+        }
+        said(&format!("proof, round {round}: {} without enough room; tuning again with more", lacking.join(", ")));
+        near = vec![now.outcome.controller().clone()];
+        best = Some(better(best, now));
+    }
+    match best {
+        Some(b) => Ok(b),
+        None => Err(VerifyError::NoRound),
+    }
+}
+
+/// The table with fewer limits left open; of equals the later one.
+fn better(before: Option<Assured>, now: Assured) -> Assured {
+    let open = |a: &Assured| match &a.certificate {
+        Some(Ok(c)) => c.cases.iter().flat_map(|c| &c.limits).filter(|l| l.verdict != Verdict::Proved).count(),
+        _ => usize::MAX,
+    };
+    match before {
+        Some(b) if open(&b) < open(&now) => b,
+        _ => now,
+    }
+}
+
+/// The certificate of a table that lies in no file yet.
+fn prove(job: &Assurance<'_>, table: &GainTable) -> Result<Certificate, VerifyError> {
+    let gains = Source { file: job.gains.to_owned(), text: table.text()? };
+    let (mut plants, mut sweeps, mut assumption) =
+        (Vec::new(), Vec::new(), SweepAssumption { least_damping: LEAST_DAMPING, hold_included: false });
+    match &job.ground {
+        Ground::Plant { source, .. } => plants.push((*source).clone()),
+        Ground::Sweep { sweep, assumption: how, .. } => {
+            sweeps.push((*sweep).clone());
+            assumption = *how;
+        }
+    }
+    let inputs = Inputs {
+        gains: &gains,
+        plants: &plants,
+        sweeps: &sweeps,
+        assumption,
+        spec: job.spec_source,
+        profile: job.profile,
+        word: Word::Double,
+        uncertainty: job.uncertainty,
+    };
+    certify(&inputs, &VerifySettings::default())
+}
+
+/// What each limit lacks to its proof is added to the room it keeps: the names of the lacking ones, and whether any room has grown.
+fn room(c: &Certificate, wanted: &[Requirement], guard: f64, room: &mut Vec<f64>) -> (Vec<String>, bool) {
+    room.resize(wanted.len(), 0.0);
+    let (mut names, mut grown) = (Vec::new(), false);
+    for case in &c.cases {
+        for ((limit, w), room) in case.limits.iter().zip(wanted).zip(room.iter_mut()) {
+            if limit.verdict == Verdict::Proved {
+                continue;
+            }
+            let lacks = match w.side {
+                crate::tune::Side::AtLeast => limit.proven.low.map(|low| 1.0 - low / limit.required),
+                crate::tune::Side::AtMost => limit.proven.high.map(|high| high / limit.required - 1.0),
+            };
+            // Without a bound there is nothing that room could mend.
+            let Some(lacks) = lacks.filter(|l| l.is_finite() && *l > 0.0) else { continue };
+            let more = (guard.max(*room) + BEYOND * lacks).min(MOST);
+            if more > *room {
+                *room = more;
+                grown = true;
+                names.push(limit.name.clone());
+            }
+        }
+    }
+    names.dedup();
+    (names, grown)
+}
+
+/// The corners of the box: every parameter at either end, those of the frequencies and of the dampings together.
+fn corners(plant: &Plant, u: &Uncertainty) -> Vec<Plant> {
+    let mut all = vec![plant.clone()];
+    let mut part = |share: f64, moved: &dyn Fn(&Plant, f64) -> Plant| {
+        if share > 0.0 {
+            all = all.iter().flat_map(|p| [moved(p, 1.0 - share), moved(p, 1.0 + share)]).collect();
+        }
+    };
+    part(u.gain, &|p, by| Plant { resonance_gain: p.resonance_gain * by, ..p.clone() });
+    part(u.delay, &|p, by| Plant { delay_s: p.delay_s * by, ..p.clone() });
+    part(u.frequency, &|p, by| {
+        let mut p = p.clone();
+        if let Body::SecondOrder { natural_frequency_rad_s, .. } = &mut p.body {
+            *natural_frequency_rad_s *= by;
+        }
+        for m in &mut p.modes {
+            m.zero_rad_s *= by;
+            m.pole_rad_s *= by;
+        }
+        p
+    });
+    part(u.damping, &|p, by| {
+        let mut p = p.clone();
+        if let Body::SecondOrder { damping_ratio, .. } = &mut p.body {
+            *damping_ratio *= by;
+        }
+        for m in &mut p.modes {
+            m.zero_damping_ratio *= by;
+            m.pole_damping_ratio *= by;
+        }
+        p
+    });
+    if u.any() { all } else { Vec::new() }
+}
