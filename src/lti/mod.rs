@@ -4,6 +4,7 @@
 //! Convention: s in rad/s, z = exp(j w T); `specs/conventions.md`. Sources: the paper's eqs. (1)-(3), (21), (29), (31).
 
 mod discrete;
+mod lanes;
 mod modal;
 mod plant;
 mod plant_file;
@@ -13,6 +14,7 @@ mod state;
 mod term_answers;
 
 pub use discrete::{DiscretePlant, Intersample, RealForm};
+pub use lanes::{CHUNK, LaneChunk, PlantLanes};
 pub use modal::{ModalForm, ModalTerm};
 pub use plant::{Body, LtiError, Mode, PhysicsEntry, Plant};
 pub use plant_file::PlantFile;

@@ -1,7 +1,8 @@
 //! Kernels in the widest registers that the processor has.
 //!
 //! In: a computation whose loops the compiler can spread over lanes. Out: the same numbers, sooner. No sum changes its order and nothing
-//! is fused, so that the result has the same bits on every processor.
+//! is fused but what the code itself writes as `mul_add`, so that the result has the same bits on every processor. (A processor without
+//! fused products, x86 from before 2013, computes `mul_add` in software: the same bits, slowly.)
 
 use pulp::Arch;
 

@@ -4,9 +4,11 @@
 //! Convention: PES = reference - position (+ run-out), amplitude |X_k|/N; spec: `specs/pes.md`.
 
 mod budget;
+mod correlate;
 mod dft;
 mod expected;
 mod figures;
+mod kernel;
 mod noise;
 mod physical;
 mod profile;
@@ -16,17 +18,20 @@ mod simulation;
 mod spectral;
 mod spectral_parts;
 mod spectral_slopes;
+mod step;
 mod window_frame;
 
 pub use budget::{Budget, PredictSettings, Prediction, Range, Source, SourceShare, budget, predict, predict_each};
 pub use dft::{Harmonic, WindowDft};
 pub use expected::{ExpectedNoise, NoiseWork};
 pub use figures::{HIGH_BAND_HZ, LOW_BAND_HZ, PesFigures, figures};
+pub use kernel::Slopes;
 pub use noise::runout;
 pub use physical::{context, simulate_physical};
 pub use profile::{Noise, PesClock, Profile, ProfileError, Runout, Spiral};
-pub use quick::{QuickScene, QuickWork};
+pub use quick::{Asked, Figure, QuickScene, QuickWork, Record};
 pub use reference::Reference;
 pub use simulation::{ClosedLoop, PesError, Scene, Workspace, simulate};
 pub use spectral::{SpectralPes, SpectralWork};
 pub use spectral_parts::{BinParts, SpectralParts};
+pub use step::{StepScene, StepWork};

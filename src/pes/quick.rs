@@ -1,224 +1,242 @@
-//! The write in a search's inner loop: the same equations as [`Scene::run`], laid out for speed.
+//! The write in a search's inner loop: the same equations as [`Scene::run`], laid out for speed, with slopes by one pass backward.
 //!
-//! In: a scene and its plant, once; then a chain of sections, thousands of times. Out: the window's PES and the largest command.
-//! Terms lie in arrays of fixed length, readings are kept for the window only. Sums run in another order than in
-//! [`Scene::run`], so the two agree to rounding, not to the bit; a test holds them together.
+//! In: a profile and its plant, once; then a chain of sections, thousands of times. Out: the window's PES and the command of the record
+//! without noise and of the record with the profile's own draw, side by side; slopes of any figure of theirs in every coefficient.
+//! Sums run in another order than in [`Scene::run`], so the two agree to rounding, not to the bit; tests hold them together.
 
-use super::Scene;
-use super::simulation::Workspace;
+use super::kernel::{Buffers, Drive, Loop, Reading, Run, Seen, Slopes, Track};
+use super::{Profile, ProfileError, Scene};
 use crate::controller::Feedforward;
-use crate::lti::{DiscretePlant, Section};
+use crate::lti::{DiscretePlant, PlantLanes, Section};
 
-/// A scene laid out for one plant.
-#[derive(Clone, Debug)]
-pub struct QuickScene(Layout);
+/// Which record of one write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Record {
+    /// Without encoder noise and windage; run-out is in it.
+    Still,
+    /// With the profile's own draw, as [`super::simulate`] reports it. Where the profile has no noise it is the still one.
+    Drawn,
+}
 
+/// What a run is asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Asked {
+    /// The record without noise.
+    pub still: bool,
+    /// The record with the profile's own draw.
+    pub drawn: bool,
+    /// The command up to the end of the write, not of the window only.
+    pub whole: bool,
+    /// Signals for a backward pass.
+    pub slopes: bool,
+}
+
+/// A figure seen backward: its slopes in what one record gave.
+#[derive(Clone, Copy, Debug)]
+pub struct Figure<'a> {
+    /// The record it is read off.
+    pub record: Record,
+    /// d figure / d PES at the window's samples; empty where it does not see them.
+    pub window: &'a [f64],
+    /// d figure / d command at the samples from the first number on: a peak is its own sample and the sign there.
+    pub command: (usize, &'a [f64]),
+}
+
+/// A write laid out for one plant.
+///
+/// ```
+/// use servotune::lti::{Body, DiscretePlant, Plant, Section};
+/// use servotune::pes::{Asked, Figure, Noise, PesClock, Profile, QuickScene, QuickWork, Record, Spiral};
+///
+/// let body = Body::FreeInertia { acceleration_gain: 1e7, viscous_rate_per_s: 0.0 };
+/// let (position_unit, command_unit) = ("um".into(), "A".into());
+/// let plant =
+///     Plant { position_unit, command_unit, body, delay_s: 1e-4, resonance_gain: 1.0, modes: vec![], physics: vec![] };
+/// let plant = DiscretePlant::of(&plant, 1e-4)?;
+/// let profile = Profile {
+///     spiral: Spiral { velocity: 10.0, distance: 0.2, acceleration_time_s: 5e-3, start_s: 1e-3, duration_s: 0.05 },
+///     pes: PesClock { sample_rate_hz: 9000.0, window: [20, 320] },
+///     noise: Noise { encoder_rms: 1e-3, ..Noise::default() },
+/// };
+/// let scene = QuickScene::new(&profile, &plant)?;
+/// let lead = Section { b0: 0.05, b1: -0.0485, b2: 0.0, a1: -0.5, a2: 0.0 };
+/// let mut work = QuickWork::default();
+///
+/// // Forward: both records in one pass, signals kept.
+/// scene.run(&[lead], None, Some(5.0), Asked { still: true, drawn: true, whole: true, slopes: true }, &mut work);
+/// let sum_of_squares: f64 = work.window(Record::Still).iter().map(|x| x * x).sum();
+/// let (at, peak) = work.peak(Record::Drawn);
+///
+/// // Backward: the slopes of both figures, two in one pass.
+/// let twice: Vec<f64> = work.window(Record::Still).iter().map(|x| 2.0 * x).collect();
+/// let sign = [work.command(Record::Drawn)[at].signum()];
+/// let figures = [
+///     Figure { record: Record::Still, window: &twice, command: (0, &[]) },
+///     Figure { record: Record::Drawn, window: &[], command: (at, &sign) },
+/// ];
+/// let mut slopes = Vec::new();
+/// scene.backward(&[lead], &figures, &mut work, &mut slopes);
+/// let [d_sum, d_peak] = [0, 1].map(|i| slopes[i].sections[0][0]);
+///
+/// // The same by moving b0.
+/// let h = 1e-7;
+/// scene.run(&[Section { b0: lead.b0 + h, ..lead }], None, Some(5.0), Asked { slopes: false, ..Asked::all() }, &mut work);
+/// let moved: f64 = work.window(Record::Still).iter().map(|x| x * x).sum();
+/// assert!(((moved - sum_of_squares) / h - d_sum).abs() < 1e-3 * d_sum.abs());
+/// assert!(((work.peak(Record::Drawn).1 - peak) / h - d_peak).abs() < 1e-3 * d_peak.abs());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
-enum Layout {
-    Two(Box<Terms<2>>),
-    Four(Box<Terms<4>>),
-    Eight(Box<Terms<8>>),
-    Sixteen(Box<Terms<16>>),
-    /// A double integrator or more terms than any of the above: the plain way.
-    Any(Box<(Scene, DiscretePlant)>),
+pub struct QuickScene {
+    run: Loop,
+    still: Drive<1>,
+    /// The drawn record alone, and both; none where the profile is without noise.
+    drawn: Option<Box<(Drive<1>, Drive<2>)>>,
+    /// Samples up to the window's end, and to the end of the write.
+    ends: [usize; 2],
 }
 
 /// Buffers of one thread.
 #[derive(Clone, Debug, Default)]
 pub struct QuickWork {
-    /// The window's PES.
-    pub window: Vec<f64>,
-    /// Commands with windage, D + 1 zeros ahead of sample 0.
-    acting: Vec<f64>,
-    plain: Option<Box<Workspace>>,
+    tracks: [Track; 2],
+    one: Buffers<1>,
+    two: Buffers<2>,
+    /// Where each record lies in `tracks`.
+    places: [usize; 2],
 }
 
-#[derive(Clone, Debug)]
-struct Terms<const N: usize> {
-    lambda: [[f64; N]; 2],
-    now: [[f64; N]; 2],
-    before: [[f64; N]; 2],
-    whole: usize,
-    /// Reference less encoder noise.
-    target: Vec<f64>,
-    windage: Vec<f64>,
-    velocity: Vec<f64>,
-    acceleration: Vec<f64>,
-    /// First sample at which anything moves.
-    first: usize,
-    readings: Vec<Reading<N>>,
+impl Asked {
+    /// Everything.
+    pub fn all() -> Asked {
+        Asked { still: true, drawn: true, whole: true, slopes: true }
+    }
 }
 
-#[derive(Clone, Debug)]
-struct Reading<const N: usize> {
-    sample: usize,
-    target: f64,
-    states: [[f64; N]; 2],
-    inputs: [f64; 2],
-}
+impl QuickWork {
+    fn track(&self, record: Record) -> &Track {
+        &self.tracks[self.places[record as usize]]
+    }
 
-fn padded<const N: usize>(x: &[f64]) -> [f64; N] {
-    std::array::from_fn(|i| x.get(i).copied().unwrap_or(0.0))
+    /// The window's PES of a record that the last run was asked for.
+    pub fn window(&self, record: Record) -> &[f64] {
+        &self.track(record).readings
+    }
+
+    /// The command of a record, from sample 0 to the end of the window or of the write.
+    pub fn command(&self, record: Record) -> &[f64] {
+        let t = self.track(record);
+        &t.command[..t.end]
+    }
+
+    /// The first sample with the largest |command|, and that size. Not a number wherever the command is not.
+    pub fn peak(&self, record: Record) -> (usize, f64) {
+        let larger = |a: (usize, f64), (k, u): (usize, &f64)| {
+            if u.abs() > a.1 || u.is_nan() { (k, u.abs()) } else { a }
+        };
+        self.command(record).iter().enumerate().fold((0, 0.0), larger)
+    }
 }
 
 impl QuickScene {
-    /// Lays a scene out for its plant.
-    pub fn of(scene: Scene, plant: &DiscretePlant) -> QuickScene {
-        let n = plant.numbers();
-        QuickScene(match n.lambda[0].len() {
-            _ if n.rigid => Layout::Any(Box::new((scene, plant.clone()))),
-            0..=2 => Layout::Two(Box::new(Terms::of(&scene, plant))),
-            3..=4 => Layout::Four(Box::new(Terms::of(&scene, plant))),
-            5..=8 => Layout::Eight(Box::new(Terms::of(&scene, plant))),
-            9..=16 => Layout::Sixteen(Box::new(Terms::of(&scene, plant))),
-            _ => Layout::Any(Box::new((scene, plant.clone()))),
-        })
+    /// Lays a write out for its plant.
+    pub fn new(profile: &Profile, plant: &DiscretePlant) -> Result<QuickScene, ProfileError> {
+        let scene = Scene::new(profile, plant)?;
+        let lanes = PlantLanes::of(plant);
+        let [from, to] = scene.window;
+        let (mut readings, mut weights) = (Vec::with_capacity(to - from), Vec::new());
+        for s in &scene.servo[from..to] {
+            let gains = lanes.reading(&s.reading, &mut weights);
+            readings.push(Reading { sample: s.controller_sample, target: s.target, gains });
+        }
+        let whole = scene.reference.len();
+        let ends = [readings.last().map_or(whole, |r| r.sample + 1), whole];
+        let moves = |x: &[f64]| x.iter().position(|r| *r != 0.0).unwrap_or(whole);
+        let first = moves(&scene.reference).min(moves(&scene.velocity)).min(moves(&scene.acceleration));
+        let still =
+            Drive { target: scene.reference.iter().map(|r| [*r]).collect(), windage: vec![[0.0]; whole], first };
+        let noisy = profile.noise.encoder_rms != 0.0 || profile.noise.windage_rms != 0.0;
+        let drawn = noisy.then(|| {
+            let target: Vec<f64> = scene.reference.iter().zip(&scene.encoder).map(|(r, e)| r - e).collect();
+            let one = Drive {
+                target: target.iter().map(|t| [*t]).collect(),
+                windage: scene.windage.iter().map(|w| [*w]).collect(),
+                first: 0,
+            };
+            let both = Drive {
+                target: scene.reference.iter().zip(&target).map(|(r, t)| [*r, *t]).collect(),
+                windage: scene.windage.iter().map(|w| [0.0, *w]).collect(),
+                first: 0,
+            };
+            Box::new((one, both))
+        });
+        let (velocity, acceleration) = (scene.velocity, scene.acceleration);
+        let run = Loop { plant: lanes, readings, weights, velocity, acceleration };
+        Ok(QuickScene { run, still, drawn, ends })
     }
 
-    /// Runs the write; the window's PES lies in `work`, the largest |command| is returned.
+    /// Whether the drawn record is another one than the still one.
+    pub fn has_noise(&self) -> bool {
+        self.drawn.is_some()
+    }
+
+    /// Samples of the window.
+    pub fn window_samples(&self) -> usize {
+        self.run.readings.len()
+    }
+
+    /// Runs the records asked for, from rest; they lie in `work` then. Allocates nothing once `work` has been used.
+    ///
+    /// A NaN or an overflow in a record means an unstable loop; the caller judges stability by the margins.
     pub fn run(
         &self,
         chain: &[Section],
         feedforward: Option<&Feedforward>,
         output_limit: Option<f64>,
+        asked: Asked,
         work: &mut QuickWork,
-    ) -> f64 {
-        match &self.0 {
-            Layout::Two(t) => t.run(chain, feedforward, output_limit, work),
-            Layout::Four(t) => t.run(chain, feedforward, output_limit, work),
-            Layout::Eight(t) => t.run(chain, feedforward, output_limit, work),
-            Layout::Sixteen(t) => t.run(chain, feedforward, output_limit, work),
-            Layout::Any(any) => {
-                let (scene, plant) = any.as_ref();
-                let plain = work.plain.get_or_insert_with(|| Box::new(scene.workspace(plant, chain.len())));
-                scene.run(plant, chain, feedforward, output_limit, plain);
-                work.window.clear();
-                work.window.extend_from_slice(scene.window(plain));
-                plain.command.iter().fold(0.0, |a, u| u.abs().max(a))
-            }
-        }
-    }
-}
-
-impl<const N: usize> Terms<N> {
-    fn of(scene: &Scene, plant: &DiscretePlant) -> Terms<N> {
-        let n = plant.numbers();
-        let pair = |x: [&[f64]; 2]| [padded(x[0]), padded(x[1])];
-        let [from, to] = scene.window;
-        let reading = |s: &super::simulation::ServoSample| Reading {
-            sample: s.controller_sample,
-            target: s.target,
-            states: pair(s.reading.states()),
-            inputs: s.reading.inputs(),
+    ) {
+        let run = Run {
+            chain,
+            forward: feedforward.map_or([0.0; 2], |f| [f.factor * f.velocity_s, f.factor * f.acceleration_s2]),
+            limit: output_limit.unwrap_or(f64::INFINITY),
+            end: self.ends[usize::from(asked.whole)],
+            kept: asked.slopes,
         };
-        Terms {
-            lambda: pair(n.lambda),
-            now: pair(n.now),
-            before: pair(n.before),
-            whole: n.whole,
-            target: scene.reference.iter().zip(&scene.encoder).map(|(r, e)| r - e).collect(),
-            windage: scene.windage.clone(),
-            velocity: scene.velocity.clone(),
-            acceleration: scene.acceleration.clone(),
-            first: scene.first,
-            readings: scene.servo[from..to].iter().map(reading).collect(),
-        }
-    }
-
-    fn run(&self, chain: &[Section], ff: Option<&Feedforward>, limit: Option<f64>, work: &mut QuickWork) -> f64 {
-        // A length known to the compiler keeps the chain in registers; longer chains than any firmware's take the slice.
-        match chain.len() {
-            1 => self.run_chain(&mut memory::<1>(chain), ff, limit, work),
-            2 => self.run_chain(&mut memory::<2>(chain), ff, limit, work),
-            3 => self.run_chain(&mut memory::<3>(chain), ff, limit, work),
-            4 => self.run_chain(&mut memory::<4>(chain), ff, limit, work),
-            5 => self.run_chain(&mut memory::<5>(chain), ff, limit, work),
-            6 => self.run_chain(&mut memory::<6>(chain), ff, limit, work),
-            _ => {
-                let mut long: Vec<_> = chain.iter().map(|s| (*s, [0.0; 2])).collect();
-                self.run_chain(long.as_mut_slice(), ff, limit, work)
+        let [first, second] = &mut work.tracks;
+        match (&self.drawn, asked.drawn, asked.still) {
+            (Some(both), true, true) => {
+                work.places = [0, 1];
+                self.run.forward(&both.1, &run, &mut work.two, [first, second]);
+            }
+            (Some(both), true, false) => {
+                work.places = [0, 1];
+                self.run.forward(&both.0, &run, &mut work.one, [second]);
+            }
+            (drawn, _, _) => {
+                work.places = if drawn.is_some() { [0, 1] } else { [0, 0] };
+                self.run.forward(&self.still, &run, &mut work.one, [first]);
             }
         }
     }
 
-    #[inline(always)]
-    fn run_chain<M: AsMut<[(Section, [f64; 2])]> + ?Sized>(
-        &self,
-        memory: &mut M,
-        ff: Option<&Feedforward>,
-        limit: Option<f64>,
-        work: &mut QuickWork,
-    ) -> f64 {
-        let ticks = self.target.len();
-        let lag = self.whole + 1;
-        work.acting.clear();
-        work.acting.resize(ticks + lag, 0.0);
-        work.window.clear();
-        let limit = limit.unwrap_or(f64::INFINITY);
-        let forward = ff.map_or([0.0; 2], |f| [f.factor * f.velocity_s, f.factor * f.acceleration_s2]);
-        let forwards = forward != [0.0; 2];
-        let (mut re, mut im) = ([0.0f64; N], [0.0f64; N]);
-        let mut peak = 0.0f64;
-        let mut next = 0;
-        while next < self.readings.len() && self.readings[next].sample < self.first {
-            work.window.push(self.readings[next].target);
-            next += 1;
+    /// Slopes of figures of the last run, which was asked for slopes, in every coefficient of its chain; two figures cost one pass.
+    ///
+    /// Where the output limit was reached the command does not move, and its slopes are 0.
+    pub fn backward(&self, chain: &[Section], figures: &[Figure<'_>], work: &mut QuickWork, out: &mut Vec<Slopes>) {
+        out.resize_with(figures.len(), Slopes::default);
+        let QuickWork { tracks, one, two, places } = work;
+        fn job<'a>(f: &Figure<'a>, tracks: &'a [Track; 2], places: [usize; 2]) -> (&'a Track, Seen<'a>) {
+            let seen = Seen { readings: f.window, command: f.command, positions: &[] };
+            (&tracks[places[f.record as usize]], seen)
         }
-        let mut due = self.readings.get(next).map_or(usize::MAX, |r| r.sample);
-        let acting = &mut work.acting[..ticks + lag];
-        let (target, windage) = (&self.target[..ticks], &self.windage[..ticks]);
-        for k in self.first..ticks {
-            let mut signal = target[k] - sum(&re);
-            for (s, m) in memory.as_mut() {
-                let out = s.b0 * signal + m[0];
-                m[0] = (s.b1 * signal + m[1]) - s.a1 * out;
-                m[1] = s.b2 * signal - s.a2 * out;
-                signal = out;
+        let job = |f| job(f, tracks, *places);
+        for (pair, out) in figures.chunks(2).zip(out.chunks_mut(2)) {
+            match (pair, out) {
+                ([a, b], [x, y]) => self.run.backward(chain, [job(a), job(b)], two, [x, y]),
+                ([a], [x]) => self.run.backward(chain, [job(a)], one, [x]),
+                _ => {}
             }
-            if forwards {
-                signal += forward[0] * self.velocity[k] + forward[1] * self.acceleration[k];
-            }
-            let u = signal.clamp(-limit, limit);
-            peak = peak.max(u.abs());
-            acting[k + lag] = u + windage[k];
-            let (now, before) = (acting[k + 1], acting[k]);
-            while due == k {
-                let r = &self.readings[next];
-                let mut position = [0.0; N];
-                for i in 0..N {
-                    position[i] = r.states[0][i] * re[i] + r.states[1][i] * im[i];
-                }
-                work.window.push(r.target - (sum(&position) + r.inputs[0] * now + r.inputs[1] * before));
-                next += 1;
-                due = self.readings.get(next).map_or(usize::MAX, |r| r.sample);
-            }
-            for i in 0..N {
-                let (a, b) = (re[i], im[i]);
-                let driven_re = self.now[0][i] * now + self.before[0][i] * before;
-                let driven_im = self.now[1][i] * now + self.before[1][i] * before;
-                re[i] = (self.lambda[0][i] * a - self.lambda[1][i] * b) + driven_re;
-                im[i] = (self.lambda[1][i] * a + self.lambda[0][i] * b) + driven_im;
-            }
-        }
-        peak
-    }
-}
-
-/// The chain at rest, its length known.
-fn memory<const S: usize>(chain: &[Section]) -> [(Section, [f64; 2]); S] {
-    std::array::from_fn(|i| (chain[i], [0.0; 2]))
-}
-
-/// A sum by halves: short in time, and in a fixed order.
-#[inline]
-fn sum<const N: usize>(x: &[f64; N]) -> f64 {
-    let mut partial = *x;
-    let mut width = N;
-    while width > 1 {
-        width /= 2;
-        for i in 0..width {
-            partial[i] += partial[i + width];
         }
     }
-    partial[0]
 }

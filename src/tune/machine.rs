@@ -6,7 +6,7 @@ use crate::feedback::{LoopOnGrid, MeasuredLoop, Pulls, ResponseCurve, SampledPla
 use crate::frf::Frf;
 use crate::lti::{DiscretePlant, Plant, Section, Sections};
 use crate::pes::{
-    ExpectedNoise, HIGH_BAND_HZ, LOW_BAND_HZ, NoiseWork, Profile, QuickScene, QuickWork, Scene, SpectralPes,
+    Asked, ExpectedNoise, HIGH_BAND_HZ, LOW_BAND_HZ, NoiseWork, Profile, QuickScene, QuickWork, Record, SpectralPes,
     SpectralWork, WindowDft,
 };
 use nalgebra::Complex;
@@ -148,15 +148,12 @@ impl Prepared {
                     return Err(TuneError::Physics { effect: p.effect.clone() });
                 }
                 let plant = DiscretePlant::of(plant, t)?;
-                // The search sees the write without noise and the noise by its expected power; one draw it would learn by heart.
-                let mut still = profile.clone();
-                (still.noise.encoder_rms, still.noise.windage_rms) = (0.0, 0.0);
-                let scene = if peak { Scene::new(&still, &plant)? } else { Scene::of_window(&still, &plant)? };
+                let scene = QuickScene::new(profile, &plant)?;
                 let [first, last] = profile.pes.window;
                 let dft = WindowDft::new(last - first, profile.pes.sample_rate_hz, bins);
                 let sampled = SampledPlant::of_model(&plant);
                 let noise = ExpectedNoise::of(profile, t, plant.integrators(), &plant, &dft).map(Box::new);
-                let source = Source::Model { scene: Box::new(QuickScene::of(scene, &plant)), dft, noise, peak };
+                let source = Source::Model { scene: Box::new(scene), dft, noise, peak };
                 Ok(Prepared { sampled, source })
             }
             Machine::Response { frf, hold, continuation } => {
@@ -190,8 +187,11 @@ impl Prepared {
     pub fn write(&self, c: &Controller, chain: &[Section], b: &mut Buffers, harmonics: &[usize], out: &mut PesScore) {
         let dft = match &self.source {
             Source::Model { scene, dft, noise, peak } => {
-                out.command_peak = scene.run(chain, c.feedforward.as_ref(), c.output_limit, &mut b.simulation);
-                dft.amplitudes(&b.simulation.window, &mut b.amplitude);
+                // The search sees the write without noise and the noise by its expected power; one draw it would learn by heart.
+                let asked = Asked { still: true, whole: *peak, ..Asked::default() };
+                scene.run(chain, c.feedforward.as_ref(), c.output_limit, asked, &mut b.simulation);
+                out.command_peak = b.simulation.peak(Record::Still).1;
+                dft.amplitudes(b.simulation.window(Record::Still), &mut b.amplitude);
                 if let Some(noise) = noise {
                     noise.add(chain, &mut b.noise, &mut b.amplitude);
                     out.command_peak += if *peak { noise.command(&mut b.noise) } else { 0.0 };
