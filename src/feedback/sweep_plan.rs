@@ -1,7 +1,7 @@
 //! The next sweep: the few tones that would narrow the intervals of the margins most.
 //!
 //! In: a measured response, a controller, what the machine bears. Out: tones with amplitudes, in the order of their worth, the widths before and
-//! after, and the machine time saved against sweeping every point again. Spec: `specs/performance_limit.md`.
+//! after, and the machine time saved against sweeping every point again. Spec: `specs/performance.md`.
 
 use super::measured::{MeasuredLoop, MeasuredMargins, measured_margins};
 use super::{FeedbackError, Interval};

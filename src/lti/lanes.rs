@@ -123,7 +123,10 @@ mod tests {
             for _ in 0..80 {
                 let before = line[lanes.whole];
                 let y = z.iter().flat_map(|z| z[0]).sum::<f64>() + lanes.direct * before;
-                size = size.max(state.position().abs());
+                size = z
+                    .iter()
+                    .flat_map(|z| z[0])
+                    .fold(size.max(before.abs() * lanes.direct.abs()), |m, z| m.max(z.abs()));
                 // Rounding of a sum of eight states.
                 assert!((y - state.position()).abs() <= 1e-12 * size, "{y} {}", state.position());
                 let u = random.normal();

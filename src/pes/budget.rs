@@ -1,7 +1,7 @@
 //! Where the PES comes from, and what it would be under gains never run.
 //!
 //! In: a plant, a controller, a profile. Out: the window's energy by source; a predicted range of its DFT norms. The loop is linear, so
-//! each source is simulated alone; noise by many draws. Convention: amplitudes as in `specs/pes.md`; spec: `specs/performance_limit.md`.
+//! each source is simulated alone; noise by many draws. Convention: amplitudes as in `specs/pes.md`; spec: `specs/performance.md`.
 
 use super::figures::{HIGH_BAND_HZ, LOW_BAND_HZ};
 use super::{Noise, PesError, Profile, Scene, WindowDft};

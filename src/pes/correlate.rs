@@ -34,3 +34,19 @@ pub(super) fn correlate(adjoint: &[f64], input: &[f64], output: &[f64]) -> [f64;
     }
     [slopes[0], slopes[1], slopes[2], -slopes[3], -slopes[4]]
 }
+
+/// Sum of products, in eight running sums.
+#[inline(always)]
+pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().min(b.len());
+    let ((a8, a1), (b8, b1)) = (a[..n].as_chunks::<LANES>(), b[..n].as_chunks::<LANES>());
+    let mut sum = [0.0; LANES];
+    for (a, b) in a8.iter().zip(b8) {
+        for j in 0..LANES {
+            sum[j] = a[j].mul_add(b[j], sum[j]);
+        }
+    }
+    let rest: f64 = a1.iter().zip(b1).map(|(a, b)| a * b).sum();
+    let half: [f64; 4] = std::array::from_fn(|j| sum[j] + sum[j + 4]);
+    (half[0] + half[1]) + (half[2] + half[3]) + rest
+}

@@ -3,11 +3,13 @@
 //! In: a sampled plant, a controller, a profile. Out: PES at the servo clock and its DFT, eqs. (40)-(44).
 //! Convention: PES = reference - position (+ run-out), amplitude |X_k|/N; spec: `specs/pes.md`.
 
+mod backward;
 mod budget;
 mod correlate;
 mod dft;
 mod expected;
 mod figures;
+mod forward;
 mod kernel;
 mod noise;
 mod physical;

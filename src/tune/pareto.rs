@@ -1,7 +1,7 @@
 //! The front of margin against objective: the same machines tuned again and again while one margin is tightened.
 //!
 //! In: machines, a spec, the range of Ms. Out: one point for each Ms, its objective the worst machine's. Every point is tuned as
-//! `tune` does it and judged exactly; a point that another beats in both is left out. Spec: `specs/performance_limit.md`.
+//! `tune` does it and judged exactly; a point that another beats in both is left out. Spec: `specs/performance.md`.
 
 use super::{Machine, Outcome, Spec, TuneError, TuneSettings, tune_from};
 use crate::controller::Controller;
