@@ -74,7 +74,7 @@ class Sampled:
         for _, r in self.plant.pairs:
             row += [2 * r.real, -2 * r.imag]
         row += [r for _, r in self.plant.reals]
-        return np.array(row + ([self.plant.double, 0.0] if self.plant.double else []))
+        return np.array(row + ([self.plant.double, self.plant.single] if self.plant.double else []))
 
     @cached_property
     def step(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -103,7 +103,7 @@ class Sampled:
         if self.plant.double:
             zm = np.expm1(1j * w * self.t)
             b1, b2 = late * late / 2 + (self.rest**2 / 2 + self.rest * late) * q, late + self.rest * q
-            value = value + self.plant.double * (b1 / zm + self.t * b2 / zm**2)
+            value = value + self.plant.double * (b1 / zm + self.t * b2 / zm**2) + self.plant.single * b2 / zm
         return value * q**self.whole
 
 

@@ -77,7 +77,8 @@ def machine(name: str, kind: str, text: str, rate_hz: float, crossover: tuple[fl
     # Windage: what moves the free plant by a thousandth of the distance at the crossover.
     wc = TAU * math.sqrt(crossover[0] * crossover[1])
     profile["noise"]["windage_rms"] = float(f"{1e-3 * distance / abs(p.response(np.array([wc]))[0]):.3g}")
-    return Machine(name, kind, p, text, t, crossover, profile, first)
+    fixed_bands = profile["pes"]["sample_rate_hz"] > 6100.0
+    return Machine(name, kind, p, text, t, crossover, profile, first and fixed_bands)
 
 
 def paper() -> list[Machine]:
@@ -160,8 +161,8 @@ def _two_actuators(vcm, pzt, vcm_f, pzt_f, damping, share) -> Plant:
             pairs.append((complex(q), complex(r)))
     for p, k in main:
         pairs.append((p, k / (p - p.conjugate()) / g(p)))
-    reals.append((0.0, (-rigid * dg(0.0) / g(0.0) ** 2).real))
-    return Plant(tuple(pairs), tuple(reals), (rigid / g(0.0)).real, 0.0, "track", "V")
+    single = (-rigid * dg(0.0) / g(0.0) ** 2).real
+    return Plant(tuple(pairs), tuple(reals), (rigid / g(0.0)).real, single, 0.0, "track", "V")
 
 
 def stages(rng: np.random.Generator) -> list[Machine]:
@@ -256,7 +257,7 @@ def voice_coils(rng: np.random.Generator) -> list[Machine]:
             w, z = TAU * hz * u(0.94, 1.06), u(0.008, 0.02)
             p = w * complex(-z, math.sqrt(1 - z * z))
             terms.append((p, share * u(0.7, 1.3) * accel / (2j * p.imag)))
-        p = Plant(tuple(terms), (), 0.0, u(18e-6, 34e-6), "track", "A")
+        p = Plant(tuple(terms), (), 0.0, 0.0, u(18e-6, 34e-6), "track", "A")
         out.append(machine(f"vcm_{i + 1}", "voice coil", p.modal_toml(), 20_000.0, (500.0, 1100.0), 10.0, False))
     return out
 

@@ -1,6 +1,6 @@
 """A linear plant as a sum of simple fractions, and the plant.toml that says the same.
 
-P(s) = exp(-delay s) [ sum r_i/(s - p_i) + c2/s^2 ]; every pole but a double one at 0 is simple. Written from the file contract alone.
+P(s) = exp(-delay s) [ sum r_i/(s - p_i) + c2/s^2 + c1/s ]; every pole but a double one at 0 is simple. Written from the file contract alone.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ class Plant:
     pairs: tuple[tuple[complex, complex], ...]
     reals: tuple[tuple[float, float], ...]
     double: float = 0.0
+    single: float = 0.0
+    """Factor of 1/s beside a double pole at rest; 0 where there is none."""
     delay_s: float = 0.0
     position_unit: str = "track"
     command_unit: str = "V"
@@ -37,7 +39,7 @@ class Plant:
     def response(self, w_rad_s: np.ndarray) -> np.ndarray:
         """P(j w), delay included, hold not."""
         s = 1j * np.asarray(w_rad_s, float)
-        value = self.double / (s * s)
+        value = self.double / (s * s) + self.single / s
         for p, r in self.pairs:
             value = value + r / (s - p) + r.conjugate() / (s - p.conjugate())
         for p, r in self.reals:
@@ -49,7 +51,7 @@ class Plant:
         lines = [f'position_unit = "{self.position_unit}"', f'command_unit = "{self.command_unit}"', "[plant]"]
         lines += ['form = "residues"', f"delay_s = {self.delay_s!r}"]
         if self.double:
-            lines.append(f"double_integrator = {float(self.double)!r}")
+            lines += [f"double_integrator = {float(self.double)!r}", f"single_integrator = {float(self.single)!r}"]
         for p, r in self.pairs:
             lines += ["[[plant.terms]]", f"pole = [{float(p.real)!r}, {float(p.imag)!r}]", f"residue = [{float(r.real)!r}, {float(r.imag)!r}]"]
         for p, r in self.reals:
@@ -82,7 +84,7 @@ def from_roots(zeros: list[complex], poles: list[complex], gain: float, delay_s:
                 value /= s - down[i]
         return value
 
-    pairs, reals, double = [], [], 0.0
+    pairs, reals, double, single = [], [], 0.0, 0.0
     for i, p in enumerate(others):
         near = min((abs(p - q) / abs(p) for k, q in enumerate(others) if k != i), default=1.0)
         if near < 1e-9:
@@ -98,9 +100,8 @@ def from_roots(zeros: list[complex], poles: list[complex], gain: float, delay_s:
             reals.append((0.0, g.real))
         else:
             slope = g * (sum(-1 / z for z in zeros) - sum(-1 / p for p in others))
-            double = g.real
-            reals.append((0.0, slope.real))
-    return Plant(tuple(pairs), tuple(reals), double, delay_s, *units)
+            double, single = g.real, slope.real
+    return Plant(tuple(pairs), tuple(reals), double, single, delay_s, *units)
 
 
 def from_document(d: dict) -> Plant:
@@ -136,7 +137,7 @@ def _from_terms(t: dict, delay: float, units: tuple[str, str]) -> Plant:
             reals.append((p.real, r.real))
         elif p.imag > 0.0:
             pairs.append((p, r))
-    return Plant(tuple(pairs), tuple(reals), t.get("double_integrator", 0.0), delay, *units)
+    return Plant(tuple(pairs), tuple(reals), t.get("double_integrator", 0.0), t.get("single_integrator", 0.0), delay, *units)
 
 
 def _from_zeros_and_poles(t: dict, delay: float, units: tuple[str, str]) -> Plant:
