@@ -38,20 +38,14 @@ def roots_toml(units: tuple[str, str], zeros: list[complex], poles: list[complex
     """Zeros, poles and the factor before prod(s - z)/prod(s - p)."""
 
     def rows(roots: list[complex]) -> str:
-        return "[" + ", ".join(f"[{complex(r).real!r}, {complex(r).imag!r}]" for r in roots) + "]"
+        return "[" + ", ".join(f"[{float(r.real)!r}, {float(r.imag)!r}]" for r in roots) + "]"
 
     return (
-        f'position_unit = "{units[0]}"\ncommand_unit = "{units[1]}"\n[plant]\nform = "zeros_poles"\n'
-        f"gain = {float(gain)!r}\ndelay_s = {float(delay_s)!r}\nzeros_rad_s = {rows(zeros)}\npoles_rad_s = {rows(poles)}\n"
+        f'position_unit = "{units[0]}"\ncommand_unit = "{units[1]}"\n[plant]\n'
+        f"gain = {float(gain)!r}\ndelay_s = {float(delay_s)!r}\n"
+        + (f"zeros_rad_s = {rows(zeros)}\n" if len(zeros) else "")
+        + f"poles_rad_s = {rows(poles)}\n"
     )
-
-
-def product_toml_of(p: Plant) -> str:
-    """A sum of modes in the same form; every one here has it."""
-    text = product.product_toml(p)
-    if text is None:
-        raise ValueError("this sum of modes has no product of pairs")
-    return text
 
 
 def free_body(acceleration_gain: float, viscous: float) -> dict:
@@ -86,8 +80,8 @@ def machine(name: str, kind: str, text: str, rate_hz: float, crossover: tuple[fl
     # Windage: what moves the free plant by a thousandth of the distance at the crossover.
     wc = TAU * math.sqrt(crossover[0] * crossover[1])
     profile["noise"]["windage_rms"] = float(f"{1e-3 * distance / abs(p.response(np.array([wc]))[0]):.3g}")
-    fixed_bands = profile["pes"]["sample_rate_hz"] > 6100.0
-    return Machine(name, kind, p, text, t, crossover, profile, first and fixed_bands)
+    before = product.product_toml(p) if first and profile["pes"]["sample_rate_hz"] > 6100.0 else None
+    return Machine(name, kind, p, text, t, crossover, profile, before)
 
 
 def paper() -> list[Machine]:
@@ -98,7 +92,7 @@ def paper() -> list[Machine]:
     for name in ("healthy", "sensor_fault", "loose_pushpin", "tunable"):
         text = (ROOT / f"specs/machines/{name}.toml").read_text(encoding="utf-8")
         p = from_document(tomllib.loads(text))
-        out.append(Machine(f"paper_{name}", "spiral writer", p, text, 39.6e-6, (350.0, 900.0), profile, True))
+        out.append(Machine(f"paper_{name}", "spiral writer", p, text, 39.6e-6, (350.0, 900.0), profile, text))
     return out
 
 
@@ -116,8 +110,20 @@ def benchmark(data: Path) -> list[Machine]:
         for share in (1.0, 1.05, 0.95):
             p = _two_actuators(vcm, pzt, vcm_f, pzt_f, damping, share)
             name = f"hdd_{word}_{round(100 * (share - 1)):+d}".replace("+0", "0").replace("+", "plus").replace("-", "minus")
-            out.append(machine(name, "HDD benchmark", product_toml_of(p), 50_400.0, (600.0, 1700.0), 1.0, True))
+            out.append(machine(name, "HDD benchmark", roots_toml(("track", "V"), *_roots_of(p), 0.0), 50_400.0, (600.0, 1700.0), 1.0, True))
     return out
+
+
+def _roots_of(p: Plant) -> tuple[list[complex], list[complex], float]:
+    """Zeros, poles and leading factor; conjugates exact, real ones real."""
+
+    def neat(roots: np.ndarray) -> list[complex]:
+        upper = [complex(z) for z in roots if z.imag > 1e-9 * abs(z)]
+        return [complex(z.real) for z in roots if abs(z.imag) <= 1e-9 * abs(z)] + [w for z in upper for w in (z, z.conjugate())]
+
+    zeros, poles = neat(product.zeros(p)), neat(p.poles())
+    leading = p.double + 2 * sum((r * q).real for q, r in p.pairs) + sum(r * q for q, r in p.reals)
+    return zeros, poles, leading
 
 
 def _two_actuators(vcm, pzt, vcm_f, pzt_f, damping, share) -> Plant:
@@ -258,16 +264,14 @@ def voice_coils(rng: np.random.Generator) -> list[Machine]:
     out = []
     for i in range(3):
         u = rng.uniform
-        pivot, damping = TAU * u(40.0, 80.0), u(0.15, 0.4)
         accel = u(1.5e8, 4e8)
-        body = pivot * complex(-damping, math.sqrt(1 - damping * damping))
-        terms = [(body, accel / (2j * body.imag))]
-        for k, (hz, share) in enumerate(((900.0, 0.04), (2200.0, -0.12), (3600.0, 0.1), (4900.0, -0.5), (7200.0, -0.2), (9000.0, 0.15))):
-            w, z = TAU * hz * u(0.94, 1.06), u(0.008, 0.02)
-            p = w * complex(-z, math.sqrt(1 - z * z))
-            terms.append((p, share * u(0.7, 1.3) * accel / (2j * p.imag)))
-        p = Plant(tuple(terms), (), 0.0, 0.0, u(18e-6, 34e-6), "track", "A")
-        out.append(machine(f"vcm_{i + 1}", "voice coil", product_toml_of(p), 20_000.0, (500.0, 1100.0), 10.0, True))
+        terms = [(TAU * u(40.0, 80.0), u(0.15, 0.4), accel)]
+        for hz, share in ((900.0, 0.04), (2200.0, -0.12), (3600.0, 0.1), (4900.0, -0.5), (7200.0, -0.2), (9000.0, 0.15)):
+            terms.append((TAU * hz * u(0.94, 1.06), u(0.008, 0.02), share * u(0.7, 1.3) * accel))
+        text = f'position_unit = "track"\ncommand_unit = "A"\n[plant]\ndelay_s = {u(18e-6, 34e-6)!r}\n'
+        for w, d, gain in terms:
+            text += f"[[plant.residue]]\ngain = {gain!r}\nfrequency_rad_s = {w!r}\ndamping_ratio = {d!r}\n"
+        out.append(machine(f"vcm_{i + 1}", "voice coil", text, 20_000.0, (500.0, 1100.0), 10.0, True))
     return out
 
 
@@ -316,6 +320,9 @@ def write(machines: list[Machine], folder: Path) -> None:
     index = {}
     for m in machines:
         (folder / f"{m.name}.toml").write_text(m.toml, encoding="utf-8")
+        if m.before is not None:
+            (folder / "before").mkdir(exist_ok=True)
+            (folder / f"before/{m.name}.toml").write_text(m.before, encoding="utf-8")
         index[m.name] = {"kind": m.kind, "sample_time_s": m.sample_time_s, "first_edition": m.first_edition}
     (folder / "index.json").write_text(json.dumps(index, indent=1), encoding="utf-8")
 

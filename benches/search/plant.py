@@ -46,18 +46,6 @@ class Plant:
             value = value + r / (s - p)
         return value * np.exp(-s * self.delay_s)
 
-    def modal_toml(self) -> str:
-        """The same as `[plant] form = "residues"`."""
-        lines = [f'position_unit = "{self.position_unit}"', f'command_unit = "{self.command_unit}"', "[plant]"]
-        lines += ['form = "residues"', f"delay_s = {self.delay_s!r}"]
-        if self.double:
-            lines += [f"double_integrator = {float(self.double)!r}", f"single_integrator = {float(self.single)!r}"]
-        for p, r in self.pairs:
-            lines += ["[[plant.terms]]", f"pole = [{float(p.real)!r}, {float(p.imag)!r}]", f"residue = [{float(r.real)!r}, {float(r.imag)!r}]"]
-        for p, r in self.reals:
-            lines += ["[[plant.terms]]", f"pole = [{float(p)!r}, 0.0]", f"residue = [{float(r)!r}, 0.0]"]
-        return "\n".join(lines) + "\n"
-
 
 def pair_roots(w: float, d: float) -> list[complex]:
     """Roots of s^2 + 2 d w s + w^2."""
@@ -110,10 +98,11 @@ def from_document(d: dict) -> Plant:
     if t.get("physics"):
         raise ValueError("linear plants only")
     delay = t.get("delay_s", 0.0)
-    if "terms" in t:
-        return _from_terms(t, delay, units)
+    if "residue" in t:
+        return _from_residues(t["residue"], delay, units)
     if "poles_rad_s" in t:
-        return _from_zeros_and_poles(t, delay, units)
+        zeros = [complex(*z) for z in t.get("zeros_rad_s", [])]
+        return from_roots(zeros, [complex(*p) for p in t["poles_rad_s"]], t["gain"], delay, units)
     gain = t.get("resonance_gain", 1.0)
     if t["natural_frequency_rad_s"] == 0.0:
         gain *= t["acceleration_gain"]
@@ -129,21 +118,13 @@ def from_document(d: dict) -> Plant:
     return from_roots(zeros, poles, gain, delay, units)
 
 
-def _from_terms(t: dict, delay: float, units: tuple[str, str]) -> Plant:
-    pairs, reals = [], []
-    for term in t["terms"]:
-        p, r = complex(*term["pole"]), complex(*term["residue"])
-        if p.imag == 0.0:
-            reals.append((p.real, r.real))
-        elif p.imag > 0.0:
-            pairs.append((p, r))
-    return Plant(tuple(pairs), tuple(reals), t.get("double_integrator", 0.0), t.get("single_integrator", 0.0), delay, *units)
-
-
-def _from_zeros_and_poles(t: dict, delay: float, units: tuple[str, str]) -> Plant:
-    zeros = [complex(*z) for z in t.get("zeros_rad_s", [])]
-    poles = [complex(*p) for p in t["poles_rad_s"]]
-    return from_roots(zeros, poles, t["gain"], delay, units)
+def _from_residues(terms: list[dict], delay: float, units: tuple[str, str]) -> Plant:
+    """Sum of gain/(s^2 + 2 d w s + w^2), every term a light mode."""
+    pairs = []
+    for term in terms:
+        pole = pair_roots(term["frequency_rad_s"], term["damping_ratio"])[0]
+        pairs.append((pole, term["gain"] / (2j * pole.imag)))
+    return Plant(tuple(pairs), (), 0.0, 0.0, delay, *units)
 
 
 def read(path: Path) -> Plant:
@@ -163,5 +144,9 @@ class Machine:
     crossover_hz: tuple[float, float]
     """Crossovers between which a random controller is laid."""
     profile: dict = field(default_factory=dict)
-    first_edition: bool = False
-    """The program of before this bench can read the plant, and its fixed bands make sense on it."""
+    before: str | None = None
+    """The plant in the first form of plant.toml, where it has one and the fixed bands of the first edition make sense on it."""
+
+    @property
+    def first_edition(self) -> bool:
+        return self.before is not None

@@ -16,6 +16,7 @@ import math
 import os
 import subprocess
 import time
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -25,11 +26,16 @@ import law as laws
 import machines
 import page
 import plant as plants
+import toml_text
 
 HERE = Path(__file__).resolve().parent
 REFERENCE = HERE / "reference.json"
 MET = 1e-4
 """The judge's own figures and the program's may differ by rounding of their grids; a table counts as meeting its limits within this."""
+
+
+LONGEST_S = 300.0
+"""A run that takes longer counts as broken."""
 
 
 class Judges:
@@ -45,12 +51,15 @@ class Judges:
         return judge.judge(self._kept[key], spec, profile, law)
 
 
-def specs_of(folder: Path, only: str, unseen: bool) -> list[str]:
+def specs_of(folder: Path, only: str, unseen: bool, on: str) -> list[str]:
+    """Names of specs that begin with `only`, on machines that begin with one of the words of `on`."""
     names = sorted(p.name for p in (folder / "specs").iterdir() if p.is_dir())
-    return [n for n in names if n.startswith(only) and n.startswith("u") == unseen]
+    names = [n for n in names if n.startswith(only) and n.startswith("u") == unseen]
+    machine = lambda n: json.loads((folder / "specs" / n / "meta.json").read_text())["machine"]  # noqa: E731
+    return [n for n in names if machine(n).startswith(tuple(on.split(",")))]
 
 
-def tune(program: str, folder: Path, name: str, label: str, words: list[str], before: bool) -> dict | None:
+def tune(program: str, folder: Path, name: str, label: str, words: list[str], before: bool, seed: int | None) -> dict | None:
     """One run of the program: exit code, verdict, objective as it says, wall time."""
     here, table = folder / "specs" / name, folder / "tables" / label / f"{name}.toml"
     table.parent.mkdir(parents=True, exist_ok=True)
@@ -64,16 +73,21 @@ def tune(program: str, folder: Path, name: str, label: str, words: list[str], be
             return None
         path = here / "first_edition.toml"
         path.write_text(text, encoding="utf-8")
-    line = [program, "tune", "--json", "--plant", str(folder / f"machines/{meta['machine']}.toml"), "--spec", str(path), "--out", str(table)]
+    if seed is not None:
+        path = here / f"seed_{seed}.toml"
+        document = tomllib.loads(text) if before else spec
+        path.write_text(toml_text.text({**document, "search": {**document["search"], "seed": seed}}), encoding="utf-8")
+    plant = f"machines/{'before/' if before else ''}{meta['machine']}.toml"
+    line = [program, "tune", "--json", "--plant", str(folder / plant), "--spec", str(path), "--out", str(table)]
     line += ["--no-certificate", *words]
     if before:
         line += ["--sample-time-s", repr(spec["sample_time_s"])]
     began = time.perf_counter()
     try:
-        done = subprocess.run(line, capture_output=True, text=True, timeout=600, check=False)
+        done = subprocess.run(line, capture_output=True, text=True, timeout=LONGEST_S, check=False)
     except subprocess.TimeoutExpired:
-        return {"id": name, "code": -1, "time_s": 600.0, "error": "timeout"}
-    out = {"id": name, "code": done.returncode, "time_s": time.perf_counter() - began}
+        return {"id": name, "seed": seed, "code": -1, "time_s": LONGEST_S, "error": "timeout"}
+    out = {"id": name, "seed": seed, "code": done.returncode, "time_s": time.perf_counter() - began}
     try:
         said = json.loads(done.stdout)
     except json.JSONDecodeError:
@@ -119,6 +133,15 @@ def update_reference(folder: Path, outcomes: list[dict], source: str) -> int:
     return better
 
 
+def keep(file: Path, outcomes: list[dict]) -> None:
+    """Adds to what the file holds of other specs and seeds, so that a run can go on where it was stopped."""
+    fresh = {(o["id"], o["seed"]) for o in outcomes}
+    old = [o for o in json.loads(file.read_text()) if (o["id"], o["seed"]) not in fresh] if file.exists() else []
+    whole = file.with_suffix(".part")
+    whole.write_text(json.dumps(sorted(old + outcomes, key=lambda o: o["id"]), indent=1), encoding="utf-8")
+    whole.rename(file)
+
+
 def witnesses(folder: Path, names: list[str]) -> list[dict]:
     """The controllers from which the specs were made, as outcomes."""
     out = []
@@ -138,31 +161,31 @@ def main() -> None:
     a.add_argument("--seeds", default="")
     a.add_argument("--label", default=None)
     a.add_argument("--only", default="")
+    a.add_argument("--on", default="", help="only machines whose names begin with one of these words, comma between them")
     a.add_argument("--every", type=int, default=1, help="only one spec in so many")
     a.add_argument("--unseen", action="store_true")
     a.add_argument("--reference", action="store_true")
     a.add_argument("--page", action="store_true")
+    a.add_argument("--words", default="", help="further words for the program")
     a.add_argument("--parallel", type=int, default=2)
     w = a.parse_args()
-    names = specs_of(w.folder, w.only, w.unseen)[:: w.every]
+    names = specs_of(w.folder, w.only, w.unseen, w.on)[:: w.every]
     label = w.label or ("before" if w.before else "reference" if w.reference else "now")
     runs = w.folder / "runs"
     runs.mkdir(parents=True, exist_ok=True)
     if not w.page:
         os.environ.setdefault("RAYON_NUM_THREADS", "1")
         judges, outcomes = Judges(w.folder), []
-        words = ["--starts", str(w.starts)] if w.starts else []
+        words = (["--starts", str(w.starts)] if w.starts else []) + w.words.split()
         for seed in w.seeds.split(",") if w.seeds else [""]:
-            more = words + (["--seed", seed] if seed else [])
-
             def one(name: str) -> dict | None:
-                return tune(w.before or w.program, w.folder, name, label + seed, more, bool(w.before))
+                return tune(w.before or w.program, w.folder, name, label + seed, words, bool(w.before), int(seed) if seed else None)
 
             with ThreadPoolExecutor(w.parallel) as pool:
                 for o in pool.map(one, names):
                     if o is not None:
                         outcomes.append(judged(judges, w.folder, label + seed, o))
-        (runs / f"{label}.json").write_text(json.dumps(outcomes, indent=1), encoding="utf-8")
+                        keep(runs / f"{label}.json", outcomes)
         better = update_reference(w.folder, outcomes + witnesses(w.folder, names), label)
         print(f"{len(outcomes)} outcomes, {better} of the reference better than before")
     page.write(w.folder, REFERENCE, machines.ROOT / "results/search.md", MET)
