@@ -31,6 +31,7 @@ CHAINS = (
     ("belt_1", "max_sensitivity"), ("bearing_1", "max_sensitivity"), ("hdd_room_0", "max_sensitivity"),
     ("vcm_2", "phase_margin_deg"), ("galvo_2", "phase_margin_deg"), ("stage_3", "gain_margin_db"),
 )  # fmt: skip
+CONVEX = ("paper_healthy", "paper_loose_pushpin", "stage_1", "gantry_2", "galvo_1", "galvo_3", "belt_1", "bearing_3")
 CHAIN_STEPS = (0.9, 0.95, 1.02, 1.1, 1.2, 1.35)
 FILTER_S = 12e-6
 
@@ -312,7 +313,35 @@ def make(out: Path, every: list[Machine], seed: int) -> int:
         m, spec, why = infeasible(rng(), maker, i)
         write(folder / f"x{i:02}", m, spec, "infeasible", None, maker, first_edition=False, why=why)
         count += 1
+    for name in CONVEX:
+        m, r = maker.every[name], rng()
+        spec, law = largest_integral(r, m, maker)
+        write(folder / f"p_{name}", m, spec, "peers", law, maker, first_edition=False)
     return count
+
+
+def largest_integral(rng: np.random.Generator, m: Machine, maker: Maker) -> tuple[dict, Law]:
+    """PID alone with a fixed filter, Ms and a ceiling on T: what a sequence of cone programmes can solve too. Beside the three hundred."""
+    bench, best = maker.bench(m), None
+    for _ in range(12):
+        law = witness.draw(rng, m, bench, "pid", 0, 0, float(f"{0.5 * m.sample_time_s:.3g}"))
+        if law and (best is None or bench.loop.margins(law).max_sensitivity < bench.loop.margins(best).max_sensitivity):
+            best = law
+    if best is None:
+        raise RuntimeError(f"no PID loop found for {m.name}")
+    nyquist = 0.5 / m.sample_time_s
+    ceiling = {"of": "T", "side": "at_most", "hz": [1e-4 * nyquist, 0.95 * nyquist], "db": [0.0, 0.0]}
+    high = 20 * math.log10(1 + judge.curve(bench, best.rows(), ceiling)) + 0.3
+    spec = {
+        "sample_time_s": m.sample_time_s,
+        "guard": 0.0,
+        "objective": {"minimise": "integral"},
+        "margins": {"max_sensitivity": 1.01 * bench.loop.margins(best).max_sensitivity},
+        "limits": {"curve": [{**ceiling, "db": [high, high]}]},
+        "search": {"seed": 1, "notches": 0, "lowpasses": 0},
+        "structure": {"controller": "pid", "derivative_filter_s": best.derivative_filter_s},
+    }
+    return spec, best
 
 
 def main() -> None:

@@ -201,11 +201,21 @@ def step(s: Sampled, law: Law) -> tuple[float, float]:
     slowest = abs(np.linalg.eigvals(c.a)).max()
     if slowest >= 1:
         return np.inf, np.inf
-    length = int(np.clip(np.log(1e-5) / np.log(slowest), 50, 60_000))
-    x, y = np.zeros(len(c.a)), np.zeros(length)
-    for k in range(length):
-        y[k] = s.c @ x[: c.n]
-        x = c.a @ x + c.b_r
+    length = int(np.clip(np.log(1e-5) / np.log(slowest), 50, 400_000))
+    # Homogeneous with the step as one more state; a block of outputs is one product.
+    n, block = len(c.a), 256
+    m = np.zeros((n + 1, n + 1))
+    m[:n, :n], m[:n, n], m[n, n] = c.a, c.b_r, 1.0
+    rows = [np.concatenate([s.c, np.zeros(n + 1 - len(s.c))])]
+    for _ in range(block - 1):
+        rows.append(rows[-1] @ m)
+    outputs, jump = np.array(rows), np.linalg.matrix_power(m, block)
+    x, parts = np.zeros(n + 1), []
+    x[n] = 1.0
+    for _ in range(0, length, block):
+        parts.append(outputs @ x)
+        x = jump @ x
+    y = np.concatenate(parts)
     final = y[-1] if abs(y[-1] - 1) > 0.019 else 1.0
     outside = np.nonzero(abs(y - final) > 0.02)[0]
     return 100 * max(y.max() - 1, 0.0), (outside[-1] + 1) * s.t if len(outside) else 0.0
