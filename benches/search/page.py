@@ -123,7 +123,8 @@ def write(folder: Path, reference: Path, page: Path, met: float) -> None:
     lines = ["# Search: three hundred specs", ""]
     lines += ["Made by `python benches/search/run.py` (see `benches/search/README.md`). Objectives and limits are the judge's (`judge.py`), which shares no code",
               f"with the program; a table counts as meeting its limits within {met:g} of each. Best known: the least objective of any table that does, ever found, from",
-              "`benches/search/reference.json`. Of the objective `room` the difference of the rooms counts. Times are of the whole command, two at a time, one thread each.", ""]  # fmt: skip
+              "`benches/search/reference.json`. Of the objective `room` the difference of the rooms counts. Times are of the whole command, two at a time, one thread each.",
+              "The program of before held only the named crossing to `gain_crossover_hz`; the judge holds every one.", ""]  # fmt: skip
     lines += ["| | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
     lines += [f"| {word} | " + " | ".join(str(f(n)) for n in columns) + " |" for word, f in rows]
     for key, title in (("machine_kind", "By kind of machine"), (None, "By objective")):

@@ -3,7 +3,7 @@
     python run.py --program target/release/servotune [--starts N] [--seed N] [--only PREFIX] [--unseen]
     python run.py --before PATH              the program of before, on what the first edition can say
     python run.py --reference --starts 1200 --seeds 1,2,3     many times the work; the best ever found is kept in reference.json
-    python run.py --page                     the page again from what was kept
+    python run.py --page                     the reference and the page again from the runs that were kept
 
 Tables stay in target/search/tables/LABEL/ID.toml, outcomes in target/search/runs/LABEL.json.
 """
@@ -120,17 +120,36 @@ def judged(judges: Judges, folder: Path, label: str, outcome: dict) -> dict:
 def update_reference(folder: Path, outcomes: list[dict], source: str) -> int:
     """The best feasible objective of each spec, from tables that the judge finds to meet every limit."""
     known = json.loads(REFERENCE.read_text()) if REFERENCE.exists() else {}
-    better = 0
+    better, known_ids = 0, {p.name for p in (folder / "specs").iterdir()}
     for o in outcomes:
-        if o.get("objective") is None or o["worst"] > MET or not math.isfinite(o["objective"]):
+        if o["id"] not in known_ids or o.get("objective") is None or o["worst"] > MET or not math.isfinite(o["objective"]):
             continue
         digest = json.loads((folder / "specs" / o["id"] / "meta.json").read_text())["digest"]
         old = known.get(o["id"])
         if old is None or old["digest"] != digest or o["objective"] < old["objective"] - 1e-9 * abs(old["objective"]):
             known[o["id"]] = {"objective": o["objective"], "source": source, "digest": digest}
             better += 1
+    _along_chains(folder, known)
     REFERENCE.write_text("{\n" + ",\n".join(f' "{k}": {json.dumps(known[k])}' for k in sorted(known)) + "\n}\n", encoding="utf-8")
     return better
+
+
+def _along_chains(folder: Path, known: dict) -> None:
+    """A table that meets a tighter step meets every looser one: its objective is known there too, unless it is the room itself."""
+    chains: dict[str, list] = {}
+    for p in sorted((folder / "specs").iterdir()):
+        meta = json.loads((p / "meta.json").read_text())
+        if meta["kind"] == "chain" and judge.objective_name(judge.read_spec(p / "spec.toml")[0]) != "room":
+            chains.setdefault(meta["chain"], []).append((meta["step"], p.name, meta["digest"]))
+    for steps in chains.values():
+        best = None
+        for _, name, digest in sorted(steps):
+            own = known.get(name)
+            own = own if own and own["digest"] == digest else None
+            if best and (own is None or best["objective"] < own["objective"]):
+                known[name] = own = {"objective": best["objective"], "source": best["source"].split(" at ")[0] + f" at {best['id']}", "digest": digest}
+            if own and (best is None or own["objective"] < best["objective"]):
+                best = {**own, "id": name}
 
 
 def keep(file: Path, outcomes: list[dict]) -> None:
@@ -186,8 +205,13 @@ def main() -> None:
                     if o is not None:
                         outcomes.append(judged(judges, w.folder, label + seed, o))
                         keep(runs / f"{label}.json", outcomes)
-        better = update_reference(w.folder, outcomes + witnesses(w.folder, names), label)
+        better = update_reference(w.folder, outcomes, label)
+        update_reference(w.folder, witnesses(w.folder, names), "witness")
         print(f"{len(outcomes)} outcomes, {better} of the reference better than before")
+    else:
+        kept = [(p.stem, json.loads(p.read_text())) for p in sorted(runs.glob("*.json"))]
+        print(sum(update_reference(w.folder, outcomes, label) for label, outcomes in kept), "of the reference better than before")
+        update_reference(w.folder, witnesses(w.folder, names), "witness")
     page.write(w.folder, REFERENCE, machines.ROOT / "results/search.md", MET)
 
 
