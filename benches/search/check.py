@@ -52,7 +52,9 @@ def margins(program: str, plant: Path, controller: Path, bench: judge.Bench, law
     return max(apart)
 
 
-def write(program: str, plant: Path, controller: Path, bench: judge.Bench, law: laws.Law, profile: dict, folder: Path) -> float:
+def write(
+    program: str, plant: Path, controller: Path, bench: judge.Bench, law: laws.Law, profile: dict, folder: Path
+) -> float:
     """Largest difference of the PES of the window without noise, as a share of its largest value."""
     quiet = {**profile, "noise": {}}
     file = folder / "profile.toml"
@@ -64,7 +66,9 @@ def write(program: str, plant: Path, controller: Path, bench: judge.Bench, law: 
     return float(abs(theirs - pes).max() / abs(pes).max())
 
 
-def noise(program: str, plant: Path, controller: Path, bench: judge.Bench, law: laws.Law, profile: dict, folder: Path) -> float:
+def noise(
+    program: str, plant: Path, controller: Path, bench: judge.Bench, law: laws.Law, profile: dict, folder: Path
+) -> float:
     """Mean square of the noise over many draws against its expectation, in standard errors of that mean (taken from the draws)."""
     scene = bench.scene(profile)
     pes, found = scene.quiet(law)[0], []
@@ -118,7 +122,9 @@ def main() -> None:
     if writes:
         print(f"writes: {len(writes)}, largest difference {max(writes)}")
     if noises:
-        print(f"noise: {len(noises)} machines, {SEEDS} draws each, farthest {max(noises, key=lambda x: abs(x[0]))} standard errors")
+        print(
+            f"noise: {len(noises)} machines, {SEEDS} draws each, farthest {max(noises, key=lambda x: abs(x[0]))} standard errors"
+        )
     assert max(worst)[0] < MARGIN, max(worst)
     assert not writes or max(writes)[0] < WRITE, max(writes)
     assert not noises or max(abs(x) for x, _ in noises) < 4.5, noises

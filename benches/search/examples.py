@@ -1,6 +1,6 @@
 """The three worked machines under examples/: their made-up truth, and the sweeps an analyser would have written of them.
 
-    python examples.py --out examples        writes NAME/sweep.csv (1 % noise, seeded); controller, spec and README stand beside them, by hand
+python examples.py --out examples        writes NAME/sweep.csv (1 % noise, seeded); controller, spec and README stand beside them, by hand
 """
 
 from __future__ import annotations
@@ -37,8 +37,15 @@ def galvo() -> Plant:
 
 def vcm() -> Plant:
     """Voice coil of a disk drive, 20 kHz: pivot at 55 Hz and six modes, every second one measured beyond its node."""
-    terms = [(55.0, 0.25, 3.2e8), (910.0, 0.015, 1.1e7), (2250.0, 0.014, -3.0e7), (3550.0, 0.012, 2.8e7), (4900.0, 0.012, -1.5e8),
-             (7150.0, 0.015, -5.5e7), (9050.0, 0.014, 4.0e7)]  # fmt: skip
+    terms = [
+        (55.0, 0.25, 3.2e8),
+        (910.0, 0.015, 1.1e7),
+        (2250.0, 0.014, -3.0e7),
+        (3550.0, 0.012, 2.8e7),
+        (4900.0, 0.012, -1.5e8),
+        (7150.0, 0.015, -5.5e7),
+        (9050.0, 0.014, 4.0e7),
+    ]
     pairs = []
     for hz, d, gain in terms:
         p = pair_roots(TAU * hz, d)[0]
@@ -64,7 +71,9 @@ def main() -> None:
     w = a.parse_args()
     for i, (name, (make, low, high, points)) in enumerate(EXAMPLES.items()):
         (w.out / name).mkdir(parents=True, exist_ok=True)
-        (w.out / name / "sweep.csv").write_text(sweep(make(), low, high, points, np.random.default_rng((SEED, i))), encoding="utf-8")
+        (w.out / name / "sweep.csv").write_text(
+            sweep(make(), low, high, points, np.random.default_rng((SEED, i))), encoding="utf-8"
+        )
 
 
 if __name__ == "__main__":

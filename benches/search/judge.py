@@ -183,7 +183,9 @@ def main() -> None:
     plant, spec, gains = (Path(a) for a in sys.argv[1:4])
     law, (document, profile) = laws.read(gains), read_spec(spec)
     found = judge(Bench(plants.read(plant), law.sample_time_s), document, profile, law)
-    print(f"stable {found.stable}; {objective_name(document)} = {found.objective:.6g}; worst violation {found.worst:+.3e}")
+    print(
+        f"stable {found.stable}; {objective_name(document)} = {found.objective:.6g}; worst violation {found.worst:+.3e}"
+    )
     for key, value in found.violations.items():
         print(f"  {key:28} {value:+.3e}")
     print("  " + ", ".join(f"{k} {v:.6g}" for k, v in found.figures.items()))

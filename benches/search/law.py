@@ -102,8 +102,20 @@ def state_space(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, f
     return a, b, row, through
 
 
-KNOWN = {"sample_time_s", "output_limit", "pid", "lowpass", "notch", "feedforward", "section", "before", "after", "provenance",
-         "position_unit", "command_unit"}
+KNOWN = {
+    "sample_time_s",
+    "output_limit",
+    "pid",
+    "lowpass",
+    "notch",
+    "feedforward",
+    "section",
+    "before",
+    "after",
+    "provenance",
+    "position_unit",
+    "command_unit",
+}
 
 
 def read(path: Path) -> Law:
@@ -119,7 +131,10 @@ def from_document(d: dict) -> Law:
     pid = d.get("pid", {})
     law = Law(
         d["sample_time_s"],
-        pid.get("kp", 0.0), pid.get("ki_per_s", 0.0), pid.get("kd_s", 0.0), pid.get("derivative_filter_s", 0.0),
+        pid.get("kp", 0.0),
+        pid.get("ki_per_s", 0.0),
+        pid.get("kd_s", 0.0),
+        pid.get("derivative_filter_s", 0.0),
         tuple((f["frequency_hz"], f.get("damping_ratio", 0.7)) for f in d.get("lowpass", [])),
         tuple((f["frequency_hz"], f["zero_damping_ratio"], f["pole_damping_ratio"]) for f in d.get("notch", [])),
         d.get("feedforward", {}),

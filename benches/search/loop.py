@@ -91,14 +91,11 @@ class Sampled:
     def response(self, w: np.ndarray) -> np.ndarray:
         """P(e^{jwT}) fraction by fraction."""
         q = np.exp(-1j * np.asarray(w, float) * self.t)
-        z, value, late = 1 / q, 0.0, self.t - self.rest
-        for p, r in self.plant.pairs:
-            for p, r in ((p, r), (p.conjugate(), r.conjugate())):
-                top = phi(p, late) + np.exp(p * late) * phi(p, self.rest) * q
-                # z - e^{pT} without cancellation near z = 1.
-                value = value + r * top / (np.expm1(1j * w * self.t) - np.expm1(p * self.t))
-        for p, r in self.plant.reals:
+        value, late = 0.0, self.t - self.rest
+        pairs = self.plant.pairs
+        for p, r in [*pairs, *((p.conjugate(), r.conjugate()) for p, r in pairs), *self.plant.reals]:
             top = phi(p, late) + np.exp(p * late) * phi(p, self.rest) * q
+            # z - e^{pT} without cancellation near z = 1.
             value = value + r * top / (np.expm1(1j * w * self.t) - np.expm1(p * self.t))
         if self.plant.double:
             zm = np.expm1(1j * w * self.t)
@@ -154,7 +151,10 @@ def modes_of(s: Sampled) -> list[tuple[float, float]]:
 def grid(s: Sampled, points: int = POINTS) -> np.ndarray:
     """Half even in the logarithm, a quarter even, a quarter crowded at the resonances."""
     end = np.pi / s.t
-    w = [np.geomspace(end * 1e-6, end * (1 - 1e-9), points // 2), np.linspace(end / points, end * (1 - 1e-9), points // 4)]
+    w = [
+        np.geomspace(end * 1e-6, end * (1 - 1e-9), points // 2),
+        np.linspace(end / points, end * (1 - 1e-9), points // 4),
+    ]
     modes = [(f, h) for f, h in modes_of(s) if f < end]
     if modes:
         each = points // 4 // len(modes) // 2
@@ -208,20 +208,30 @@ class Bench:
             w = np.array([w])
             return complex((self.s.response(w) * laws.response(rows, np.exp(-1j * w * self.s.t)))[0])
 
-        gains = [(x, float(np.degrees(np.angle(-at(x))))) for x in self._roots(lambda x: np.log(abs(at(x))), np.log(abs(value)))]
+        gains = [
+            (x, float(np.degrees(np.angle(-at(x)))))
+            for x in self._roots(lambda x: np.log(abs(at(x))), np.log(abs(value)))
+        ]
         axis = self._roots(lambda x: at(x).imag, value.imag)
         phases = [(x, -20 * np.log10(-at(x).real)) for x in axis if at(x).real < 0]
         i = int(np.clip(np.argmin(abs(1 + value)), 1, len(self.w) - 2))
-        found = minimize_scalar(lambda x: abs(1 + at(x)), bounds=(self.w[i - 1], self.w[i + 1]), method="bounded",
-                                options={"xatol": 1e-10 * self.w[i]})
+        found = minimize_scalar(
+            lambda x: abs(1 + at(x)),
+            bounds=(self.w[i - 1], self.w[i + 1]),
+            method="bounded",
+            options={"xatol": 1e-10 * self.w[i]},
+        )
         far = min(float(found.fun), float(abs(1 + value[i])))
         t = abs(value / (1 + value))
         falls = self._roots(lambda x: np.log(abs(at(x) / (1 + at(x))) * np.sqrt(2)), np.log(t * np.sqrt(2)), 1)
         hz = 1 / (2 * np.pi)
         return Margins(
             close(self.s, rows).unstable() == 0,
-            [(x * hz, v) for x, v in gains], [(x * hz, float(v)) for x, v in phases],
-            1 / far, float(self.w[i] * hz), falls[0] * hz if falls else None,
+            [(x * hz, v) for x, v in gains],
+            [(x * hz, float(v)) for x, v in phases],
+            1 / far,
+            float(self.w[i] * hz),
+            falls[0] * hz if falls else None,
         )
 
     def _roots(self, f, value: np.ndarray, most: int = 1000) -> list[float]:

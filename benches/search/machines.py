@@ -23,7 +23,9 @@ TAU = 2 * math.pi
 SEED = 18
 
 
-def product_toml(units: tuple[str, str], body: dict, delay_s: float, modes: list[tuple[float, float, float, float]], gain=1.0) -> str:
+def product_toml(
+    units: tuple[str, str], body: dict, delay_s: float, modes: list[tuple[float, float, float, float]], gain=1.0
+) -> str:
     """Body and monic pairs: zero (Hz), its damping, pole (Hz), its damping."""
     lines = [f'position_unit = "{units[0]}"', f'command_unit = "{units[1]}"', "[plant]"]
     lines += [f"{k} = {float(v)!r}" for k, v in body.items()]
@@ -63,14 +65,21 @@ def move(crossover_hz: float, sample_time_s: float, distance: float, noise: floa
     start = 2.0 / crossover_hz
     first, last = round((ramp + 0.5 / crossover_hz) * rate), round(travel * rate)
     return {
-        "spiral": {"velocity": distance / (travel - ramp), "distance": distance, "acceleration_time_s": ramp, "start_s": start,
-                   "duration_s": start + 1.3 * (travel + ramp)},
+        "spiral": {
+            "velocity": distance / (travel - ramp),
+            "distance": distance,
+            "acceleration_time_s": ramp,
+            "start_s": start,
+            "duration_s": start + 1.3 * (travel + ramp),
+        },
         "pes": {"sample_rate_hz": rate, "window": [first, last]},
         "noise": {"encoder_rms": noise * distance, "windage_corner_hz": round(crossover_hz / 10, 3), "seed": 1},
     }
 
 
-def machine(name: str, kind: str, text: str, rate_hz: float, crossover: tuple[float, float], distance: float, first: bool) -> Machine:
+def machine(
+    name: str, kind: str, text: str, rate_hz: float, crossover: tuple[float, float], distance: float, first: bool
+) -> Machine:
     """Reads the text back, so that the plant judged is the one in the file."""
     import tomllib
 
@@ -109,8 +118,22 @@ def benchmark(data: Path) -> list[Machine]:
     for word, vcm_f, pzt_f, damping in (("room", 1.0, 1.0, 1.0), ("low", 1.04, 1.06, 0.8), ("high", 0.96, 0.94, 1.2)):
         for share in (1.0, 1.05, 0.95):
             p = _two_actuators(vcm, pzt, vcm_f, pzt_f, damping, share)
-            name = f"hdd_{word}_{round(100 * (share - 1)):+d}".replace("+0", "0").replace("+", "plus").replace("-", "minus")
-            out.append(machine(name, "HDD benchmark", roots_toml(("track", "V"), *_roots_of(p), 0.0), 50_400.0, (600.0, 1700.0), 1.0, True))
+            name = (
+                f"hdd_{word}_{round(100 * (share - 1)):+d}".replace("+0", "0")
+                .replace("+", "plus")
+                .replace("-", "minus")
+            )
+            out.append(
+                machine(
+                    name,
+                    "HDD benchmark",
+                    roots_toml(("track", "V"), *_roots_of(p), 0.0),
+                    50_400.0,
+                    (600.0, 1700.0),
+                    1.0,
+                    True,
+                )
+            )
     return out
 
 
@@ -119,7 +142,9 @@ def _roots_of(p: Plant) -> tuple[list[complex], list[complex], float]:
 
     def neat(roots: np.ndarray) -> list[complex]:
         upper = [complex(z) for z in roots if z.imag > 1e-9 * abs(z)]
-        return [complex(z.real) for z in roots if abs(z.imag) <= 1e-9 * abs(z)] + [w for z in upper for w in (z, z.conjugate())]
+        return [complex(z.real) for z in roots if abs(z.imag) <= 1e-9 * abs(z)] + [
+            w for z in upper for w in (z, z.conjugate())
+        ]
 
     zeros, poles = neat(product.zeros(p)), neat(p.poles())
     leading = p.double + 2 * sum((r * q).real for q, r in p.pairs) + sum(r * q for q, r in p.reals)
@@ -161,7 +186,7 @@ def _two_actuators(vcm, pzt, vcm_f, pzt_f, damping, share) -> Plant:
     for i, (p, k) in enumerate(fine):
         j = 2 * i
         a[j, j + 1] = 1.0
-        a[j + 1, j], a[j + 1, j + 1] = -abs(p / scale) ** 2, 2 * (p / scale).real
+        a[j + 1, j], a[j + 1, j + 1] = -(abs(p / scale) ** 2), 2 * (p / scale).real
         a[j + 1, n - 1] = -1.0
         a[n - 1, j] = lag_gain * (lag / scale) * k / scale**2
     a[n - 1, n - 1] = -lag / scale
@@ -200,7 +225,9 @@ def stages(rng: np.random.Generator) -> list[Machine]:
         else:
             current = TAU * 1500.0
             zeros, poles = _pairs(modes)
-            text = roots_toml(units, zeros, [0j, complex(-u(0.5, 3.0)), complex(-current)] + poles, accel * current, delay)
+            text = roots_toml(
+                units, zeros, [0j, complex(-u(0.5, 3.0)), complex(-current)] + poles, accel * current, delay
+            )
         out.append(machine(f"stage_{i + 1}", "linear stage", text, 10_000.0, (30.0, 90.0), 2000.0, first))
     return out
 
@@ -232,7 +259,13 @@ def gantries(rng: np.random.Generator) -> list[Machine]:
             first = rate >= 8000.0
         else:
             zeros, poles = _pairs(modes)
-            text = roots_toml(units, zeros, [0j, complex(-viscous)] + poles + pair_roots(TAU * pole, 0.02), accel * (TAU * pole) ** 2, delay)
+            text = roots_toml(
+                units,
+                zeros,
+                [0j, complex(-viscous)] + poles + pair_roots(TAU * pole, 0.02),
+                accel * (TAU * pole) ** 2,
+                delay,
+            )
             first = False
         out.append(machine(f"gantry_{i + 1}", "gantry", text, rate, (10.0, 26.0), 100.0, first))
     return out
@@ -254,7 +287,9 @@ def galvos(rng: np.random.Generator) -> list[Machine]:
             coil = TAU * 18_000.0
             zeros, poles = _pairs(modes)
             w0 = TAU * spring
-            text = roots_toml(units, zeros, pair_roots(w0, damping) + [complex(-coil)] + poles, at_rest * w0 * w0 * coil, delay)
+            text = roots_toml(
+                units, zeros, pair_roots(w0, damping) + [complex(-coil)] + poles, at_rest * w0 * w0 * coil, delay
+            )
         out.append(machine(f"galvo_{i + 1}", "galvo", text, rate, (700.0, 1700.0), 0.02, first))
     return out
 
@@ -266,7 +301,14 @@ def voice_coils(rng: np.random.Generator) -> list[Machine]:
         u = rng.uniform
         accel = u(1.5e8, 4e8)
         terms = [(TAU * u(40.0, 80.0), u(0.15, 0.4), accel)]
-        for hz, share in ((900.0, 0.04), (2200.0, -0.12), (3600.0, 0.1), (4900.0, -0.5), (7200.0, -0.2), (9000.0, 0.15)):
+        for hz, share in (
+            (900.0, 0.04),
+            (2200.0, -0.12),
+            (3600.0, 0.1),
+            (4900.0, -0.5),
+            (7200.0, -0.2),
+            (9000.0, 0.15),
+        ):
             terms.append((TAU * hz * u(0.94, 1.06), u(0.008, 0.02), share * u(0.7, 1.3) * accel))
         text = f'position_unit = "track"\ncommand_unit = "A"\n[plant]\ndelay_s = {u(18e-6, 34e-6)!r}\n'
         for w, d, gain in terms:
@@ -285,9 +327,13 @@ def belts(rng: np.random.Generator) -> list[Machine]:
         accel, viscous, delay = u(600.0, 2000.0), u(2.0, 9.0), u(0.4, 0.9) / rate
         units = ("mm", "A")
         if i == 0:
-            text = product_toml(units, free_body(accel, viscous), delay, [(zero, 0.05, pole, 0.04)], gain=(pole / zero) ** 2)
+            text = product_toml(
+                units, free_body(accel, viscous), delay, [(zero, 0.05, pole, 0.04)], gain=(pole / zero) ** 2
+            )
         else:
-            text = roots_toml(units, [], [0j, complex(-viscous)] + pair_roots(TAU * pole, 0.05), accel * (TAU * pole) ** 2, delay)
+            text = roots_toml(
+                units, [], [0j, complex(-viscous)] + pair_roots(TAU * pole, 0.05), accel * (TAU * pole) ** 2, delay
+            )
         out.append(machine(f"belt_{i + 1}", "belt drive", text, rate, (4.0, 11.0), 200.0, False))
     return out
 
@@ -301,7 +347,13 @@ def bearings(rng: np.random.Generator) -> list[Machine]:
         bend, second = u(620.0, 900.0), u(1500.0, 2100.0)
         modes = [(bend * u(0.9, 0.97), 0.006, bend, 0.005), (second * u(0.94, 1.05), 0.008, second, 0.007)]
         zeros, poles = _pairs(modes)
-        text = roots_toml(("um", "A"), zeros, [complex(p), complex(-p), complex(-amplifier)] + poles, accel * amplifier, u(0.6, 1.1) / rate)
+        text = roots_toml(
+            ("um", "A"),
+            zeros,
+            [complex(p), complex(-p), complex(-amplifier)] + poles,
+            accel * amplifier,
+            u(0.6, 1.1) / rate,
+        )
         out.append(machine(f"bearing_{i + 1}", "magnetic bearing", text, rate, (110.0, 260.0), 50.0, False))
     return out
 

@@ -29,7 +29,9 @@ class Kept:
                 self.meta[p.name] = json.loads((p / "meta.json").read_text())
                 self.objective[p.name] = judge.objective_name(judge.read_spec(p / "spec.toml")[0])
         known = json.loads(reference.read_text()) if reference.exists() else {}
-        self.best = {k: v["objective"] for k, v in known.items() if k in self.meta and v["digest"] == self.meta[k]["digest"]}
+        self.best = {
+            k: v["objective"] for k, v in known.items() if k in self.meta and v["digest"] == self.meta[k]["digest"]
+        }
 
     def feasible(self, o: dict) -> bool:
         return o.get("objective") is not None and o["worst"] <= self.met
@@ -52,7 +54,9 @@ class Kept:
             "no_table": sum(not math.isfinite(g) for g in gaps.values()),
             "false_infeasible": sorted(o["id"] for o in judged if o.get("verdict") == "infeasible"),
             "false_met": sorted(o["id"] for o in said_met if o.get("worst") is None or o["worst"] > self.met),
-            "false_feasible": sorted(o["id"] for o in said_met if self.meta[o["id"]]["kind"] == "infeasible" and self.feasible(o)),
+            "false_feasible": sorted(
+                o["id"] for o in said_met if self.meta[o["id"]]["kind"] == "infeasible" and self.feasible(o)
+            ),
             "errors": sorted(o["id"] for o in outcomes if o.get("error")),
             "times": [o["time_s"] for o in outcomes],
         }
@@ -96,8 +100,11 @@ def write(folder: Path, reference: Path, page: Path, met: float) -> None:
     columns = {name: runs[name] for name in ("before", "now", "unseen") if name in runs}
     if "before" in columns and "now" in columns:
         ids = {o["id"] for o in columns["before"]}
-        columns = {"before": columns["before"], "now, the same specs": [o for o in columns["now"] if o["id"] in ids],
-                   **{k: v for k, v in columns.items() if k != "before"}}  # fmt: skip
+        columns = {
+            "before": columns["before"],
+            "now, the same specs": [o for o in columns["now"] if o["id"] in ids],
+            **{k: v for k, v in columns.items() if k != "before"},
+        }
     if not columns:
         return
     s = {name: kept.summary(o) for name, o in columns.items()}
@@ -106,10 +113,13 @@ def write(folder: Path, reference: Path, page: Path, met: float) -> None:
     rows = [
         ("specs", lambda n: s[n]["specs"]),
         ("of them known to be feasible", lambda n: s[n]["feasible"]),
-        ("within 2 % of the best known", lambda n: f"{s[n]['near']} ({100 * s[n]['near'] / max(s[n]['feasible'], 1):.1f} %)"),
+        (
+            "within 2 % of the best known",
+            lambda n: f"{s[n]['near']} ({100 * s[n]['near'] / max(s[n]['feasible'], 1):.1f} %)",
+        ),
         ("farthest behind, of tables that meet their limits", lambda n: f"{percent(s[n]['worst'])} {s[n]['worst_id']}"),
         ("no table that meets its limits", lambda n: s[n]["no_table"]),
-        ("false \"infeasible\"", lambda n: listed(s[n]["false_infeasible"])),
+        ('false "infeasible"', lambda n: listed(s[n]["false_infeasible"])),
         ("said to meet every limit, does not by the judge", lambda n: listed(s[n]["false_met"])),
         ("met, though an argument says it cannot be", lambda n: listed(s[n]["false_feasible"])),
         ("refused or broken", lambda n: listed(s[n]["errors"])),
@@ -121,14 +131,23 @@ def write(folder: Path, reference: Path, page: Path, met: float) -> None:
         ("time, longest", lambda n: seconds(s[n]["times"], 1.0)),
     ]
     lines = ["# Search: three hundred specs", ""]
-    lines += ["Made by `python benches/search/run.py` (see `benches/search/README.md`). Objectives and limits are the judge's (`judge.py`), which shares no code",
-              f"with the program; a table counts as meeting its limits within {met:g} of each. Best known: the least objective of any table that does, ever found, from",
-              "`benches/search/reference.json`. Of the objective `room` the difference of the rooms counts. Times are of the whole command, two at a time, one thread each.",
-              "The program of before held only the named crossing to `gain_crossover_hz`; the judge holds every one.", ""]  # fmt: skip
+    lines += [
+        "Made by `python benches/search/run.py` (see `benches/search/README.md`). Objectives and limits are the judge's (`judge.py`), which shares no code",
+        f"with the program; a table counts as meeting its limits within {met:g} of each. Best known: the least objective of any table that does, ever found, from",
+        "`benches/search/reference.json`. Of the objective `room` the difference of the rooms counts. Times are of the whole command, two at a time, one thread each.",
+        "The program of before held only the named crossing to `gain_crossover_hz`; the judge holds every one.",
+        "",
+    ]
     lines += ["| | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
     lines += [f"| {word} | " + " | ".join(str(f(n)) for n in columns) + " |" for word, f in rows]
     for key, title in (("machine_kind", "By kind of machine"), (None, "By objective")):
-        lines += ["", f"## {title}", "", "| | " + " | ".join(f"{n}: feasible, within 2 %, farthest behind" for n in columns) + " |", "|---" * (len(columns) + 1) + "|"]
+        lines += [
+            "",
+            f"## {title}",
+            "",
+            "| | " + " | ".join(f"{n}: feasible, within 2 %, farthest behind" for n in columns) + " |",
+            "|---" * (len(columns) + 1) + "|",
+        ]
         of = lambda i: kept.meta[i][key] if key else kept.objective[i]  # noqa: E731
         for group in sorted({of(o["id"]) for rows_ in columns.values() for o in rows_}):
             cells = []
@@ -139,10 +158,18 @@ def write(folder: Path, reference: Path, page: Path, met: float) -> None:
     last = list(columns.values())[-1]
     far = sorted((o for o in last if o["id"] in kept.best and kept.gap(o) > NEAR), key=kept.gap, reverse=True)
     if far:
-        lines += ["", "## Behind by more than 2 %", "", "| spec | machine | objective | behind | verdict | worst limit |", "|---|---|---|---|---|---|"]
+        lines += [
+            "",
+            "## Behind by more than 2 %",
+            "",
+            "| spec | machine | objective | behind | verdict | worst limit |",
+            "|---|---|---|---|---|---|",
+        ]
         for o in far[:40]:
             why = o.get("error") or o.get("verdict")
             limit = f"{o['worst_of']} {o['worst']:+.2e}" if o.get("worst") is not None else ""
-            lines.append(f"| {o['id']} | {kept.meta[o['id']]['machine']} | {kept.objective[o['id']]} | {percent(kept.gap(o))} | {why} | {limit} |")
+            lines.append(
+                f"| {o['id']} | {kept.meta[o['id']]['machine']} | {kept.objective[o['id']]} | {percent(kept.gap(o))} | {why} | {limit} |"
+            )
     page.write_text("\n".join(lines) + "\n", encoding="utf-8")
     print(f"wrote {page}")

@@ -62,7 +62,12 @@ class Problem:
         scaled = {"kp": inverse, "ki_per_s": inverse * w, "kd_s": inverse / w}
         given, kind = self.search.get("bounds", {}), self.structure.get("controller", "pid")
         out = []
-        gains = {"pid": ("kp", "ki_per_s", "kd_s"), "pi": ("kp", "ki_per_s"), "lead": ("kp", "kd_s"), "p_pi": ("a", "b", "c")}[kind]
+        gains = {
+            "pid": ("kp", "ki_per_s", "kd_s"),
+            "pi": ("kp", "ki_per_s"),
+            "lead": ("kp", "kd_s"),
+            "p_pi": ("a", "b", "c"),
+        }[kind]
         scaled["a"], scaled["b"], scaled["c"] = np.array([2 * low, 0.1 * TAU * high]), scaled["kd_s"], scaled["kp"] / 10
         for g in gains:
             found = given.get(g)
@@ -77,7 +82,11 @@ class Problem:
         out += [(f"lowpass {i}", (hz[0], min(hz[1], 0.495 * rate))) for i in range(self.search.get("lowpasses", 0))]
         hz = given.get("notch_hz", [1.2 * low, 0.45 * rate])
         for i in range(self.search.get("notches", 0)):
-            out += [(f"notch {i}", (hz[0], min(hz[1], 0.495 * rate))), (f"depth {i}", (0.01, 1.0)), (f"width {i}", (0.05, 1.0))]
+            out += [
+                (f"notch {i}", (hz[0], min(hz[1], 0.495 * rate))),
+                (f"depth {i}", (0.01, 1.0)),
+                (f"width {i}", (0.05, 1.0)),
+            ]
         return [n for n, _ in out], [(math.log(a), math.log(b)) for _, (a, b) in out]
 
     def law(self, x: np.ndarray) -> Law:
@@ -87,7 +96,9 @@ class Problem:
         kp, ki, kd = v.get("kp", 0.0), v.get("ki_per_s", 0.0), v.get("kd_s", 0.0)
         if kind == "p_pi":
             kp, ki, kd = v["a"] * v["b"] + v["c"], v["a"] * v["c"], v["b"]
-        filter_s = 0.0 if kind in ("p_pi", "pi") else v.get("filter", fixed if isinstance(fixed, float) else 0.3 * self.t)
+        filter_s = (
+            0.0 if kind in ("p_pi", "pi") else v.get("filter", fixed if isinstance(fixed, float) else 0.3 * self.t)
+        )
         lows = tuple((v[f"lowpass {i}"], 0.7) for i in range(self.search.get("lowpasses", 0)))
         holes = []
         for i in range(self.search.get("notches", 0)):
@@ -163,7 +174,9 @@ class Problem:
         return found
 
 
-def evolve(plant: plants.Plant, spec: dict, profile: dict | None, seconds: float, seed: int) -> tuple[Law | None, float, int]:
+def evolve(
+    plant: plants.Plant, spec: dict, profile: dict | None, seconds: float, seed: int
+) -> tuple[Law | None, float, int]:
     """scipy's differential evolution to its own end, or until its time is over."""
     p = Problem(plant, spec, profile, seconds)
     try:
@@ -210,11 +223,14 @@ def convex(plant: plants.Plant, spec: dict, start: Law) -> tuple[Law, float, int
 
     t, guard = start.sample_time_s, judge.guard_of(spec)
     b = loop.Bench(plant, t, COARSE)
-    unit = [Law(t, *g, start.derivative_filter_s, start.lowpasses, start.notches) for g in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+    unit = [
+        Law(t, *g, start.derivative_filter_s, start.lowpasses, start.notches) for g in ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    ]
     scale = np.array([start.kp, start.ki_per_s, start.kd_s])
     parts = np.stack([b.p * laws.response(u.rows(), b.q) for u in unit], 1) * scale
     x, spent, rounds = np.ones(3), 0.0, 0
-    for rounds in range(1, 31):
+    while rounds < 30:
+        rounds += 1
         now = 1 + parts @ x
         turn = now.conj() / abs(now)
         g = cp.Variable(3, nonneg=True)
@@ -252,7 +268,11 @@ def row(name: str, meta: dict, spec: dict, own: dict | None, best: float | None,
         met = own.get("objective") is not None and own["worst"] <= run.MET
         said = f"{own['objective']:.5g}" if met else "refused" if own.get("error") else str(own.get("verdict"))
         said += f", {own['time_s']:.2f} s"
-    return f"| {name} | {meta['machine']} | {judge.objective_name(spec)} | {'' if best is None else f'{best:.5g}'} | {said} | " + " | ".join(cells) + " |"
+    return (
+        f"| {name} | {meta['machine']} | {judge.objective_name(spec)} | {'' if best is None else f'{best:.5g}'} | {said} | "
+        + " | ".join(cells)
+        + " |"
+    )
 
 
 def main() -> None:
@@ -265,13 +285,21 @@ def main() -> None:
     w = a.parse_args()
     os.environ.setdefault("RAYON_NUM_THREADS", "1")
     judges, found = run.Judges(w.folder), []
-    lines = ["# Search: by other hands", "", "Made by `python benches/search/peers.py` (see `benches/search/README.md`). Each cell: objective by the judge and time.",
-             f"scipy's differential evolution has {w.seconds:g} s a spec on one thread, around numpy margins of {COARSE} points, bounds and structure of the same spec.", ""]  # fmt: skip
+    lines = [
+        "# Search: by other hands",
+        "",
+        "Made by `python benches/search/peers.py` (see `benches/search/README.md`). Each cell: objective by the judge and time.",
+        f"scipy's differential evolution has {w.seconds:g} s a spec on one thread, around numpy margins of {COARSE} points, bounds and structure of the same spec.",
+        "",
+    ]
     kept = page.Kept(w.folder, run.REFERENCE, run.MET)
     names = [n for n in run.specs_of(w.folder, "r", False, "")]
     sample = [] if w.convex_only else names[:: max(len(names) // w.count, 1)][: w.count]
     if sample:
-        lines += ["| spec | machine | objective | best known | servotune tune | differential evolution | python-control, one margin call: of the state space; of the response |", "|---|---|---|---|---|---|---|"]
+        lines += [
+            "| spec | machine | objective | best known | servotune tune | differential evolution | python-control, one margin call: of the state space; of the response |",
+            "|---|---|---|---|---|---|---|",
+        ]
     ahead = behind = 0
     for name in sample:
         here = w.folder / "specs" / name
@@ -281,23 +309,39 @@ def main() -> None:
         law, spent, evaluations = evolve(plant, spec, profile, w.seconds, 1)
         other = judges.judge(meta["machine"], spec, profile, law) if law else None
         met = other is not None and other.worst <= run.MET
-        cell = f"{other.objective:.5g}, {spent:.1f} s, {evaluations} candidates" if met else f"no table, {spent:.1f} s, {evaluations} candidates"
+        cell = (
+            f"{other.objective:.5g}, {spent:.1f} s, {evaluations} candidates"
+            if met
+            else f"no table, {spent:.1f} s, {evaluations} candidates"
+        )
         if met:
             found.append({"id": name, "seed": None, "objective": other.objective, "worst": other.worst})
             own_met = own.get("objective") is not None and own["worst"] <= run.MET
             further = not own_met or page.behind(own["objective"], other.objective, kept.objective[name]) > page.NEAR
             ahead, behind = ahead + further, behind + (not further)
         try:
-            peer = "; ".join(f"{1e3 * each:.1f} ms, Ms {100 * apart:+.2g} %" for each, apart in control_time(plant, law_of(meta)))
+            peer = "; ".join(
+                f"{1e3 * each:.1f} ms, Ms {100 * apart:+.2g} %" for each, apart in control_time(plant, law_of(meta))
+            )
         except Exception as e:  # it refuses some loops; that is its result
             peer = f"refused: {type(e).__name__}"
         lines.append(row(name, meta, spec, own, kept.best.get(name), [cell, peer]))
         print(lines[-1], flush=True)
     if sample:
-        lines += ["", f"Differential evolution came to a table in {len(found)} of {len(sample)}; in {ahead} of them it is ahead of the program by more than 2 % or the program has none."]
+        lines += [
+            "",
+            f"Differential evolution came to a table in {len(found)} of {len(sample)}; in {ahead} of them it is ahead of the program by more than 2 % or the program has none.",
+        ]
     convexes = [n for n in run.specs_of(w.folder, "p_", False, "")]
-    lines += ["", "## Largest integral gain, filters fixed", "", "PID alone, Ms and a ceiling on T: a sequence of cone programmes in three gains (CVXPY with Clarabel), started from the spec's own controller.", "",
-              "| spec | machine | objective | best known | servotune tune | CVXPY with Clarabel | differential evolution |", "|---|---|---|---|---|---|---|"]  # fmt: skip
+    lines += [
+        "",
+        "## Largest integral gain, filters fixed",
+        "",
+        "PID alone, Ms and a ceiling on T: a sequence of cone programmes in three gains (CVXPY with Clarabel), started from the spec's own controller.",
+        "",
+        "| spec | machine | objective | best known | servotune tune | CVXPY with Clarabel | differential evolution |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for name in convexes:
         here = w.folder / "specs" / name
         meta, (spec, profile) = json.loads((here / "meta.json").read_text()), judge.read_spec(here / "spec.toml")
@@ -306,10 +350,17 @@ def main() -> None:
         cells = []
         law, spent, rounds = convex(plant, spec, law_of(meta))
         evolved, time_s, evaluations = evolve(plant, spec, profile, w.seconds, 1)
-        for l, said in ((law, f"{spent:.2f} s, {rounds} rounds"), (evolved, f"{time_s:.1f} s, {evaluations} candidates")):
+        for l, said in (
+            (law, f"{spent:.2f} s, {rounds} rounds"),
+            (evolved, f"{time_s:.1f} s, {evaluations} candidates"),
+        ):
             other = judges.judge(meta["machine"], spec, profile, l) if l else None
             met = other is not None and other.worst <= run.MET
-            cells.append(f"{other.objective:.5g}, {said}" if met else f"no table (worst {other.worst if other else math.inf:+.1e}), {said}")
+            cells.append(
+                f"{other.objective:.5g}, {said}"
+                if met
+                else f"no table (worst {other.worst if other else math.inf:+.1e}), {said}"
+            )
             if met:
                 found.append({"id": name, "seed": None, "objective": other.objective, "worst": other.worst})
         lines.append(row(name, meta, spec, own, kept.best.get(name), cells))

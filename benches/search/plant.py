@@ -53,7 +53,9 @@ def pair_roots(w: float, d: float) -> list[complex]:
     return [w * (-d + root), w * (-d - root)]
 
 
-def from_roots(zeros: list[complex], poles: list[complex], gain: float, delay_s: float, units: tuple[str, str]) -> Plant:
+def from_roots(
+    zeros: list[complex], poles: list[complex], gain: float, delay_s: float, units: tuple[str, str]
+) -> Plant:
     """gain prod(s - z)/prod(s - p): two poles at 0 at most, every other one simple."""
     at_rest = [p for p in poles if p == 0]
     others = [complex(p) for p in poles if p != 0]
@@ -62,8 +64,10 @@ def from_roots(zeros: list[complex], poles: list[complex], gain: float, delay_s:
 
     def factors(s: complex, without: int | None) -> complex:
         """gain prod(s - z)/prod(s - p) without the poles at rest and the one named, in an order that keeps it in range."""
-        value, up, down = complex(gain), sorted(zeros, key=abs), sorted(
-            (p for i, p in enumerate(others) if i != without), key=abs
+        value, up, down = (
+            complex(gain),
+            sorted(zeros, key=abs),
+            sorted((p for i, p in enumerate(others) if i != without), key=abs),
         )
         for i in range(max(len(up), len(down))):
             if i < len(up):

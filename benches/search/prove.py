@@ -1,7 +1,7 @@
 """Tables tuned over a box of gain and delay: how many `verify` proves, and what the judge finds at the box's corners.
 
-    python run.py --words "--uncertainty gain=5%,delay=5%" --label boxed --parallel 2
-    python prove.py [--tables boxed] [--count 200]            writes results/search_proofs.md
+python run.py --words "--uncertainty gain=5%,delay=5%" --label boxed --parallel 2
+python prove.py [--tables boxed] [--count 200]            writes results/search_proofs.md
 """
 
 from __future__ import annotations
@@ -51,7 +51,9 @@ def corners(folder: Path, name: str, table: Path) -> tuple[float, str]:
             found = judge.judge(judge.Bench(scaled(p, gain, delay), law.sample_time_s, 30_000), spec, profile, law)
             if found.worst > worst:
                 worst = found.worst
-                what = max(found.violations, key=found.violations.get, default="unstable") if found.stable else "unstable"
+                what = (
+                    max(found.violations, key=found.violations.get, default="unstable") if found.stable else "unstable"
+                )
     return float(worst), what
 
 
@@ -61,7 +63,13 @@ def verify(program: str, folder: Path, name: str, table: Path) -> dict:
     line += ["--spec", str(folder / "specs" / name / "spec.toml"), "--uncertainty", BOX]
     began = time.perf_counter()
     done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=300)
-    out = {"id": name, "machine": meta["machine"], "kind": meta["machine_kind"], "code": done.returncode, "time_s": time.perf_counter() - began}
+    out = {
+        "id": name,
+        "machine": meta["machine"],
+        "kind": meta["machine_kind"],
+        "code": done.returncode,
+        "time_s": time.perf_counter() - began,
+    }
     if done.returncode == 2:
         out["error"] = (done.stderr.strip().splitlines() or ["nothing said"])[-1][:200]
     try:
@@ -83,23 +91,44 @@ def main() -> None:
     tables = sorted((w.folder / "tables" / w.tables).glob("*.toml"))[: w.count]
     names = [t.stem for t in tables]
     with ThreadPoolExecutor(2) as pool:
-        rows = list(pool.map(lambda n: verify(w.program, w.folder, n, w.folder / "tables" / w.tables / f"{n}.toml"), names))
+        rows = list(
+            pool.map(lambda n: verify(w.program, w.folder, n, w.folder / "tables" / w.tables / f"{n}.toml"), names)
+        )
     for row in rows:
-        row["corner"], row["corner_of"] = corners(w.folder, row["id"], w.folder / "tables" / w.tables / f"{row['id']}.toml")
+        row["corner"], row["corner_of"] = corners(
+            w.folder, row["id"], w.folder / "tables" / w.tables / f"{row['id']}.toml"
+        )
     proved = [r for r in rows if r["code"] == 0]
     wrong = [r for r in proved if r["corner"] > run.MET]
     per = Counter(r["kind"] for r in rows)
-    lines = ["# Search: tables proved over a box", "", f"Made by `python benches/search/prove.py`. `servotune verify --uncertainty {BOX}` of {len(rows)} tables, each tuned over the same box;",
-             "beside it the judge at the four corners of the box.", "", f"Proved: {len(proved)} of {len(rows)}. Proved, yet a limit fails at a corner by the judge: {len(wrong)}"
-             + (f" ({', '.join(r['id'] for r in wrong[:10])})." if wrong else "."), ""]  # fmt: skip
+    lines = [
+        "# Search: tables proved over a box",
+        "",
+        f"Made by `python benches/search/prove.py`. `servotune verify --uncertainty {BOX}` of {len(rows)} tables, each tuned over the same box;",
+        "beside it the judge at the four corners of the box.",
+        "",
+        f"Proved: {len(proved)} of {len(rows)}. Proved, yet a limit fails at a corner by the judge: {len(wrong)}"
+        + (f" ({', '.join(r['id'] for r in wrong[:10])})." if wrong else "."),
+        "",
+    ]
     if rows:
-        lines += [f"Time of a proof: median {np.median([r['time_s'] for r in rows]):.2f} s, longest {max(r['time_s'] for r in rows):.2f} s.", ""]
+        lines += [
+            f"Time of a proof: median {np.median([r['time_s'] for r in rows]):.2f} s, longest {max(r['time_s'] for r in rows):.2f} s.",
+            "",
+        ]
     lines += ["| kind of machine | tables | proved |", "|---|---|---|"]
     lines += [f"| {k} | {n} | {sum(r['kind'] == k for r in proved)} |" for k, n in sorted(per.items())]
     short = [r for r in rows if r["code"] != 0]
     if short:
-        lines += ["", "| not proved | machine | what verify says | worst at a corner, by the judge |", "|---|---|---|---|"]
-        lines += [f"| {r['id']} | {r['machine']} | {r.get('error', r.get('said'))} | {r['corner_of']} {r['corner']:+.2e} |" for r in short]
+        lines += [
+            "",
+            "| not proved | machine | what verify says | worst at a corner, by the judge |",
+            "|---|---|---|---|",
+        ]
+        lines += [
+            f"| {r['id']} | {r['machine']} | {r.get('error', r.get('said'))} | {r['corner_of']} {r['corner']:+.2e} |"
+            for r in short
+        ]
     (machines.ROOT / "results/search_proofs.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     print(lines[5])
 

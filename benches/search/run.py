@@ -54,12 +54,18 @@ class Judges:
 def specs_of(folder: Path, only: str, unseen: bool, on: str) -> list[str]:
     """Names of specs that begin with `only`, on machines that begin with one of the words of `on`."""
     names = sorted(p.name for p in (folder / "specs").iterdir() if p.is_dir())
-    names = [n for n in names if n.startswith(only) and n.startswith("u") == unseen and n.startswith("p_") == only.startswith("p_")]
+    names = [
+        n
+        for n in names
+        if n.startswith(only) and n.startswith("u") == unseen and n.startswith("p_") == only.startswith("p_")
+    ]
     machine = lambda n: json.loads((folder / "specs" / n / "meta.json").read_text())["machine"]  # noqa: E731
     return [n for n in names if machine(n).startswith(tuple(on.split(",")))]
 
 
-def tune(program: str, folder: Path, name: str, label: str, words: list[str], before: bool, seed: int | None) -> dict | None:
+def tune(
+    program: str, folder: Path, name: str, label: str, words: list[str], before: bool, seed: int | None
+) -> dict | None:
     """One run of the program: exit code, verdict, objective as it says, wall time."""
     here, table = folder / "specs" / name, folder / "tables" / label / f"{name}.toml"
     table.parent.mkdir(parents=True, exist_ok=True)
@@ -113,8 +119,13 @@ def judged(judges: Judges, folder: Path, label: str, outcome: dict) -> dict:
     except ValueError as e:
         return {**outcome, "error": f"the table cannot be judged: {e}"}
     worst = max(found.violations, key=found.violations.get, default="")
-    return {**outcome, "objective": found.objective if found.stable else None, "worst": found.worst if found.stable else None,
-            "worst_of": worst, "stable": found.stable}  # fmt: skip
+    return {
+        **outcome,
+        "objective": found.objective if found.stable else None,
+        "worst": found.worst if found.stable else None,
+        "worst_of": worst,
+        "stable": found.stable,
+    }
 
 
 def update_reference(folder: Path, outcomes: list[dict], source: str) -> int:
@@ -122,7 +133,12 @@ def update_reference(folder: Path, outcomes: list[dict], source: str) -> int:
     known = json.loads(REFERENCE.read_text()) if REFERENCE.exists() else {}
     better, known_ids = 0, {p.name for p in (folder / "specs").iterdir()}
     for o in outcomes:
-        if o["id"] not in known_ids or o.get("objective") is None or o["worst"] > MET or not math.isfinite(o["objective"]):
+        if (
+            o["id"] not in known_ids
+            or o.get("objective") is None
+            or o["worst"] > MET
+            or not math.isfinite(o["objective"])
+        ):
             continue
         digest = json.loads((folder / "specs" / o["id"] / "meta.json").read_text())["digest"]
         old = known.get(o["id"])
@@ -130,7 +146,9 @@ def update_reference(folder: Path, outcomes: list[dict], source: str) -> int:
             known[o["id"]] = {"objective": o["objective"], "source": source, "digest": digest}
             better += 1
     _along_chains(folder, known)
-    REFERENCE.write_text("{\n" + ",\n".join(f' "{k}": {json.dumps(known[k])}' for k in sorted(known)) + "\n}\n", encoding="utf-8")
+    REFERENCE.write_text(
+        "{\n" + ",\n".join(f' "{k}": {json.dumps(known[k])}' for k in sorted(known)) + "\n}\n", encoding="utf-8"
+    )
     return better
 
 
@@ -147,7 +165,11 @@ def _along_chains(folder: Path, known: dict) -> None:
             own = known.get(name)
             own = own if own and own["digest"] == digest else None
             if best and (own is None or best["objective"] < own["objective"]):
-                known[name] = own = {"objective": best["objective"], "source": best["source"].split(" at ")[0] + f" at {best['id']}", "digest": digest}
+                known[name] = own = {
+                    "objective": best["objective"],
+                    "source": best["source"].split(" at ")[0] + f" at {best['id']}",
+                    "digest": digest,
+                }
             if own and (best is None or own["objective"] < best["objective"]):
                 best = {**own, "id": name}
 
@@ -180,7 +202,9 @@ def main() -> None:
     a.add_argument("--seeds", default="")
     a.add_argument("--label", default=None)
     a.add_argument("--only", default="")
-    a.add_argument("--on", default="", help="only machines whose names begin with one of these words, comma between them")
+    a.add_argument(
+        "--on", default="", help="only machines whose names begin with one of these words, comma between them"
+    )
     a.add_argument("--every", type=int, default=1, help="only one spec in so many")
     a.add_argument("--unseen", action="store_true")
     a.add_argument("--reference", action="store_true")
@@ -197,8 +221,17 @@ def main() -> None:
         judges, outcomes = Judges(w.folder), []
         words = (["--starts", str(w.starts)] if w.starts else []) + w.words.split()
         for seed in w.seeds.split(",") if w.seeds else [""]:
+
             def one(name: str) -> dict | None:
-                return tune(w.before or w.program, w.folder, name, label + seed, words, bool(w.before), int(seed) if seed else None)
+                return tune(
+                    w.before or w.program,
+                    w.folder,
+                    name,
+                    label + seed,
+                    words,
+                    bool(w.before),
+                    int(seed) if seed else None,
+                )
 
             with ThreadPoolExecutor(w.parallel) as pool:
                 for o in pool.map(one, names):
@@ -210,7 +243,10 @@ def main() -> None:
         print(f"{len(outcomes)} outcomes, {better} of the reference better than before")
     else:
         kept = [(p.stem, json.loads(p.read_text())) for p in sorted(runs.glob("*.json"))]
-        print(sum(update_reference(w.folder, outcomes, label) for label, outcomes in kept), "of the reference better than before")
+        print(
+            sum(update_reference(w.folder, outcomes, label) for label, outcomes in kept),
+            "of the reference better than before",
+        )
         update_reference(w.folder, witnesses(w.folder, names), "witness")
     page.write(w.folder, REFERENCE, machines.ROOT / "results/search.md", MET)
 

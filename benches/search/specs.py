@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+import impossible
 import judge
 import machines
 import toml_text
@@ -27,10 +28,17 @@ SEED = 300
 RANDOM, INFEASIBLE = 174, 30
 PAPER_MS = (1.4, 1.5, 1.6, 1.7, 1.8, 1.9, 2.0, 2.2, 2.4)
 CHAINS = (
-    ("stage_1", "max_sensitivity"), ("gantry_2", "max_sensitivity"), ("galvo_1", "max_sensitivity"), ("vcm_1", "max_sensitivity"),
-    ("belt_1", "max_sensitivity"), ("bearing_1", "max_sensitivity"), ("hdd_room_0", "max_sensitivity"),
-    ("vcm_2", "phase_margin_deg"), ("galvo_2", "phase_margin_deg"), ("stage_3", "gain_margin_db"),
-)  # fmt: skip
+    ("stage_1", "max_sensitivity"),
+    ("gantry_2", "max_sensitivity"),
+    ("galvo_1", "max_sensitivity"),
+    ("vcm_1", "max_sensitivity"),
+    ("belt_1", "max_sensitivity"),
+    ("bearing_1", "max_sensitivity"),
+    ("hdd_room_0", "max_sensitivity"),
+    ("vcm_2", "phase_margin_deg"),
+    ("galvo_2", "phase_margin_deg"),
+    ("stage_3", "gain_margin_db"),
+)
 CONVEX = ("paper_healthy", "paper_loose_pushpin", "stage_1", "gantry_2", "galvo_1", "galvo_3", "belt_1", "bearing_3")
 CHAIN_STEPS = (0.9, 0.95, 1.02, 1.1, 1.2, 1.35)
 FILTER_S = 12e-6
@@ -124,11 +132,20 @@ class Maker:
         spec["margins"] = margins
         limits: dict = {}
         if not first:
-            curves = [self._curve(rng, m, bench, law, of, guard, gains) for of, p in (("S", 0.25), ("L", 0.3), ("T", 0.15), ("CS", 0.1), ("PS", 0.1)) if rng.random() < p]
+            curves = [
+                self._curve(rng, m, bench, law, of, guard, gains)
+                for of, p in (("S", 0.25), ("L", 0.3), ("T", 0.15), ("CS", 0.1), ("PS", 0.1))
+                if rng.random() < p
+            ]
             if curves:
                 limits["curve"] = curves
             if structure != "p_pi" and rng.random() < 0.15:
-                found = judge.judge(bench, {"limits": {"overshoot_percent": 1.0, "settling_s": 1.0}, "objective": {"minimise": "bandwidth"}}, None, law).figures
+                found = judge.judge(
+                    bench,
+                    {"limits": {"overshoot_percent": 1.0, "settling_s": 1.0}, "objective": {"minimise": "bandwidth"}},
+                    None,
+                    law,
+                ).figures
                 if found["overshoot_percent"] > 1.0:
                     limits["overshoot_percent"] = above(found["overshoot_percent"])
                 if rng.random() < 0.5:
@@ -188,65 +205,6 @@ class Maker:
             spec["structure"]["derivative_filter_s"] = f if rng.random() < 0.6 else [f / 6, f * 4]
 
 
-def infeasible(rng: np.random.Generator, maker: Maker, index: int) -> tuple[Machine, dict, str]:
-    """A spec that cannot be met, and why."""
-    kind = ("sensitivity", "phase", "sensitivity", "phase", "complement")[index % 5]
-    names = list(maker.every)
-    while True:
-        m = maker.every[str(rng.choice(names))]
-        nyquist, crossing = 0.5 / m.sample_time_s, math.sqrt(m.crossover_hz[0] * m.crossover_hz[1])
-        spec: dict = {"sample_time_s": m.sample_time_s, "guard": 0.0}
-        spec["objective"] = {"minimise": str(rng.choice(["disturbance", "bandwidth", "integral", "room"]))}
-        if spec["objective"]["minimise"] == "disturbance":
-            spec["disturbance"] = {"rms": 1.0, "corner_hz": 0.1 * crossing}
-        unstable = m.plant.unstable_poles()
-        if kind == "complement":
-            if not unstable:
-                continue
-            bench = maker.bench(m)
-            held = bench.loop.s.whole + 1
-            floor = sum(p.real for p in unstable) * m.sample_time_s * held
-            db = 20 * floor / math.log(10) - rng.uniform(0.2, 0.8)
-            spec["margins"] = {"max_sensitivity": 4.0}
-            spec["limits"] = {"curve": [{"of": "T", "side": "at_most", "hz": [crossing * 1e-4, 0.999999 * nyquist], "db": [db, db]}]}
-            why = f"T is 1 at the unstable pole and late by {held} samples: its largest value is at least {20 * floor / math.log(10):.4f} dB"
-            spec["search"] = {"seed": 1, "notches": 1, "lowpasses": 1}
-            return m, spec, why
-        if unstable:
-            continue
-        if kind == "sensitivity":
-            most, depth = rng.uniform(1.2, 1.7), rng.uniform(12.0, 30.0)
-            # The integral of ln|S| over (0, Nyquist) is 0 for a stable law on a stable plant.
-            share = math.log(most) / (depth / 20 * math.log(10) + math.log(most))
-            high = 1.15 * share * nyquist
-            low = 0.02 * high
-            if high > 0.8 * nyquist:
-                continue
-            spec["margins"] = {"max_sensitivity": most}
-            spec["limits"] = {"curve": [{"of": "S", "side": "at_most", "hz": [low, high], "db": [-depth, -depth]}]}
-            area = depth / 20 * math.log(10) * (high - low) - math.log(most) * (nyquist - (high - low))
-            if area <= 0:
-                continue
-            why = "the integral of ln|S| up to half the clock is 0; this limit needs it below 0"
-            spec["search"] = {"seed": 1, "notches": 2, "lowpasses": 1}
-            return m, spec, why
-        # Phase: a PID turns by more than -90 and less than 90 deg - wT/2; without filters nothing else does.
-        low, high = crossing, 1.8 * crossing
-        w = 2 * math.pi * np.geomspace(low, high, 20_000)
-        w = np.unique(np.concatenate([w, [x for x in maker.bench(m).loop.w if 2 * math.pi * low <= x <= 2 * math.pi * high]]))
-        # The law turns by -90 ... +90 - wT/2: the best margin is the largest over that arc.
-        arc = np.degrees(np.angle(-maker.bench(m).loop.s.response(w)))
-        most = np.where(abs(arc) >= 90, 180.0, arc + 90 - np.degrees(w * m.sample_time_s / 2))
-        asked = float(most.max()) + rng.uniform(2.0, 6.0)
-        if asked > 100 or asked < 25:
-            continue
-        spec["margins"] = {"phase_margin_deg": asked, "gain_crossover_hz": [low, high]}
-        spec["search"] = {"seed": 1, "notches": 0, "lowpasses": 0}
-        spec["structure"] = {"controller": "pid"}
-        why = f"no PID law without filters has more than {most.max():.2f} deg with a crossover between {low:.4g} and {high:.4g} Hz"
-        return m, spec, why
-
-
 def write(folder: Path, m: Machine, spec: dict, kind: str, law: Law | None, maker: Maker, **more) -> None:
     """One spec with its profile and what is known of it."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -258,8 +216,11 @@ def write(folder: Path, m: Machine, spec: dict, kind: str, law: Law | None, make
         (folder / "profile.toml").write_text(toml_text.text(profile), encoding="utf-8")
     meta = {"machine": m.name, "machine_kind": m.kind, "kind": kind, **more}
     if law is not None:
-        meta["witness"] = {k: v for k, v in law.__dict__.items() if k in (
-            "sample_time_s", "kp", "ki_per_s", "kd_s", "derivative_filter_s", "lowpasses", "notches")}  # fmt: skip
+        meta["witness"] = {
+            k: v
+            for k, v in law.__dict__.items()
+            if k in ("sample_time_s", "kp", "ki_per_s", "kd_s", "derivative_filter_s", "lowpasses", "notches")
+        }
         meta["witness_objective"] = judge.judge(maker.bench(m), spec, profile, law).objective
     digest = hashlib.sha256((m.toml + text + json.dumps(profile)).encode())
     meta["digest"] = digest.hexdigest()[:16]
@@ -294,7 +255,13 @@ def make(out: Path, every: list[Machine], seed: int) -> int:
         m = maker.every[f"paper_{name}"]
         paper, _ = judge.read_spec(machines.ROOT / "specs/limits/paper.toml")
         for k, limit in enumerate(PAPER_MS):
-            spec = {"sample_time_s": m.sample_time_s, "guard": 0.0, **paper, "profile": "profile.toml", "objective": {"minimise": "dft"}}
+            spec = {
+                "sample_time_s": m.sample_time_s,
+                "guard": 0.0,
+                **paper,
+                "profile": "profile.toml",
+                "objective": {"minimise": "dft"},
+            }
             spec["margins"] = {**paper["margins"], "max_sensitivity": limit}
             write(folder / f"c_{m.name}_{k}", m, spec, "chain", None, maker, first_edition=True, chain=m.name, step=k)
             count += 1
@@ -305,10 +272,20 @@ def make(out: Path, every: list[Machine], seed: int) -> int:
         for k, step in enumerate(CHAIN_STEPS):
             stepped, proved = chain_spec(spec, key, getattr(f, key), step)
             known = law if proved else None
-            write(folder / f"c_{name}_{k}", m, stepped, "chain", known, maker, first_edition=m.first_edition, chain=name, step=k)
+            write(
+                folder / f"c_{name}_{k}",
+                m,
+                stepped,
+                "chain",
+                known,
+                maker,
+                first_edition=m.first_edition,
+                chain=name,
+                step=k,
+            )
             count += 1
     for i in range(INFEASIBLE):
-        m, spec, why = infeasible(rng(), maker, i)
+        m, spec, why = impossible.draw(rng(), maker, i)
         write(folder / f"x{i:02}", m, spec, "infeasible", None, maker, first_edition=False, why=why)
         count += 1
     for name in CONVEX:

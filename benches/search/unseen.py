@@ -23,6 +23,12 @@ def every() -> list[Machine]:
             text = product_toml(units, held_body(at_rest, flexure, u(0.015, 0.04)), delay, modes)
         else:
             amplifier, (zeros, poles) = TAU * u(1500.0, 4000.0), _pairs(modes)
-            text = roots_toml(units, zeros, pair_roots(w0, u(0.015, 0.04)) + [complex(-amplifier)] + poles, at_rest * w0 * w0 * amplifier, delay)
+            text = roots_toml(
+                units,
+                zeros,
+                pair_roots(w0, u(0.015, 0.04)) + [complex(-amplifier)] + poles,
+                at_rest * w0 * w0 * amplifier,
+                delay,
+            )
         out.append(machine(f"piezo_{i + 1}", "piezo scanner", text, rate, (flexure / 6, flexure / 2), 10.0, False))
     return out

@@ -78,7 +78,9 @@ def ways(text: str, spec: dict, profile: dict | None) -> dict[str, tuple[str, di
     }
 
 
-def asked(program: str, folder: Path, way: str, job: tuple[str, dict, dict | None, list[str]]) -> tuple[laws.Law | None, str]:
+def asked(
+    program: str, folder: Path, way: str, job: tuple[str, dict, dict | None, list[str]]
+) -> tuple[laws.Law | None, str]:
     """The table in the original units, and what was said where there is none."""
     text, spec, profile, words = job
     folder.mkdir(parents=True, exist_ok=True)
@@ -88,7 +90,18 @@ def asked(program: str, folder: Path, way: str, job: tuple[str, dict, dict | Non
         (folder / "profile.toml").write_text(toml_text.text(profile), encoding="utf-8")
     table = folder / "gains.toml"
     table.unlink(missing_ok=True)
-    line = [program, "tune", "--json", "--plant", str(folder / "plant.toml"), "--spec", str(folder / "spec.toml"), "--out", str(table), "--no-certificate"]
+    line = [
+        program,
+        "tune",
+        "--json",
+        "--plant",
+        str(folder / "plant.toml"),
+        "--spec",
+        str(folder / "spec.toml"),
+        "--out",
+        str(table),
+        "--no-certificate",
+    ]
     done = subprocess.run(line + words, capture_output=True, text=True, check=False, timeout=300)
     if not table.exists():
         return None, "refused" if done.returncode == 2 else "infeasible"
@@ -116,20 +129,38 @@ def main() -> None:
         jobs = ways(text, spec, profile)
         heads = list(jobs)
         with ThreadPoolExecutor(2) as pool:
-            found = dict(zip(jobs, pool.map(lambda k: asked(w.program, w.folder / "variants" / f"{name}_{k.replace(' ', '_')}", k, jobs[k]), jobs)))
+            found = dict(
+                zip(
+                    jobs,
+                    pool.map(
+                        lambda k: asked(w.program, w.folder / "variants" / f"{name}_{k.replace(' ', '_')}", k, jobs[k]),
+                        jobs,
+                    ),
+                )
+            )
         values = {}
-        for way, (law, said) in found.items():
+        for way, (law, _) in found.items():
             j = judges.judge(meta["machine"], spec, profile, law) if law else None
             values[way] = j.objective if j and j.worst <= run.MET else math.inf
         best = min(values.values())
-        gaps = {k: page.behind(v, best, judge.objective_name(spec)) if v < math.inf else math.inf for k, v in values.items()}
+        gaps = {
+            k: page.behind(v, best, judge.objective_name(spec)) if v < math.inf else math.inf for k, v in values.items()
+        }
         apart.append(max(gaps.values()) if best < math.inf else 0.0)
         cells = [found[k][1] or page.percent(gaps[k]) for k in jobs]
         rows.append(f"| {name} | {meta['machine']} | {judge.objective_name(spec)} | " + " | ".join(cells) + " |")
         print(rows[-1], flush=True)
     same = sum(x <= page.NEAR for x in apart)
-    lines = ["# Search: the same, asked in other ways", "", "Made by `python benches/search/variants.py`. How far each answer is behind the best of its row, judged in the original units.", "",
-             f"All ways within 2 %: {same} of {len(rows)} specs.", "", "| spec | machine | objective | " + " | ".join(heads) + " |", "|---" * (len(heads) + 3) + "|"]  # fmt: skip
+    lines = [
+        "# Search: the same, asked in other ways",
+        "",
+        "Made by `python benches/search/variants.py`. How far each answer is behind the best of its row, judged in the original units.",
+        "",
+        f"All ways within 2 %: {same} of {len(rows)} specs.",
+        "",
+        "| spec | machine | objective | " + " | ".join(heads) + " |",
+        "|---" * (len(heads) + 3) + "|",
+    ]
     (machines.ROOT / "results/search_variants.md").write_text("\n".join(lines + rows) + "\n", encoding="utf-8")
 
 

@@ -26,7 +26,15 @@ def _peaks(m: Machine, bench: judge.Bench) -> list[float]:
     return [hz for _, hz in sorted(found, reverse=True)]
 
 
-def draw(rng: np.random.Generator, m: Machine, bench: judge.Bench, structure: str, notches: int, lowpasses: int, filter_s: float) -> Law | None:
+def draw(
+    rng: np.random.Generator,
+    m: Machine,
+    bench: judge.Bench,
+    structure: str,
+    notches: int,
+    lowpasses: int,
+    filter_s: float,
+) -> Law | None:
     """One stable law with sound margins, or nothing after many tries."""
     t, nyquist, peaks = m.sample_time_s, 0.5 / m.sample_time_s, _peaks(m, bench)
     for _ in range(60):
@@ -52,10 +60,31 @@ def draw(rng: np.random.Generator, m: Machine, bench: judge.Bench, structure: st
             one = (velocity + inner, velocity * inner, 1.0)
             law = Law(t, one[0], one[1], one[2], 0.0, filters, tuple(holes))
         else:
-            law = Law(t, 1 + (integral / lead if lead < math.inf else 0.0), integral, 1 / lead if lead < math.inf else 0.0, filter_s, filters, tuple(holes))
-        scale = 1 / abs(bench.loop.s.response(np.array([wc])) * laws.response(law.rows(), np.exp(-1j * np.array([wc * t]))))[0]
+            law = Law(
+                t,
+                1 + (integral / lead if lead < math.inf else 0.0),
+                integral,
+                1 / lead if lead < math.inf else 0.0,
+                filter_s,
+                filters,
+                tuple(holes),
+            )
+        scale = (
+            1
+            / abs(bench.loop.s.response(np.array([wc])) * laws.response(law.rows(), np.exp(-1j * np.array([wc * t]))))[
+                0
+            ]
+        )
         for _ in range(4):
-            tried = Law(t, law.kp * scale, law.ki_per_s * scale, law.kd_s * scale, law.derivative_filter_s, filters, tuple(holes))
+            tried = Law(
+                t,
+                law.kp * scale,
+                law.ki_per_s * scale,
+                law.kd_s * scale,
+                law.derivative_filter_s,
+                filters,
+                tuple(holes),
+            )
             if close(bench.loop.s, tried.rows()).unstable() == 0:
                 f = bench.loop.margins(tried)
                 sound = f.max_sensitivity < 3.0 and (f.phase_margin_deg or 99) > 18 and (f.gain_margin_db or 99) > 3
@@ -63,5 +92,3 @@ def draw(rng: np.random.Generator, m: Machine, bench: judge.Bench, structure: st
                     return tried
             scale *= 0.8
     return None
-
-

@@ -51,9 +51,18 @@ def profile_of(d: dict) -> Profile:
     s, noise = d["spiral"], d.get("noise", {})
     run = tuple((r["order"], r["amplitude"], np.radians(r.get("phase_deg", 0.0))) for r in noise.get("runout", []))
     return Profile(
-        s["velocity"], s["distance"], s["acceleration_time_s"], s["start_s"], s["duration_s"], d["pes"]["sample_rate_hz"],
-        tuple(d["pes"]["window"]), noise.get("encoder_rms", 0.0), noise.get("windage_rms", 0.0), noise.get("windage_corner_hz", 0.0),
-        noise.get("spindle_hz", 0.0), run,
+        s["velocity"],
+        s["distance"],
+        s["acceleration_time_s"],
+        s["start_s"],
+        s["duration_s"],
+        d["pes"]["sample_rate_hz"],
+        tuple(d["pes"]["window"]),
+        noise.get("encoder_rms", 0.0),
+        noise.get("windage_rms", 0.0),
+        noise.get("windage_corner_hz", 0.0),
+        noise.get("spindle_hz", 0.0),
+        run,
     )
 
 
@@ -85,7 +94,9 @@ class Scene:
         c, f = close(self.s, law.rows()), law.feedforward
         ahead = np.zeros(len(self.r))
         if f:
-            ahead = f.get("factor", 0.0) * (f.get("velocity_s", 0.0) * self.speed + f.get("acceleration_s2", 0.0) * self.acceleration)
+            ahead = f.get("factor", 0.0) * (
+                f.get("velocity_s", 0.0) * self.speed + f.get("acceleration_s2", 0.0) * self.acceleration
+            )
         x = np.zeros((len(self.r) + 1, len(c.a)))
         driven = np.outer(self.r, c.b_r) + np.outer(ahead, c.b_w)
         for k in range(len(self.r)):
