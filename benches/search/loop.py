@@ -17,6 +17,8 @@ from law import Law
 from plant import Plant
 
 POINTS = 100_000
+EDGE = 10 ** (-3 / 20)
+"""|T| at the edge of the bandwidth, -3 dB."""
 
 
 def phi(p: complex, h: float) -> complex:
@@ -223,7 +225,7 @@ class Bench:
         )
         far = min(float(found.fun), float(abs(1 + value[i])))
         t = abs(value / (1 + value))
-        falls = self._roots(lambda x: np.log(abs(at(x) / (1 + at(x))) * np.sqrt(2)), np.log(t * np.sqrt(2)), 1)
+        falls = self._roots(lambda x: np.log(abs(at(x) / (1 + at(x))) / EDGE), np.log(t / EDGE), 1)
         hz = 1 / (2 * np.pi)
         return Margins(
             close(self.s, rows).unstable() == 0,

@@ -133,7 +133,7 @@ class Problem:
             low, high = m["gain_crossover_hz"]
             v += judge.crossings(list(gains), low * (1 + guard), high * (1 - guard), m.get("phase_stabilised_hz", []))
         if "bandwidth_hz" in m:
-            below = np.nonzero(abs(value * s) < math.sqrt(0.5))[0]
+            below = np.nonzero(abs(value * s) < loop.EDGE)[0]
             if len(below):
                 v.append(1 - hz[below[0]] / (m["bandwidth_hz"] * (1 + guard)))
         limits = self.spec.get("limits", {})
