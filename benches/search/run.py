@@ -145,6 +145,8 @@ def update_reference(folder: Path, outcomes: list[dict], source: str) -> int:
         if old is None or old["digest"] != digest or o["objective"] < old["objective"] - 1e-9 * abs(old["objective"]):
             known[o["id"]] = {"objective": o["objective"], "source": source, "digest": digest}
             better += 1
+    digests = {n: json.loads((folder / "specs" / n / "meta.json").read_text())["digest"] for n in known_ids}
+    known = {k: v for k, v in known.items() if digests.get(k, v["digest"]) == v["digest"]}
     _along_chains(folder, known)
     REFERENCE.write_text(
         "{\n" + ",\n".join(f' "{k}": {json.dumps(known[k])}' for k in sorted(known)) + "\n}\n", encoding="utf-8"
