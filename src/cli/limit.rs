@@ -114,12 +114,21 @@ pub(super) fn beside(
     Ok(Gap { file, says: limit_sentences(&bound, Some(&own), Some((&best, STARTS)), structure, alone) })
 }
 
+/// The bounds rest on the plant's own answer to a pulse, which of an unstable plant outgrows every digit within a record.
+pub(super) fn refuse_unstable(plant: &Plant) -> Result<(), Failure> {
+    match plant.body.unstable_poles() {
+        0 => Ok(()),
+        poles => Err(Failure::LimitOfUnstable { poles }),
+    }
+}
+
 pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     a.out.as_deref().map_or(Ok(()), check_target)?;
     let plant = load::plant(&a.plant)?;
     if let Some(p) = plant.physics.first() {
         return Err(LimitError::Physics { effect: p.effect.clone() }.into());
     }
+    refuse_unstable(&plant)?;
     let spec = Spec::read(&a.spec).map_err(TuneError::from)?;
     let gains = a.gains.as_ref().map(|file| load::controller(file)).transpose()?;
     let t = gains.as_ref().map_or(a.sample_time_s, |g| g.sample_time_s);

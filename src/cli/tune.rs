@@ -90,6 +90,9 @@ impl Given {
 }
 
 pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    if a.frf.is_none() && a.taken.any() {
+        return Err(Failure::MeasuredWithout);
+    }
     if let (Some(machines), Some(gate)) = (&a.machines, &a.gate) {
         return tune_machines::run(a, machines, gate, screen);
     }
@@ -111,12 +114,21 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
             if let Some(physics) = physics.as_ref().filter(|_| a.gap) {
                 return Err(Failure::GapOfPhysics { file: file.clone(), effects: physics.names().join(", ") });
             }
+            if a.gap {
+                limit::refuse_unstable(&plant)?;
+            }
             plant.physics.clear();
             input("plant", sha256_hex(read_text(file)?.as_bytes()));
             Given::Model(Box::new(plant), physics.map(Box::new))
         }
         (None, Some(file)) => {
-            let sweep = load::sweep(file, &a.reading, screen)?;
+            let taken = load::Taken {
+                how: &a.taken,
+                unstable_poles: a.unstable_poles,
+                hold_included: a.hold_included || a.model.settings().hold != identify::Hold::NotIncluded,
+                controller: a.controller.as_deref(),
+            };
+            let sweep = load::sweep(file, &a.reading, &taken, screen)?;
             input("frf", sweep.source_digest.clone());
             let hold = if a.hold_included { Hold::Included } else { Hold::NotIncluded };
             let identified = identify(&sweep.frf, &model_settings(a))

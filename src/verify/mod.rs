@@ -4,6 +4,7 @@
 //! a refusal that says what to measure again. Shared with the rest are the readers of files and the seeded generator only.
 //! Convention: L = P C, negative feedback; spec: `specs/certificate.md`.
 
+mod blocks;
 mod bounds;
 mod cascade;
 mod certificate;
@@ -21,6 +22,7 @@ mod patch;
 mod plant;
 mod prove;
 mod range;
+mod roots;
 mod rounding;
 mod settings;
 mod spectrum_box;

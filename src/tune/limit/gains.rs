@@ -69,7 +69,8 @@ pub(super) fn lasting(
             let sampled = DiscretePlant::of(plant, t)?;
             let grid = crate::feedback::SampledPlant::of_model(&sampled);
             let w = grid.w_rad_s().to_vec();
-            frf = Frf::new(w.clone(), w.iter().map(|w| sampled.at(*w)).collect(), None)?;
+            frf = Frf::new(w.clone(), w.iter().map(|w| sampled.at(*w)).collect(), None)?
+                .with_unstable_poles(sampled.unstable_poles());
             curve(&frf, Hold::Included, Some(plant), t)?
         }
     };
