@@ -17,6 +17,7 @@ fn cascade(p: &Plant) -> (DMatrix<f64>, DVector<f64>, DVector<f64>) {
             (dc_gain * w * w, (w * T).powi(2), 2.0 * damping_ratio * w * T)
         }
         Body::FreeInertia { acceleration_gain, viscous_rate_per_s } => (acceleration_gain, 0.0, viscous_rate_per_s * T),
+        Body::Rational(_) => unreachable!("bodies of this file have two poles"),
     };
     a[(0, 1)] = 1.0;
     a[(1, 0)] = -w;

@@ -4,7 +4,7 @@ pub(super) use super::diagnose_arguments::DiagnoseArguments;
 pub(super) use super::fleet_arguments::{FleetArguments, TwinFleetArguments};
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
 pub(super) use super::performance_arguments::{BudgetArguments, NextSweepArguments, ParetoArguments};
-pub(super) use super::sweep_arguments::{ModelArguments, ReadingArguments};
+pub(super) use super::sweep_arguments::{MeasuredArguments, ModelArguments, ReadingArguments};
 pub(super) use super::verify_arguments::VerifyArguments;
 use super::verify_arguments::uncertainty;
 use crate::twin::line::UnknownKind;
@@ -85,8 +85,13 @@ pub(super) struct IdentifyArguments {
     /// Plant model to write
     #[arg(long, value_name = "PLANT")]
     pub out: PathBuf,
+    /// Controller that ran while the sweep was taken, for --measured other than P
+    #[arg(long, value_name = "CONTROLLER")]
+    pub controller: Option<PathBuf>,
     #[command(flatten)]
     pub reading: ReadingArguments,
+    #[command(flatten)]
+    pub taken: MeasuredArguments,
     #[command(flatten)]
     pub model: ModelArguments,
 }
@@ -97,7 +102,9 @@ pub(super) struct IdentifyArguments {
 #[command(after_help = "Examples:
   servotune margins --plant specs/machines/healthy.toml --controller specs/controllers/nominal.toml
   servotune margins --plant plant_corrected.toml --controller specs/controllers/nominal.toml --amplitudes 0.02:15
-  servotune margins --frf slot07.bod --controller specs/controllers/nominal.toml")]
+  servotune margins --frf slot07.bod --controller specs/controllers/nominal.toml
+  servotune margins --frf sensitivity.csv --measured S --controller specs/controllers/nominal.toml
+  servotune margins --frf bearing.bod --unstable-poles 1 --controller bearing_controller.toml")]
 pub(super) struct MarginsArguments {
     /// Plant model (plant.toml)
     #[arg(long, value_name = "PLANT", group = "machine")]
@@ -114,8 +121,13 @@ pub(super) struct MarginsArguments {
     /// Amplitudes of the position at which physics beyond linear is described (position_unit)
     #[arg(long, value_name = "LOW:HIGH", default_value = "0.15:15", value_parser = amplitudes, conflicts_with = "frf")]
     pub amplitudes: (f64, f64),
+    /// Poles of the plant in the right half-plane: no sweep shows them, and the count of the loop's unstable poles needs them
+    #[arg(long, value_name = "N", default_value_t = 0, conflicts_with = "plant")]
+    pub unstable_poles: usize,
     #[command(flatten)]
     pub reading: ReadingArguments,
+    #[command(flatten)]
+    pub taken: MeasuredArguments,
 }
 
 /// Time record to swept-sine file: the response of one column to another, with its deviation
@@ -248,8 +260,13 @@ pub(super) struct TuneArguments {
     /// Starts of the search
     #[arg(long, value_name = "N", default_value_t = 12)]
     pub starts: usize,
+    /// Poles of the swept plant in the right half-plane: no sweep shows them
+    #[arg(long, value_name = "N", default_value_t = 0, conflicts_with_all = ["plant", "machines"])]
+    pub unstable_poles: usize,
     #[command(flatten)]
     pub reading: ReadingArguments,
+    #[command(flatten)]
+    pub taken: MeasuredArguments,
     #[command(flatten)]
     pub model: ModelArguments,
 }

@@ -5,7 +5,7 @@ use crate::diagnose::DiagnoseError;
 use crate::document::DocumentError;
 use crate::feedback::FeedbackError;
 use crate::fleet::FleetError;
-use crate::frf::{FrfError, FrfShapeError};
+use crate::frf::{FrfError, FrfShapeError, Measured};
 use crate::gate::GateError;
 use crate::gate::features::FeatureError;
 use crate::identify::IdentifyError;
@@ -60,6 +60,20 @@ pub enum Failure {
         file.display()
     )]
     Unit { file: PathBuf, found: String, expected: String },
+    #[error(
+        "--measured {measured} needs the controller that ran during the sweep; give it with --measured-with or --controller"
+    )]
+    NoController { measured: Measured },
+    #[error(
+        "--measured-with names the controller of a sweep in closed loop; expected --measured L, S, T, PS or CS beside it"
+    )]
+    MeasuredPlant,
+    #[error(
+        "--measured {measured}: the controller's hold is in such a sweep and is taken out; leave --hold-included and --hold-s out"
+    )]
+    HoldTwice { measured: Measured },
+    #[error("--measured and --measured-with speak of one sweep; expected --frf, found --plant or --machines")]
+    MeasuredWithout,
     #[error("no machine: expected --plant PLANT, --frf FRF or --machines DIR with --gate GATE")]
     NoMachine,
     #[error("--override {id}: no such machine in {}; found {found}", folder.display())]

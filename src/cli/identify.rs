@@ -3,7 +3,7 @@
 use super::arguments::IdentifyArguments;
 use super::{Ending, Failure, Screen, load};
 use crate::document::write_text;
-use crate::identify::{HeldOut, Identified, Intervals, LadderRung, TrustedBand, Work, identify};
+use crate::identify::{HeldOut, Hold, Identified, Intervals, LadderRung, TrustedBand, Work, identify};
 use crate::lti::PlantFile;
 use crate::report::identified::{identified_sentences, ladder_table, order_table, parameter_table};
 use serde::Serialize;
@@ -30,7 +30,9 @@ struct Document<'a> {
 }
 
 pub(super) fn run(a: &IdentifyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
-    let sweep = load::sweep(&a.frf, &a.reading, screen)?;
+    let hold_included = a.model.settings().hold != Hold::NotIncluded;
+    let taken = load::Taken { how: &a.taken, unstable_poles: 0, hold_included, controller: a.controller.as_deref() };
+    let sweep = load::sweep(&a.frf, &a.reading, &taken, screen)?;
     let id = identify(&sweep.frf, &a.model.settings())
         .map_err(|source| Failure::Identify { file: a.frf.clone(), source })?;
     let file = PlantFile::from(&id.plant);

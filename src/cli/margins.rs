@@ -20,6 +20,9 @@ pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, F
     let controller = load::controller(&a.controller)?;
     let sections =
         controller.sections().map_err(|source| Failure::Controller { file: a.controller.clone(), source })?;
+    if a.frf.is_none() && a.taken.any() {
+        return Err(Failure::MeasuredWithout);
+    }
     let stable = match (&a.plant, &a.frf) {
         (Some(file), _) => {
             let fallback = Context::default();
@@ -33,7 +36,13 @@ pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, F
             of_model(file, &sections, &context, &amplitudes, screen)?
         }
         (None, Some(file)) => {
-            let sweep = load::sweep(file, &a.reading, screen)?;
+            let taken = load::Taken {
+                how: &a.taken,
+                unstable_poles: a.unstable_poles,
+                hold_included: a.hold_included,
+                controller: Some(&a.controller),
+            };
+            let sweep = load::sweep(file, &a.reading, &taken, screen)?;
             let judged = measured_margins(&MeasuredLoop::new(&sweep.frf, &sections, a.hold_included)?)?;
             screen.result(&judged, &measured_text(&judged)?)?;
             judged.margins.stable

@@ -6,7 +6,13 @@ use crate::feedback::{PlanSettings, sweep_plan};
 use crate::report::budget::{narrowing_table, tones_table};
 
 pub(super) fn run(a: &NextSweepArguments, screen: &mut Screen) -> Result<Ending, Failure> {
-    let sweep = load::sweep(&a.frf, &a.reading, screen)?;
+    let taken = load::Taken {
+        how: &a.taken,
+        unstable_poles: a.unstable_poles,
+        hold_included: a.hold_included,
+        controller: Some(&a.controller),
+    };
+    let sweep = load::sweep(&a.frf, &a.reading, &taken, screen)?;
     let controller = load::controller(&a.controller)?;
     let sections =
         controller.sections().map_err(|source| Failure::Controller { file: a.controller.clone(), source })?;

@@ -1,6 +1,6 @@
 //! The words of `pareto`, `budget` and `next-sweep`.
 
-use super::sweep_arguments::ReadingArguments;
+use super::sweep_arguments::{MeasuredArguments, ReadingArguments};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -97,8 +97,13 @@ pub(super) struct NextSweepArguments {
     /// Settling before each tone (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 0.02, value_parser = not_negative)]
     pub settle_s: f64,
+    /// Poles of the plant in the right half-plane: no sweep shows them
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub unstable_poles: usize,
     #[command(flatten)]
     pub reading: ReadingArguments,
+    #[command(flatten)]
+    pub taken: MeasuredArguments,
 }
 
 fn number(text: &str, good: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {

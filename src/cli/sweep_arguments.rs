@@ -1,11 +1,12 @@
 //! What a person can say about a sweep file and about the model wanted from it.
 
 use crate::frf::{
-    AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale,
+    AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale, Measured,
     PhaseConvention, ReadSettings, Unsorted,
 };
 use crate::identify::{BodyChoice, Hold, IdentifySettings, OrderChoice, ZeroSide};
 use clap::{Args, ValueEnum};
+use std::path::PathBuf;
 
 /// How to read the sweep file; whatever is left at `auto` is decided from the file and said
 #[derive(Clone, Debug, Args)]
@@ -66,6 +67,25 @@ impl ReadingArguments {
             expected_hz: self.expect_hz,
             ..ReadSettings::default()
         }
+    }
+}
+
+/// In what loop the sweep was taken
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Reading the sweep")]
+pub(super) struct MeasuredArguments {
+    /// What was swept: P, or in closed loop L, S, T, PS or CS with a known controller, out of which the plant is then opened
+    #[arg(long, default_value_t, value_name = "WORD")]
+    pub measured: Measured,
+    /// Controller that ran while L, S, T, PS or CS was swept (controller.toml or gains.toml); --controller where absent
+    #[arg(long, value_name = "CONTROLLER")]
+    pub measured_with: Option<PathBuf>,
+}
+
+impl MeasuredArguments {
+    /// Whether anything is said.
+    pub(super) fn any(&self) -> bool {
+        self.measured != Measured::Plant || self.measured_with.is_some()
     }
 }
 

@@ -109,6 +109,9 @@ impl Given {
 }
 
 pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    if a.frf.is_none() && a.taken.any() {
+        return Err(Failure::MeasuredWithout);
+    }
     if let (Some(machines), Some(gate)) = (&a.machines, &a.gate) {
         return tune_machines::run(a, machines, gate, screen);
     }
@@ -199,7 +202,13 @@ fn given(
             Ok(Given::Model { plant: Box::new(plant), source: Box::new(source), physics })
         }
         (None, Some(file)) => {
-            let sweep = load::sweep(file, &a.reading, screen)?;
+            let taken = load::Taken {
+                how: &a.taken,
+                unstable_poles: a.unstable_poles,
+                hold_included: a.hold_included || a.model.settings().hold != identify::Hold::NotIncluded,
+                controller: a.controller.as_deref(),
+            };
+            let sweep = load::sweep(file, &a.reading, &taken, screen)?;
             input("frf", sweep.source_digest.clone());
             let hold = if a.hold_included { Hold::Included } else { Hold::NotIncluded };
             let identified = identify(&sweep.frf, &model_settings(a, clock))

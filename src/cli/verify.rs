@@ -26,7 +26,17 @@ pub(super) fn run(a: &VerifyArguments, screen: &mut Screen) -> Result<Ending, Fa
         None => Default::default(),
     };
     let plants = a.plant.iter().map(|p| Source::read(p)).collect::<Result<Vec<Source>, VerifyError>>()?;
-    let sweeps = a.frf.iter().map(|f| load::sweep(f, &a.reading, screen)).collect::<Result<Vec<Sweep>, Failure>>()?;
+    let taken = load::Taken {
+        how: &a.taken,
+        unstable_poles: a.unstable_poles,
+        hold_included: a.hold_included,
+        controller: a.controller.as_deref(),
+    };
+    if a.frf.is_empty() && a.taken.any() {
+        return Err(Failure::MeasuredWithout);
+    }
+    let sweeps =
+        a.frf.iter().map(|f| load::sweep(f, &a.reading, &taken, screen)).collect::<Result<Vec<Sweep>, Failure>>()?;
     let profile = Spec::profile_path(&a.spec).map_err(VerifyError::from)?;
     let profile = profile.map(|p| Source::read(&p)).transpose()?;
     let inputs = Inputs {

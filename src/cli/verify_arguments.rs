@@ -1,6 +1,6 @@
 //! The words of `servotune verify`.
 
-use super::sweep_arguments::ReadingArguments;
+use super::sweep_arguments::{MeasuredArguments, ReadingArguments};
 use crate::verify::{LEAST_DAMPING, Uncertainty, Word};
 use clap::Args;
 use std::path::PathBuf;
@@ -32,8 +32,16 @@ pub(super) struct VerifyArguments {
     /// The sweep was taken through the controller's own hold, which is then not applied again
     #[arg(long, requires = "frf")]
     pub hold_included: bool,
+    /// Poles of the swept plant in the right half-plane: no sweep shows them
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "frf")]
+    pub unstable_poles: usize,
+    /// Controller that ran while the sweeps were taken, for --measured other than P
+    #[arg(long, value_name = "CONTROLLER", requires = "frf")]
+    pub controller: Option<PathBuf>,
     #[command(flatten)]
     pub reading: ReadingArguments,
+    #[command(flatten)]
+    pub taken: MeasuredArguments,
     /// Limits and write (spec.toml)
     #[arg(long, value_name = "SPEC")]
     pub spec: PathBuf,

@@ -318,13 +318,13 @@ impl Bench {
     /// The constant torque on a run beside command and laws (command_unit): what the error along the recorded motion asks for.
     pub fn constant_torque(&self, run: &Run, model: &Model) -> Result<f64, LtiError> {
         let (carrier, mut e) = self.raw_along(run, model)?;
-        let (t, n, body) = (self.scene.sample_time_s, run.len(), self.form.given.body);
+        let (t, n, body) = (self.scene.sample_time_s, run.len(), &self.form.given.body);
         self.whitener.apply(&mut e);
-        let mut free = free_motions(&body, t, n);
+        let mut free = free_motions(body, t, n);
         free.iter_mut().for_each(|c| self.whitener.apply(c));
         let mut qr = Qr::default();
         qr.factor(n, 3, |a| a.chunks_exact_mut(n).zip(&free).for_each(|(a, c)| a.copy_from_slice(c)));
-        let acceleration = qr.solve(&mut e)[2] * free_scales(&body, t, n)[2];
+        let acceleration = qr.solve(&mut e)[2] * free_scales(body, t, n)[2];
         let gain = body_numbers(&carrier.plant.body).0 * carrier.plant.resonance_gain;
         Ok(acceleration * carrier.arm_over_record() / gain - run.before)
     }

@@ -18,7 +18,7 @@ use super::select::{self, SelectSettings, Selection};
 use super::swing::swing;
 use super::unrest::unrest;
 use crate::controller::{Controller, ControllerError, Law};
-use crate::lti::{LtiError, Plant};
+use crate::lti::{Body, LtiError, Plant};
 use crate::physics::library;
 use crate::recording::Case;
 use thiserror::Error;
@@ -48,6 +48,11 @@ pub enum DiagnoseError {
         "the plant holds [[plant.physics]] effect \"{effect}\": a diagnosis starts from a linear plant; remove the table, and the effect is found again if it is there"
     )]
     Physics { effect: String },
+    /// The plant is no second-order body or free inertia with resonance pairs.
+    #[error(
+        "the plant has {poles} poles beside its resonance pairs, real or unstable ones among them: a diagnosis starts from a second-order body or a free inertia; give the machine's own body, and a lag as [[plant.physics]] is found again if it is there"
+    )]
+    Body { poles: usize },
     /// Nothing moves.
     #[error("record `{record}`: the command never changes; expected a record in which the machine is driven")]
     Still { record: String },
@@ -104,6 +109,10 @@ pub fn diagnose(
     }
     if let Some(entry) = given.physics.first() {
         return Err(DiagnoseError::Physics { effect: entry.effect.clone() });
+    }
+    let given = &given.paired();
+    if let Body::Rational(r) = &given.body {
+        return Err(DiagnoseError::Body { poles: r.poles.len() });
     }
     let mut all = runs(case);
     for run in &all {

@@ -57,7 +57,7 @@ impl Judged<'_> {
         let modes: f64 = self.plant.modes.iter().map(|m| (m.zero_rad_s / m.pole_rad_s).powi(2)).product();
         match self.plant.body {
             Body::SecondOrder { dc_gain, .. } => dc_gain * self.plant.resonance_gain * modes,
-            Body::FreeInertia { .. } => f64::INFINITY,
+            Body::FreeInertia { .. } | Body::Rational(_) => f64::INFINITY,
         }
     }
 

@@ -32,11 +32,11 @@ struct Phasors([Vec<[f64; 2]>; 3]);
 
 impl Phasors {
     fn of(bench: &Bench, runs: &[(Run, Vec<f64>)], line: &Line) -> Phasors {
-        let (t, body) = (bench.scene.sample_time_s, bench.form.given.body);
+        let (t, body) = (bench.scene.sample_time_s, &bench.form.given.body);
         let over = |part: [usize; 2]| -> Vec<[f64; 2]> {
             let each = runs.iter().map(|(run, e)| {
                 let [from, to] = part.map(|p| p * run.len() / 2);
-                line.fit(run, from..to, &free_motions(&body, t, to - from), t, e)
+                line.fit(run, from..to, &free_motions(body, t, to - from), t, e)
             });
             each.collect()
         };

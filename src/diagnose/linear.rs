@@ -132,6 +132,7 @@ impl LinearForm {
             Body::FreeInertia { .. } => {
                 Body::FreeInertia { acceleration_gain: gain, viscous_rate_per_s: viscous.max(0.0) }
             }
+            Body::Rational(ref r) => Body::Rational(r.clone()),
         };
         plant
     }
@@ -144,6 +145,8 @@ pub fn body_numbers(body: &Body) -> (f64, f64, f64) {
             (dc_gain * w * w, w * w, 2.0 * damping_ratio * w)
         }
         Body::FreeInertia { acceleration_gain, viscous_rate_per_s } => (acceleration_gain, 0.0, viscous_rate_per_s),
+        // Refused at the door of the room.
+        Body::Rational(ref r) => (r.gain, 0.0, 0.0),
     }
 }
 
@@ -152,6 +155,7 @@ pub(super) fn rate_of(body: &Body) -> f64 {
     match *body {
         Body::SecondOrder { natural_frequency_rad_s, .. } => natural_frequency_rad_s,
         Body::FreeInertia { viscous_rate_per_s, .. } => viscous_rate_per_s.max(1.0),
+        Body::Rational(_) => 1.0,
     }
 }
 

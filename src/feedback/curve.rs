@@ -20,6 +20,8 @@ pub struct ResponseCurve {
     ln_p: Vec<Complex<f64>>,
     /// Poles of the plant at rest: the model's, or from the slope of the first points, |P| then going on as w^-integrators.
     integrators: usize,
+    /// Poles of the plant outside the unit circle, as stated.
+    outside: usize,
     /// What goes on outside the sweep, with the factors that join it to the first and to the last point.
     continuation: Option<(DiscretePlant, [Complex<f64>; 2])>,
 }
@@ -52,7 +54,15 @@ impl ResponseCurve {
         let last = ln_w.partition_point(|x| *x <= ln_w[0] + SLOPE_OCTAVES * 2f64.ln()).max(2) - 1;
         let slope = (ln_p[last].re - ln_p[0].re) / (ln_w[last] - ln_w[0]);
         let integrators = (-slope).round().clamp(0.0, 2.0) as usize;
-        Ok(ResponseCurve { sample_time_s, w, ln_w, ln_p, integrators, continuation: None })
+        Ok(ResponseCurve {
+            sample_time_s,
+            w,
+            ln_w,
+            ln_p,
+            integrators,
+            outside: frf.unstable_poles(),
+            continuation: None,
+        })
     }
 
     /// The same curve, going on outside the sweep as a model does: scaled to meet the first and the last point.
@@ -93,7 +103,9 @@ impl ResponseCurve {
     /// The curve on its own points.
     pub fn sampled(&self) -> SampledPlant {
         let value: Vec<Complex<f64>> = self.ln_p.iter().map(|p| p.exp()).collect();
-        SampledPlant::of_points(self.sample_time_s, self.integrators, self.w.clone(), &value)
+        // An unstable pole and its mirror below the first points look like two integrators, and lift nothing.
+        let integrators = self.integrators.saturating_sub(2 * self.outside);
+        SampledPlant::of_points(self.sample_time_s, integrators, self.w.clone(), &value).with_unstable(self.outside)
     }
 
     /// Whether a frequency (rad/s) lies within the sweep.

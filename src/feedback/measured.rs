@@ -6,7 +6,7 @@
 
 use super::open_loop::section_poles;
 use super::{FeedbackError, Margins, OpenLoop, ResponseCurve, margins};
-use crate::frf::Frf;
+use crate::frf::{Frf, scatter};
 use crate::lti::{FrequencyResponse, Sections};
 use nalgebra::Complex;
 use serde::Serialize;
@@ -22,6 +22,8 @@ pub struct MeasuredLoop<'a> {
     slack: Vec<f64>,
     /// Phase of the plant at the first point (rad), on its true branch.
     start_phase: f64,
+    /// Poles of the plant outside the unit circle, as stated.
+    outside: usize,
 }
 
 /// A range.
@@ -68,7 +70,9 @@ const REACH: f64 = 1.96 * std::f64::consts::FRAC_1_SQRT_2;
 impl<'a> MeasuredLoop<'a> {
     /// `hold_included`: the sweep was taken through the controller's own hold, so it is not applied again.
     ///
-    /// The plant is taken to be stable with a phase between +90 and -270 deg at the first point, as a positioner's is.
+    /// A stable plant is taken to have a phase between +90 and -270 deg at the first point, counted from rest, as a positioner's is. Each
+    /// unstable pole that the response is stated to have turns the value at rest by half a turn, as the negative stiffness of a bearing does;
+    /// more than one of them are taken to lie above the first point.
     pub fn new(frf: &Frf, sections: &'a Sections, hold_included: bool) -> Result<Self, FeedbackError> {
         let t = sections.sample_time_s;
         let curve = ResponseCurve::of(frf, t, |w| if hold_included { Complex::new(1.0, 0.0) } else { hold(w * t) })?;
@@ -77,7 +81,7 @@ impl<'a> MeasuredLoop<'a> {
         let (ln_size, phase): (Vec<f64>, Vec<f64>) = ln_p.iter().map(|p| (p.re, p.im)).unzip();
         let deviation: Vec<f64> = match frf.relative_std() {
             Some(s) => s[..n].to_vec(),
-            None => vec![scatter(&ln_size, &phase); n],
+            None => vec![scatter(ln_p); n],
         };
         let slack = (0..n - 1)
             .map(|i| {
@@ -85,9 +89,9 @@ impl<'a> MeasuredLoop<'a> {
                 noise + bend(ln_w, &ln_size, i).max(bend(ln_w, &phase, i))
             })
             .collect();
-        let first = phase[0];
-        let start_phase = if first > PI / 2.0 { first - TAU } else { first };
-        Ok(MeasuredLoop { sections, curve, slack, start_phase })
+        let outside = frf.unstable_poles();
+        let start_phase = from_rest(phase[0] + PI * outside as f64);
+        Ok(MeasuredLoop { sections, curve, slack, start_phase, outside })
     }
 
     /// Half width (95 %) of ln|L| and of arg L (rad) at a frequency of the band.
@@ -138,16 +142,10 @@ pub fn hold(x: f64) -> Complex<f64> {
     Complex::from_polar(half.sin() / half, -half)
 }
 
-/// Relative deviation of the values where the file gives none: third differences see noise and hardly anything else, and the
-/// median ignores the resonances. A third difference of white noise has 20 times its variance; 0.6745 is a normal's quartile.
-fn scatter(ln_size: &[f64], phase: &[f64]) -> f64 {
-    let third =
-        |y: &[f64]| -> Vec<f64> { y.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect() };
-    let mut all = third(ln_size);
-    all.extend(third(phase));
-    all.sort_by(f64::total_cmp);
-    let one_part = all[all.len() / 2] / (0.6745 * 20f64.sqrt());
-    one_part * std::f64::consts::SQRT_2
+/// The angle moved by whole turns into -270 to +90 deg.
+pub fn from_rest(angle: f64) -> f64 {
+    let a = angle - TAU * ((angle + 1.5 * PI) / TAU).floor();
+    if a <= -1.5 * PI { a + TAU } else { a }
 }
 
 /// Error of interpolating `y` in interval `i`: h²/8 of the larger second derivative at its ends.
@@ -198,7 +196,7 @@ impl OpenLoop for MeasuredLoop<'_> {
     }
 
     fn unstable_poles(&self) -> usize {
-        section_poles(self.sections).1
+        self.outside + section_poles(self.sections).1
     }
 
     fn ends_at_half_rate(&self) -> bool {

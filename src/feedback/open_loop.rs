@@ -124,7 +124,7 @@ impl OpenLoop for ModelLoop<'_> {
     }
 
     fn unstable_poles(&self) -> usize {
-        section_poles(self.sections).1
+        self.plant.unstable_poles() + section_poles(self.sections).1
     }
 
     fn ends_at_half_rate(&self) -> bool {

@@ -27,6 +27,8 @@ pub(super) const LANES: usize = 4;
 pub struct SampledPlant {
     sample_time_s: f64,
     integrators: usize,
+    /// Poles of the plant outside the unit circle.
+    outside: i64,
     /// True points; the arrays below are filled up to whole lanes with copies of the last one.
     points: usize,
     w: Vec<f64>,
@@ -87,6 +89,13 @@ impl SampledPlant {
         }
         let value: Vec<Complex<f64>> = w.iter().map(|&w| plant.at(w)).collect();
         SampledPlant::of_points(plant.sample_time_s(), plant.integrators(), w, &value)
+            .with_unstable(plant.unstable_poles())
+    }
+
+    /// The same with so many poles of the plant outside the unit circle; without a word they are none.
+    pub fn with_unstable(mut self, poles: usize) -> SampledPlant {
+        self.outside = poles as i64;
+        self
     }
 
     /// Ascending frequencies (rad/s) and the plant at each, hold included; `integrators`: poles of the plant on z = 1.
@@ -102,6 +111,7 @@ impl SampledPlant {
         SampledPlant {
             sample_time_s,
             integrators,
+            outside: 0,
             points,
             re: lanes(&|i| value[i].re),
             im: lanes(&|i| value[i].im),
@@ -244,7 +254,7 @@ impl SampledPlant {
 
     /// The Nyquist count of [`super::nyquist_count`], by crossings of the real axis instead of angles.
     fn unstable_poles(&self, chain: &[Section], on: &mut LoopOnGrid) -> i64 {
-        let (mut m, mut outside) = (self.integrators, 0);
+        let (mut m, mut outside) = (self.integrators, self.outside);
         for pole in chain.iter().flat_map(|s| s.poles()) {
             if (pole - 1.0).norm() < 1e-10 {
                 m += 1;

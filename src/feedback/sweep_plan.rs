@@ -168,7 +168,7 @@ fn with_tone(now: &Frf, old: &Frf, hz: f64, seconds: f64, s: &PlanSettings) -> (
     }
     let (w, rest): (Vec<f64>, Vec<(Complex<f64>, f64)>) = rows.into_iter().map(|(w, v, d)| (w, (v, d))).unzip();
     let (v, d) = rest.into_iter().unzip();
-    (Frf::new(w, v, Some(d)).ok(), tone)
+    (Frf::new(w, v, Some(d)).ok().map(|f| f.with_unstable_poles(now.unstable_poles())), tone)
 }
 
 /// Relative deviation where a sweep carries none.

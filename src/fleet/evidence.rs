@@ -67,6 +67,11 @@ impl Shift {
                 *acceleration_gain *= self.gain * self.frequency * self.frequency;
                 *viscous_rate_per_s *= self.frequency;
             }
+            // As a stretch of the frequency axis: P(s/f) gain.
+            Body::Rational(r) => {
+                r.gain *= self.gain * self.frequency.powi(r.relative_degree() as i32);
+                r.zeros.iter_mut().chain(&mut r.poles).for_each(|x| *x *= self.frequency);
+            }
         }
         for m in &mut p.modes {
             m.zero_rad_s *= self.frequency;

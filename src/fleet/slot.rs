@@ -230,7 +230,7 @@ impl Prepared {
 pub(super) fn model_row(plant: &Plant, rms_relative_error: f64, near: bool) -> ModelRow {
     let dc_gain = match plant.body {
         Body::SecondOrder { dc_gain, .. } => Some(dc_gain * plant.resonance_gain),
-        Body::FreeInertia { .. } => None,
+        Body::FreeInertia { .. } | Body::Rational(_) => None,
     };
     let [low, high] = FIRST_RESONANCE_HZ.map(|hz| hz * std::f64::consts::TAU);
     // Height of a pair: how far its pole and zero lie apart over its damping.

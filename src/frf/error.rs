@@ -4,6 +4,7 @@
 
 use super::causality::Evidence;
 use super::response::FrfShapeError;
+use super::settings::Measured;
 use crate::document::way_on;
 use std::fmt;
 use thiserror::Error;
@@ -239,6 +240,10 @@ pub enum FrfError {
     Setting { name: &'static str, found: f64, expected: &'static str },
     #[error("line {line_hz} Hz carries no input; leave it out of the excited lines")]
     NotExcited { line_hz: f64 },
+    #[error(
+        "of {of} points of {measured} only {found} tell the plant to {known} of itself; expected at least {needed}: sweep where |L| is neither far above nor far below 1, excite more, or sweep the plant itself"
+    )]
+    Closed { measured: Measured, found: usize, of: usize, needed: usize, known: f64 },
     #[error("cannot write the response: {source}")]
     Write { source: std::io::Error },
 }

@@ -6,6 +6,7 @@
 mod algebra;
 mod bytes;
 mod causality;
+mod closed_loop;
 mod columns;
 mod decide;
 mod error;
@@ -27,6 +28,7 @@ mod write;
 
 pub use algebra::{feedback, product, ratio};
 pub use causality::{Evidence, Misfit, Reading};
+pub use closed_loop::{Opened, open_loop, scatter};
 pub use error::{Doubt, FrfError, NotText, Question};
 pub use estimate::{Estimate, PeriodicSettings, SegmentSettings, periodic, segments};
 pub use interpolate::{Interpolation, resample};
@@ -35,7 +37,7 @@ pub use phase::{check_order, phase_rad};
 pub use read::{Sweep, read_bytes, read_file};
 pub use response::{Frf, FrfShapeError};
 pub use settings::{
-    AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale,
+    AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale, Measured,
     PhaseConvention, ReadSettings, UnknownWord, Unsorted,
 };
 pub use write::{PhaseDisplay, write_bod, write_bod_as};

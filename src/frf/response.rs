@@ -15,6 +15,7 @@ pub struct Frf {
     w_rad_s: Vec<f64>,
     value: Vec<Complex<f64>>,
     relative_std: Option<Vec<f64>>,
+    unstable_poles: usize,
 }
 
 /// Why numbers do not make a frequency response.
@@ -69,7 +70,19 @@ impl Frf {
             }
             before = w;
         }
-        Ok(Frf { w_rad_s, value, relative_std })
+        Ok(Frf { w_rad_s, value, relative_std, unstable_poles: 0 })
+    }
+
+    /// The same response of a plant that has so many poles in the right half-plane: no sweep shows them, its owner states them.
+    ///
+    /// They count in every Nyquist count on this response. One made of two others does not inherit them.
+    pub fn with_unstable_poles(self, poles: usize) -> Frf {
+        Frf { unstable_poles: poles, ..self }
+    }
+
+    /// Poles of the plant in the right half-plane, as stated; 0 where nobody said so.
+    pub fn unstable_poles(&self) -> usize {
+        self.unstable_poles
     }
 
     /// Angular frequencies, ascending (rad/s).

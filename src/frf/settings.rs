@@ -127,6 +127,23 @@ choice! {
     } default Refuse
 }
 choice! {
+    /// What was swept: the plant, or its loop closed by a known controller.
+    Measured {
+        /// P, position over command.
+        Plant = "P",
+        /// L = P C, with the sign that makes 1 + L the loop's denominator.
+        Loop = "L",
+        /// S = 1/(1 + L), error over reference.
+        Sensitivity = "S",
+        /// T = L/(1 + L), position over reference.
+        Complementary = "T",
+        /// P S, position over a disturbance at the plant's input.
+        Process = "PS",
+        /// C S, command over reference.
+        Control = "CS",
+    } default Plant
+}
+choice! {
     /// How a column of standard deviations is scaled.
     DeviationScale {
         /// From its header word (`rel`, `%`, `dB`); otherwise absolute, with a note.

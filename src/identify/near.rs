@@ -10,7 +10,7 @@ use super::spread::{Spread, correlation_inflation};
 use super::sweep::Sweep;
 use super::{IdentifyError, IdentifySettings, Work, ZeroSide};
 use crate::frf::Frf;
-use crate::lti::{FrequencyResponse, Plant};
+use crate::lti::{Body, FrequencyResponse, Plant};
 use crate::numeric::levenberg::Workspace;
 
 /// A plant that was fitted from a neighbour's.
@@ -58,7 +58,8 @@ pub fn identify_near(
         let mean = logs.iter().sum::<f64>() / logs.len() as f64;
         logs.iter().map(|l| (l - mean).powi(2)).sum()
     };
-    let ranked = neighbours.iter().enumerate().map(|(i, p)| (distance(p), i));
+    let ranked = neighbours.iter().enumerate().filter(|(_, p)| !matches!(p.body, Body::Rational(_)));
+    let ranked = ranked.map(|(i, p)| (distance(p), i));
     let Some((_, neighbour)) =
         ranked.filter(|(d, _)| d.is_finite()).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
     else {

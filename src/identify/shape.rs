@@ -76,6 +76,8 @@ impl Shape {
                 x.push(viscous_rate_per_s);
                 BodyForm::FreeInertia
             }
+            // No fit has this form: what starts from neighbours leaves such plants out.
+            Body::Rational(_) => BodyForm::Without,
         };
         x.push(plant.delay_s);
         let mut shape = Shape { body, delay: true, modes: 0 };

@@ -13,7 +13,7 @@ use std::f64::consts::{PI, TAU};
 const LEAST_POINTS: usize = 8;
 
 /// What the linear fit found.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct StandardForm {
     pub body: Body,
     /// Points used: 0..end.
@@ -59,7 +59,7 @@ fn weighted_rounds(sweep: &Sweep, end: usize, rounds: usize, fits: &mut usize) -
         let error: Vec<Complex<f64>> = (0..end).map(|k| f[k] - model(k)).collect();
         let norm = norm_error(error.iter().copied());
         let stable = b1 > 0.0 && b2 > 0.0 && a0 != 0.0;
-        if stable && best.is_none_or(|(_, n)| norm < n) {
+        if stable && best.as_ref().is_none_or(|(_, n)| norm < *n) {
             let w0 = 1.0 / b2.sqrt();
             best = Some((
                 Body::SecondOrder { dc_gain: a0, natural_frequency_rad_s: w0, damping_ratio: 0.5 * b1 * w0 },
@@ -107,7 +107,7 @@ pub(super) fn fit(sweep: &Sweep, settings: &IdentifySettings) -> Option<Standard
     let widest = below.max(LEAST_POINTS.min(sweep.len()));
     let mut fits = 0;
     let first = weighted_rounds(sweep, widest, settings.weight_rounds, &mut fits);
-    let sign = match first {
+    let sign = match &first {
         Some((body, _)) => body.acceleration_gain().signum(),
         None => 1.0,
     };

@@ -147,6 +147,11 @@ impl DiscretePlant {
         all
     }
 
+    /// How many of the plant's poles lie outside the unit circle: those in the right half-plane.
+    pub fn unstable_poles(&self) -> usize {
+        self.pole.iter().filter(|p| p.re > 0.0).map(|p| if p.im > 0.0 { 2 } else { 1 }).sum()
+    }
+
     /// Continuous poles of the terms (rad/s), each conjugate pair once.
     pub fn terms(&self) -> &[Complex<f64>] {
         &self.pole

@@ -100,7 +100,7 @@ mod tests {
             Body::FreeInertia { acceleration_gain: 1e5, viscous_rate_per_s: 3.0 },
             Body::FreeInertia { acceleration_gain: 1e5, viscous_rate_per_s: 0.0 },
         ];
-        for (body, delay_s) in bodies.into_iter().flat_map(|b| [0.0, 1e-5, 4e-5, 1.3e-4].map(|d| (b, d))) {
+        for (body, delay_s) in bodies.into_iter().flat_map(|b| [0.0, 1e-5, 4e-5, 1.3e-4].map(|d| (b.clone(), d))) {
             let mode = |w: f64| Mode {
                 pole_rad_s: w,
                 pole_damping_ratio: 0.02,

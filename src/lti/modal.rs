@@ -4,7 +4,8 @@
 //! from expanded polynomials, whose coefficients span 90 decades at order 22.
 
 use super::plant::quadratic_roots;
-use super::{Body, LtiError, Plant};
+use super::rational::worst_on_grid;
+use super::{Body, FrequencyResponse, LtiError, Plant};
 use nalgebra::Complex;
 
 /// One pole with its residue. A complex pole stands for itself and its conjugate; its response is the sum of both.
@@ -35,13 +36,49 @@ const SPREAD: f64 = 3e-6;
 /// The same for three poles in one place, whose residues grow with the square of the inverse spread.
 const SPREAD_OF_THREE: f64 = 1e-4;
 
+/// Largest relative error of the partial fractions of a rational body.
+const DIGITS: f64 = 1e-5;
+/// Spreads tried for one, as multiples of the usual: far above repeated poles the wider ones keep more digits.
+const WIDER: [f64; 3] = [1.0, 4.0, 16.0];
+
 impl ModalForm {
     /// The partial fractions of a checked plant.
     pub fn of(plant: &Plant) -> Result<ModalForm, LtiError> {
         plant.check()?;
+        if !matches!(plant.body, Body::Rational(_)) {
+            return ModalForm::spread(plant, 1.0).map(|(form, _)| form);
+        }
+        // Roots given by hand may lie in one place, or nearly so.
+        let mut best: Option<((f64, f64), ModalForm)> = None;
+        for wider in WIDER {
+            let (form, repeated) = ModalForm::spread(plant, wider)?;
+            let off = form.off(plant);
+            if best.as_ref().is_none_or(|(least, _)| off.0 < least.0) {
+                best = Some((off, form));
+            }
+            if !repeated {
+                break;
+            }
+        }
+        match best {
+            Some(((found, _), form)) if found <= DIGITS => Ok(form),
+            other => {
+                let (found, at_rad_s) = other.map_or((f64::INFINITY, 0.0), |(off, _)| off);
+                let what = "partial fractions of the plant's poles and zeros";
+                let advice = "poles lie too close together: merge them";
+                Err(LtiError::Digits { what, found, at_rad_s, limit: DIGITS, advice })
+            }
+        }
+    }
+
+    /// Partial fractions with coinciding poles spread `wider` than usual, and whether any were.
+    fn spread(plant: &Plant, wider: f64) -> Result<(ModalForm, bool), LtiError> {
         let gain = plant.resonance_gain * plant.body.acceleration_gain();
         let mut poles: Vec<Complex<f64>> = Vec::with_capacity(plant.order());
+        let mut zeros: Vec<Complex<f64>> = Vec::with_capacity(plant.order());
         let mut double_integrator = false;
+        // Roots of a rational body: their part in the value and the logarithmic slope at rest.
+        let (mut body_at_rest, mut body_slope) = (1.0, 0.0);
         match plant.body {
             Body::SecondOrder { natural_frequency_rad_s, damping_ratio, .. } => {
                 poles.extend(quadratic_roots(natural_frequency_rad_s, damping_ratio));
@@ -50,13 +87,20 @@ impl ModalForm {
                 poles.extend([Complex::new(0.0, 0.0), Complex::new(-viscous_rate_per_s, 0.0)]);
             }
             Body::FreeInertia { .. } => double_integrator = true,
+            Body::Rational(ref r) => {
+                zeros.extend(&r.zeros);
+                double_integrator = r.integrators() == 2;
+                poles.extend(r.poles.iter().filter(|p| !double_integrator || p.norm() > 0.0));
+                if double_integrator {
+                    (body_at_rest, body_slope) = r.beside_the_integrators();
+                }
+            }
         }
-        let mut zeros = Vec::with_capacity(2 * plant.modes.len());
         for m in &plant.modes {
             poles.extend(quadratic_roots(m.pole_rad_s, m.pole_damping_ratio));
             zeros.extend(quadratic_roots(m.zero_rad_s, m.zero_damping_ratio));
         }
-        spread(&mut poles)?;
+        let repeated = spread(&mut poles, wider)?;
 
         let mut terms = Vec::with_capacity(poles.len());
         for (i, &p) in poles.iter().enumerate() {
@@ -91,10 +135,15 @@ impl ModalForm {
                 .iter()
                 .map(|m| 2.0 * m.zero_damping_ratio / m.zero_rad_s - 2.0 * m.pole_damping_ratio / m.pole_rad_s)
                 .sum();
-            rigid2 = gain * at_rest;
-            rigid1 = rigid2 * slope;
+            rigid2 = gain * at_rest * body_at_rest;
+            rigid1 = rigid2 * (slope + body_slope);
         }
-        Ok(ModalForm { terms, rigid2, rigid1, delay_s: plant.delay_s })
+        Ok((ModalForm { terms, rigid2, rigid1, delay_s: plant.delay_s }, repeated))
+    }
+
+    /// Largest relative difference from the product form, and where: close-lying poles cost digits.
+    fn off(&self, plant: &Plant) -> (f64, f64) {
+        worst_on_grid(self.terms.iter().map(|t| t.pole.norm()), |w| (self.at(w), plant.at(w)))
     }
 
     /// The response at s = j w by the sum of terms, delay included.
@@ -114,8 +163,9 @@ impl ModalForm {
     }
 }
 
-/// Moves coinciding poles apart, symmetrically about their common place.
-fn spread(poles: &mut [Complex<f64>]) -> Result<(), LtiError> {
+/// Moves coinciding poles apart, symmetrically about their common place; says whether there were any.
+fn spread(poles: &mut [Complex<f64>], wider: f64) -> Result<bool, LtiError> {
+    let mut repeated = false;
     // A critically damped pair sits in its own place twice; a pair of modes at one place does so in both half-planes.
     for i in 0..poles.len() {
         let here = poles[i];
@@ -133,7 +183,8 @@ fn spread(poles: &mut [Complex<f64>]) -> Result<(), LtiError> {
         if count > 3 {
             return Err(LtiError::Coincident { pole_rad_s: size, count });
         }
-        let width = size * if count == 2 { SPREAD } else { SPREAD_OF_THREE };
+        repeated = true;
+        let width = wider * size * if count == 2 { SPREAD } else { SPREAD_OF_THREE };
         for (rank, &k) in group.iter().enumerate() {
             let shift = width * (rank as f64 - 0.5 * (count as f64 - 1.0));
             let old = poles[k];
@@ -151,14 +202,14 @@ fn spread(poles: &mut [Complex<f64>]) -> Result<(), LtiError> {
             poles[k] = moved;
         }
     }
-    Ok(())
+    Ok(repeated)
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::lti::{FrequencyResponse, Mode};
+    use crate::lti::Mode;
 
     fn plant(body: Body, modes: Vec<Mode>) -> Plant {
         Plant {
@@ -205,7 +256,7 @@ mod tests {
     #[test]
     fn repeated_poles_keep_nine_digits_and_four_are_refused() {
         let body = Body::SecondOrder { dc_gain: 1.0, natural_frequency_rad_s: 300.0, damping_ratio: 1.0 };
-        let twice = plant(body, vec![mode(7000.0, 8000.0, 0.02), mode(7500.0, 8000.0, 0.02)]);
+        let twice = plant(body.clone(), vec![mode(7000.0, 8000.0, 0.02), mode(7500.0, 8000.0, 0.02)]);
         // The spread's own error, see SPREAD.
         assert!(worst(&twice) < 2e-8, "{}", worst(&twice));
         let four = plant(body, vec![mode(7000.0, 8000.0, 0.02); 4]);

@@ -2,13 +2,13 @@
 //!
 //! P(s) = resonance_gain exp(-delay s) body(s) Π (s² + 2 ζz ωz s + ωz²)/(s² + 2 ζp ωp s + ωp²), eqs. (21), (29), (30).
 
-use super::FrequencyResponse;
+use super::{FrequencyResponse, Rational};
 use nalgebra::Complex;
 use std::collections::BTreeMap;
 use thiserror::Error;
 
-/// The low-frequency part of the plant.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The low-frequency part of the plant, or all of its rational part.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Body {
     /// Eq. (1): dc_gain ω0² / (s² + 2 ζ0 ω0 s + ω0²).
     SecondOrder {
@@ -26,6 +26,8 @@ pub enum Body {
         /// Viscous rate (1/s), at least 0.
         viscous_rate_per_s: f64,
     },
+    /// Any strictly proper quotient, by its poles and zeros: real ones, integrators, poles in the right half-plane.
+    Rational(Rational),
 }
 
 /// One monic resonance pair of eq. (2): (s² + 2 ζz ωz s + ωz²)/(s² + 2 ζp ωp s + ωp²).
@@ -84,6 +86,22 @@ pub enum LtiError {
     /// Four or more poles in one place, whose partial fractions f64 cannot carry.
     #[error("{count} poles coincide near {pole_rad_s} rad/s: merge modes that repeat one another")]
     Coincident { pole_rad_s: f64, count: usize },
+    /// Keys that do not go together, or none that make a plant.
+    #[error("[plant]: found {found}; expected {expected}")]
+    Keys { found: String, expected: &'static str },
+    /// A complex root without its conjugate: the response to a real command would not be real.
+    #[error(
+        "{key}: the root {re} {im:+}j has no conjugate beside it; list both, or only those with positive imaginary parts"
+    )]
+    Conjugate { key: String, re: f64, im: f64 },
+    /// More zeros than a plant can have.
+    #[error("plant: {zeros} zeros and {poles} poles; expected fewer zeros than poles, and at most {limit} poles")]
+    Proper { zeros: usize, poles: usize, limit: usize },
+    /// A change of form lost digits.
+    #[error(
+        "{what}: the response found is off by {found:.1e} of itself at {at_rad_s:.4} rad/s; expected at most {limit:.0e}: {advice}"
+    )]
+    Digits { what: &'static str, found: f64, at_rad_s: f64, limit: f64, advice: &'static str },
 }
 
 /// The two roots of s² + 2 ζ ω s + ω², the one with the positive imaginary part first.
@@ -122,25 +140,68 @@ impl Body {
             Body::FreeInertia { acceleration_gain, viscous_rate_per_s } => {
                 acceleration_gain / Complex::new(-w * w, viscous_rate_per_s * w)
             }
+            Body::Rational(ref r) => r.at(w),
         }
     }
 
-    /// The high-frequency asymptote: position/s² per command, dc_gain ω0² or the acceleration gain.
+    /// The high-frequency asymptote: position/s² per command, dc_gain ω0² or the acceleration gain. Of a rational body its `gain`,
+    /// which goes with 1/s to the power of its relative degree.
     pub fn acceleration_gain(&self) -> f64 {
         match *self {
             Body::SecondOrder { dc_gain, natural_frequency_rad_s: w0, .. } => dc_gain * w0 * w0,
             Body::FreeInertia { acceleration_gain, .. } => acceleration_gain,
+            Body::Rational(ref r) => r.gain,
+        }
+    }
+
+    /// The same body by poles and zeros.
+    pub fn rational(&self) -> Rational {
+        let (gain, zeros) = (self.acceleration_gain(), Vec::new());
+        match *self {
+            Body::SecondOrder { natural_frequency_rad_s, damping_ratio, .. } => {
+                Rational { gain, zeros, poles: quadratic_roots(natural_frequency_rad_s, damping_ratio).to_vec() }
+            }
+            Body::FreeInertia { viscous_rate_per_s, .. } => {
+                // No negative zero: the file would show it.
+                let slow = if viscous_rate_per_s > 0.0 { -viscous_rate_per_s } else { 0.0 };
+                Rational { gain, zeros, poles: vec![Complex::new(0.0, 0.0), Complex::new(slow, 0.0)] }
+            }
+            Body::Rational(ref r) => r.clone(),
+        }
+    }
+
+    /// Poles in the right half-plane.
+    pub fn unstable_poles(&self) -> usize {
+        match self {
+            Body::Rational(r) => r.unstable_poles(),
+            _ => 0,
         }
     }
 }
 
 impl Plant {
-    /// The order of the rational part: 2 for the body and 2 for each mode.
+    /// The order of the rational part: the body's, 2 for one without a form of its own, and 2 for each mode.
     pub fn order(&self) -> usize {
-        2 + 2 * self.modes.len()
+        let body = match &self.body {
+            Body::Rational(r) => r.poles.len(),
+            _ => 2,
+        };
+        body + 2 * self.modes.len()
     }
 
-    /// Refuses numbers that are no stable plant; the key in the error is the one of the plant file.
+    /// The same plant with as much of a rational body as possible in resonance pairs: each complex pair of zeros goes with the pair of
+    /// poles in the left half-plane that lies nearest to it in ln of frequency. A body of two poles and no zeros takes its plain form.
+    pub fn paired(&self) -> Plant {
+        let mut plant = self.clone();
+        if let Body::Rational(r) = &self.body {
+            let (body, modes) = r.paired();
+            plant.body = body;
+            plant.modes.extend(modes);
+        }
+        plant
+    }
+
+    /// Refuses numbers that are no plant; the key in the error is the one of the plant file. Only a rational body may be unstable.
     pub fn check(&self) -> Result<(), LtiError> {
         let finite = |key: &str, found: f64| {
             let expected = "a finite number, not 0";
@@ -167,6 +228,7 @@ impl Plant {
             }
         };
         match self.body {
+            Body::Rational(ref r) => r.check(self.modes.len())?,
             Body::SecondOrder { dc_gain, natural_frequency_rad_s, damping_ratio } => {
                 finite("plant.dc_gain", dc_gain)?;
                 positive("plant.natural_frequency_rad_s", natural_frequency_rad_s)?;

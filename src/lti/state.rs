@@ -238,7 +238,7 @@ mod tests {
             Body::SecondOrder { dc_gain: 75.0, natural_frequency_rad_s: 369.0, damping_ratio: 0.22 },
             Body::FreeInertia { acceleration_gain: 1e5, viscous_rate_per_s: 0.0 },
         ];
-        for (body, delay_s) in bodies.into_iter().flat_map(|b| [0.0, 1e-5, 4e-5, 1.3e-4].map(|d| (b, d))) {
+        for (body, delay_s) in bodies.into_iter().flat_map(|b| [0.0, 1e-5, 4e-5, 1.3e-4].map(|d| (b.clone(), d))) {
             let mode = Mode { pole_rad_s: 5e3, pole_damping_ratio: 0.02, zero_rad_s: 4.5e3, zero_damping_ratio: 0.03 };
             let (position_unit, command_unit) = ("track".into(), "V".into());
             let modes = vec![mode];

@@ -112,10 +112,10 @@ mod tests {
             Body::FreeInertia { acceleration_gain: 1e5, viscous_rate_per_s: 0.0 },
         ];
         for body in bodies {
-            let kept = TermAnswers::of(&plant(body, 700.0, 9e-5), &input);
+            let kept = TermAnswers::of(&plant(body.clone(), 700.0, 9e-5), &input);
             // The same pole with other delays, and a pole that moved.
             for (pole, delay) in [(700.0, 9e-5), (700.0, 0.0), (700.0, 2e-4), (731.0, 1.3e-4), (700.0, 0.03)] {
-                let other = plant(body, pole, delay);
+                let other = plant(body.clone(), pole, delay);
                 let (mut found, mut simulated) = (vec![0.5; 400], vec![0.0; 400]);
                 kept.add(&other, 2.0, &mut found);
                 other.add_response(&input, &mut simulated);

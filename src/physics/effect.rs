@@ -191,6 +191,11 @@ pub enum PhysicsError {
     /// A parameter is out of its range.
     #[error("effect `{effect}`: {parameter} = {found}; expected {expected}")]
     Range { effect: &'static str, parameter: &'static str, found: f64, expected: &'static str },
+    /// The plant is no second-order body or free inertia with resonance pairs.
+    #[error(
+        "effect `{effect}`: acts on a second-order body or a free inertia; the plant has {poles} poles beside its resonance pairs"
+    )]
+    Body { effect: String, poles: usize },
     /// The effect is one of data or statistics and cannot be simulated.
     #[error(
         "effect `{effect}`: found in records, but not one that a simulation can carry; take its entry out of the plant file"

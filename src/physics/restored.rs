@@ -6,7 +6,7 @@
 use super::effect::{Effect, Given, PhysicsError, Setting};
 use super::library::{data_facts, effect, library};
 use super::sample::Scene;
-use crate::lti::{PhysicsEntry, Plant};
+use crate::lti::{Body, PhysicsEntry, Plant};
 
 /// What a plant file does not say of the machine and its motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +52,7 @@ impl Restored {
     /// The physics of `plant`; unknown effects and unknown or missing parameters are refused by name.
     pub fn of(plant: &Plant, context: &Context) -> Result<Restored, PhysicsError> {
         let scene = Scene {
-            plant: Plant { physics: Vec::new(), ..plant.clone() },
+            plant: Plant { physics: Vec::new(), ..plant.paired() },
             sample_time_s: context.sample_time_s,
             spindle_hz: context.spindle_hz,
             travel: context.travel,
@@ -69,7 +69,12 @@ impl Restored {
         let mut restored = Restored { parts: Vec::new(), scene, left_out: Vec::new() };
         for entry in &plant.physics {
             match effect(&entry.effect) {
-                Some(e) => restored.parts.push((e, setting(e, entry, &restored.scene)?)),
+                Some(e) => {
+                    if let Body::Rational(r) = &restored.scene.plant.body {
+                        return Err(PhysicsError::Body { effect: entry.effect.clone(), poles: r.poles.len() });
+                    }
+                    restored.parts.push((e, setting(e, entry, &restored.scene)?));
+                }
                 None => match data_facts().iter().find(|f| f.name == entry.effect) {
                     Some(facts) => restored.left_out.push(facts.name),
                     None => {

@@ -143,6 +143,7 @@ fn write_line(w: &WriteBox) -> String {
                 WriteOpen::NotProvedStable => "the box is not proved stable",
                 WriteOpen::MayClip => "a member may reach output_limit",
                 WriteOpen::NoDecay => "a pole of the plant does not decay",
+                WriteOpen::OtherRoots => "the plant has real poles or zeros beside its body and its resonance pairs",
                 WriteOpen::TooLong => "the record is too long",
             };
             format!("The write has no bound over the box: {why}.")

@@ -195,6 +195,8 @@ fn numbers(plant: &Plant) -> [f64; 3] {
             [dc_gain * w * w, w * w, 2.0 * damping_ratio * w]
         }
         Body::FreeInertia { acceleration_gain, viscous_rate_per_s } => [acceleration_gain, 0.0, viscous_rate_per_s],
+        // No diagnosis starts from one.
+        Body::Rational(ref r) => [r.gain, 0.0, 0.0],
     };
     [b * plant.resonance_gain, k, c]
 }

@@ -184,7 +184,7 @@ fn judge(seed: u64) -> Result<(LoopCase, LoopRow), StudyError> {
         crate::lti::Body::SecondOrder { dc_gain, natural_frequency_rad_s, damping_ratio } => {
             [dc_gain, natural_frequency_rad_s, damping_ratio]
         }
-        crate::lti::Body::FreeInertia { .. } => [0.0; 3],
+        crate::lti::Body::FreeInertia { .. } | crate::lti::Body::Rational(_) => [0.0; 3],
     };
     let row = LoopRow {
         body,

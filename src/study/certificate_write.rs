@@ -105,6 +105,7 @@ fn machine(
                 WriteOpen::NotProvedStable => "the box is not proved stable",
                 WriteOpen::MayClip => "a member may clip its command",
                 WriteOpen::NoDecay => "a pole does not decay",
+                WriteOpen::OtherRoots => "real poles or zeros beside body and pairs",
                 WriteOpen::TooLong => "the record is too long",
             };
             text += &format!("| {name} | {percent} % | {why} | | | | | | | {seconds:.1} |\n");

@@ -97,6 +97,7 @@ fn moved(class: MachineClass, random: &mut Random) -> Result<Plant, StudyError> 
             by(damping_ratio);
         }
         Body::FreeInertia { acceleration_gain, .. } => by(acceleration_gain),
+        Body::Rational(r) => by(&mut r.gain),
     }
     by(&mut plant.delay_s);
     for m in &mut plant.modes {

@@ -148,6 +148,7 @@ fn scale(plant: &mut Plant, gain: f64, frequency: f64) {
             *natural_frequency_rad_s *= frequency;
         }
         Body::FreeInertia { acceleration_gain, .. } => *acceleration_gain *= gain,
+        Body::Rational(r) => r.gain *= gain,
     }
     for mode in &mut plant.modes {
         mode.zero_rad_s *= frequency;

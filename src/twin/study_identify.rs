@@ -143,7 +143,7 @@ pub fn judge(truth: &Plant, found: &Identified, w_rad_s: &[f64], relative_std: f
                 i.dc_gain.as_ref().is_some_and(|i| inside(i, dc_gain * truth.resonance_gain)),
             ]
         }
-        Body::FreeInertia { .. } => [inside(&found.intervals.delay_s, truth.delay_s); 3],
+        Body::FreeInertia { .. } | Body::Rational(_) => [inside(&found.intervals.delay_s, truth.delay_s); 3],
     };
     StudyCase {
         seed,

@@ -10,7 +10,8 @@ use super::{
 };
 use crate::controller::Controller;
 use crate::frf::Sweep;
-use crate::lti::{Body, Plant};
+use crate::lti::Plant;
+use crate::numeric::random::Random;
 use crate::tune::{GainTable, InputDigest, Machine, Outcome, Requirement, Spec, TuneSettings, tune_from};
 
 /// What a table is tuned and proved on.
@@ -191,8 +192,14 @@ fn room(c: &Certificate, wanted: &[Requirement], guard: f64, room: &mut Vec<f64>
     (names, grown)
 }
 
-/// The corners of the box: every parameter at either end, those of the frequencies and of the dampings together.
+/// Members drawn from the box where frequencies or dampings move, each on its own.
+const DRAWN: u64 = 6;
+
+/// The corners of gain and dead time, and drawn members where frequencies or dampings move too.
 fn corners(plant: &Plant, u: &Uncertainty) -> Vec<Plant> {
+    if !u.any() {
+        return Vec::new();
+    }
     let mut all = vec![plant.clone()];
     let mut part = |share: f64, moved: &dyn Fn(&Plant, f64) -> Plant| {
         if share > 0.0 {
@@ -201,27 +208,11 @@ fn corners(plant: &Plant, u: &Uncertainty) -> Vec<Plant> {
     };
     part(u.gain, &|p, by| Plant { resonance_gain: p.resonance_gain * by, ..p.clone() });
     part(u.delay, &|p, by| Plant { delay_s: p.delay_s * by, ..p.clone() });
-    part(u.frequency, &|p, by| {
-        let mut p = p.clone();
-        if let Body::SecondOrder { natural_frequency_rad_s, .. } = &mut p.body {
-            *natural_frequency_rad_s *= by;
-        }
-        for m in &mut p.modes {
-            m.zero_rad_s *= by;
-            m.pole_rad_s *= by;
-        }
-        p
-    });
-    part(u.damping, &|p, by| {
-        let mut p = p.clone();
-        if let Body::SecondOrder { damping_ratio, .. } = &mut p.body {
-            *damping_ratio *= by;
-        }
-        for m in &mut p.modes {
-            m.zero_damping_ratio *= by;
-            m.pole_damping_ratio *= by;
-        }
-        p
-    });
-    if u.any() { all } else { Vec::new() }
+    if u.frequency > 0.0 || u.damping > 0.0 {
+        all.extend((0..DRAWN).map(|i| u.draw(plant, &mut Random::stream(SEED, i))));
+    }
+    all
 }
+
+/// Fixes the drawn members.
+const SEED: u64 = 0x5eed_0003;

@@ -1,8 +1,9 @@
-//! The plant as a cascade of second-order states, and its loop stepped from one controller sample to the next.
+//! The plant as a cascade of first- and second-order states, and its loop stepped from one controller sample to the next.
 //!
 //! In: plant without partial fractions, sections. Out: positions under held commands. The transitions are matrix exponentials of twice the precision,
 //! rounded once, so that every coefficient is right to its last digit.
 
+use super::blocks::Chain;
 use crate::controller::Controller;
 use crate::lti::{Body, Plant, Section};
 use crate::numeric::twofold::exponential;
@@ -18,6 +19,10 @@ pub(super) struct Cascade {
 impl Cascade {
     /// Every pair of resonances is 1 + (b1 s + b0)/q(s); its states are w/q and s/q, so that all are of one size.
     pub fn of(p: &Plant) -> Cascade {
+        let p = &p.paired();
+        if let Body::Rational(r) = &p.body {
+            return Chain::of(p, r).cascade();
+        }
         let n = 2 * (p.modes.len() + 1);
         let mut rates = DMatrix::zeros(n + 1, n + 1);
         let mut output = DVector::zeros(n);
@@ -48,6 +53,8 @@ impl Cascade {
                 rates[(b, b)] = -viscous_rate_per_s;
                 output[a] = p.resonance_gain * acceleration_gain;
             }
+            // Taken above.
+            Body::Rational(_) => {}
         }
         rates[(b, n)] = 1.0;
         for j in 0..a {

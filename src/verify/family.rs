@@ -45,6 +45,8 @@ impl Family {
             Body::FreeInertia { acceleration_gain, viscous_rate_per_s } => {
                 (acceleration_gain, Some(viscous_rate_per_s))
             }
+            // Left open before a family is made.
+            Body::Rational(ref r) => (r.gain, None),
         };
         Family { plant: plant.clone(), gain: gain * plant.resonance_gain, free, pairs, t }
     }

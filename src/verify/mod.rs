@@ -5,6 +5,7 @@
 //! Convention: L = P C, negative feedback; spec: `specs/certificate.md`.
 
 mod assured;
+mod blocks;
 mod bounds;
 mod cascade;
 mod certificate;
@@ -22,6 +23,7 @@ mod patch;
 mod plant;
 mod prove;
 mod range;
+mod roots;
 mod rounding;
 mod settings;
 mod spectrum_box;

@@ -138,9 +138,10 @@ impl Enclosed for Sampled {
     fn places(&self) -> Vec<f64> {
         let t = self.product.t;
         let mut all: Vec<f64> = self.chain.angles().collect();
-        let body = match &self.product.body {
-            RigidBody::Spring(q) => Some(q.w0),
-            RigidBody::Free(_) => None,
+        let body: Vec<f64> = match &self.product.body {
+            RigidBody::Spring(q) => vec![q.w0],
+            RigidBody::Free(_) => vec![],
+            RigidBody::Rational(r) => r.places().collect(),
         };
         for w in self.product.modes.iter().flatten().map(|q| q.w0).chain(body) {
             // A mode above half the rate shows at its alias.
@@ -151,7 +152,11 @@ impl Enclosed for Sampled {
     }
 
     fn outside(&self) -> usize {
-        self.chain.outside
+        let plant = match &self.product.body {
+            RigidBody::Rational(r) => r.unstable,
+            _ => 0,
+        };
+        self.chain.outside + plant
     }
 
     fn sample_time_s(&self) -> f64 {

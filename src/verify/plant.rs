@@ -4,6 +4,7 @@
 //! factors whose roots are known; the aliases beyond the last one summed are bounded by an integral (`specs/certificate.md`).
 
 use super::expansion::{Expansion, Jet};
+use super::roots::Roots;
 use crate::lti::{Body, Plant};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
@@ -76,8 +77,13 @@ impl Quadratic {
         (if self.re[0].abs() < self.re[1].abs() { self.re[0] } else { self.re[1] }, self.im)
     }
 
+    /// Bound of |s²/factor| from `w` on, which lies above the root: |factor|²/w⁴ >= 1 - 2 (w0/w)².
+    pub fn over_asymptote(&self, w: f64) -> f64 {
+        1.0 / (1.0 - 2.0 * (self.w0 / w).powi(2)).max(0.25).sqrt()
+    }
+
     /// The slowest decay or nearest place of a root (rad/s).
-    fn nearest(&self) -> f64 {
+    pub fn nearest(&self) -> f64 {
         if self.im > 0.0 { self.w0 } else { self.re[0].abs().min(self.re[1].abs()) }
     }
 }
@@ -85,8 +91,10 @@ impl Quadratic {
 /// The plant's factors.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Product {
-    /// Gain of the high-frequency asymptote, with sign (position_unit/s² per command_unit).
+    /// Gain of the high-frequency asymptote gain/s^degree, with sign (position_unit/s^degree per command_unit).
     pub gain: f64,
+    /// Poles less zeros: 2 but for a rational body.
+    degree: usize,
     pub body: RigidBody,
     /// Zeros and poles of each mode.
     pub modes: Vec<[Quadratic; 2]>,
@@ -99,32 +107,39 @@ pub(super) struct Product {
     far: Vec<Complex<f64>>,
 }
 
-/// The denominator of the body.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The roots of the body.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum RigidBody {
     /// s² + 2 d w0 s + w0².
     Spring(Quadratic),
     /// s (s + rate).
     Free(f64),
+    /// Roots that no resonance pair holds.
+    Rational(Roots),
 }
 
 /// Relative size below which far aliases are not worth summing, and the most that are.
 const LEFT_OUT: f64 = 1e-8;
 const FAR: usize = 64;
+/// The same where aliases fall with the first power only.
+const FAR_OF_ONE: usize = 2000;
 
 impl Product {
     pub fn of(plant: &Plant, t: f64) -> Product {
+        let plant = &plant.paired();
         let body = match plant.body {
             Body::SecondOrder { natural_frequency_rad_s, damping_ratio, .. } => {
                 RigidBody::Spring(Quadratic::new(natural_frequency_rad_s, damping_ratio))
             }
             Body::FreeInertia { viscous_rate_per_s, .. } => RigidBody::Free(viscous_rate_per_s),
+            Body::Rational(ref r) => RigidBody::Rational(Roots::of(r)),
         };
-        let gain = plant.resonance_gain
-            * match plant.body {
-                Body::SecondOrder { dc_gain, natural_frequency_rad_s: w, .. } => dc_gain * w * w,
-                Body::FreeInertia { acceleration_gain, .. } => acceleration_gain,
-            };
+        let (gain, degree) = match plant.body {
+            Body::SecondOrder { dc_gain, natural_frequency_rad_s: w, .. } => (dc_gain * w * w, 2),
+            Body::FreeInertia { acceleration_gain, .. } => (acceleration_gain, 2),
+            Body::Rational(ref r) => (r.gain, r.relative_degree()),
+        };
+        let gain = plant.resonance_gain * gain;
         let modes: Vec<[Quadratic; 2]> = plant
             .modes
             .iter()
@@ -132,16 +147,25 @@ impl Product {
                 [Quadratic::new(m.zero_rad_s, m.zero_damping_ratio), Quadratic::new(m.pole_rad_s, m.pole_damping_ratio)]
             })
             .collect();
-        let top = modes.iter().flatten().map(|q| q.w0 * q.damping.abs().max(1.0)).fold(0.0, f64::max);
+        // The far aliases' bounds hold from three times the largest root on, the body's among them.
+        let size = |q: &Quadratic| q.w0 * q.damping.abs().max(1.0);
+        let of_body = match &body {
+            RigidBody::Spring(q) => size(q),
+            RigidBody::Free(rate) => *rate,
+            RigidBody::Rational(r) => r.top(),
+        };
+        let top = modes.iter().flatten().map(size).fold(of_body, f64::max);
         let whole = (3.0 * top * t / TAU + 0.5).ceil().max(2.0) as usize;
         let turns = plant.delay_s / t;
-        let far = (1..=FAR).map(|k| Complex::from_polar(1.0, -TAU * (k as f64 * turns).fract())).collect();
-        Product { gain, body, modes, delay_s: plant.delay_s, t, whole, far }
+        let most = if degree == 1 { FAR_OF_ONE } else { FAR };
+        let far = (1..=most.max(whole)).map(|k| Complex::from_polar(1.0, -TAU * (k as f64 * turns).fract())).collect();
+        Product { gain, degree, body, modes, delay_s: plant.delay_s, t, whole, far }
     }
 
     /// Poles at rest: integrators in z = 1.
     pub fn integrators(&self) -> usize {
         match self.body {
+            RigidBody::Rational(ref r) => r.integrators,
             RigidBody::Free(rate) if rate > 0.0 => 1,
             RigidBody::Free(_) => 2,
             RigidBody::Spring(_) => 0,
@@ -151,6 +175,7 @@ impl Product {
     /// Bound of the slope of ln P without its integrators near rest, per unit of angle.
     pub fn restlessness(&self) -> f64 {
         let body = match self.body {
+            RigidBody::Rational(ref r) => r.restlessness(),
             RigidBody::Spring(q) => 2.0 / q.nearest(),
             RigidBody::Free(rate) if rate > 0.0 => 1.0 / rate,
             RigidBody::Free(_) => 0.0,
@@ -166,6 +191,7 @@ impl Product {
         let (w, reach) = (x / t, half / t);
         let mut e = Expansion { value: Complex::new(self.gain, 0.0), ..Expansion::ONE };
         e = match self.body {
+            RigidBody::Rational(ref r) => e.times(r.expand(w, reach, t)),
             RigidBody::Spring(q) => e.over(q.expand(w, reach, t)),
             RigidBody::Free(rate) => {
                 let value = Complex::new(-w * w, rate * w);
@@ -236,27 +262,30 @@ impl Product {
 
     /// The far aliases, Σ P(s_k) a/(a + 2 pi k) over |k| > `whole`, and the bound of their error over the cell.
     ///
-    /// They are taken as P = -gain/w² e^{-jw delay}; what that leaves out is bounded by [`Product::off`], and what lies beyond the last one by
+    /// They are taken as P = gain/(jw)^degree e^{-jw delay}; what that leaves out is bounded by [`Product::off`], and what lies beyond the last one by
     /// an integral.
     pub fn far(&self, angle: f64, half: f64) -> (Expansion, f64) {
-        let n = self.whole;
-        let enough = ((angle / TAU).powi(3) / LEFT_OUT).sqrt().ceil() as usize;
-        let last = enough.clamp(n, FAR.max(n));
+        let (n, r) = (self.whole, self.degree as i32);
+        let enough = ((angle / TAU).powi(r + 1) / LEFT_OUT).powf(1.0 / f64::from(r)).ceil() as usize;
+        let last = enough.clamp(n, self.far.len().max(n));
         let (mut value, mut first) = (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0));
         for k in n + 1..=last {
             let turn = self.far[k - 1];
             let (up, down) = (1.0 / (angle + TAU * k as f64), 1.0 / (angle - TAU * k as f64));
-            let (up3, down3) = (up * up * up, down * down * down);
-            value += turn * up3 + turn.conj() * down3;
-            first -= 3.0 * (turn * (up3 * up) + turn.conj() * (down3 * down));
+            let (high, low) = (up.powi(r + 1), down.powi(r + 1));
+            value += turn * high + turn.conj() * low;
+            first -= f64::from(r + 1) * (turn * (high * up) + turn.conj() * (low * down));
         }
-        // 12 Σ 1/|a + 2 pi k|^5 <= 12 · 2 Σ (pi (2 k - 1))^-5 over the cell, whose angle is at most pi.
-        let second = 24.0 / (PI * (2 * n + 1) as f64).powi(5) * 2.0;
-        let scale = -self.gain * self.t * self.t;
+        // Over the cell, whose angle is at most pi: Σ 1/|a + 2 pi k|^q over |k| > n is at most 2 Σ (pi (2 k - 1))^-q, and that sum its first
+        // term and an integral, q = degree + 3.
+        let odd = (2 * n + 1) as f64;
+        let tail = (1.0 + odd / f64::from(2 * (r + 2))) / (PI * odd).powi(r + 3);
+        let second = f64::from((r + 1) * (r + 2)) * 2.0 * tail;
+        let scale = Complex::new(0.0, -1.0).powi(r) * (self.gain * self.t.powi(r));
         let turns = self.delay_s / self.t;
         // a e^{-j a delay/T}: the factor common to all.
         let lag = Expansion {
-            value: Complex::from_polar(angle * scale, -angle * turns),
+            value: scale * Complex::from_polar(angle, -angle * turns),
             slope: Complex::new(1.0 / angle, -turns),
             bend: 1.0 / (angle - half).powi(2),
             rounding: 16.0 * f64::EPSILON * (1.0 + turns),
@@ -264,15 +293,16 @@ impl Product {
         };
         let jet = Jet::of(value, first, second, half, 1e-14 / (n * n) as f64);
         let off = self.off(n);
-        let error = (off * cubes(n) + (1.0 + off) * cubes(last)) * scale.abs() * (angle + half);
+        let error = (off * powers(r + 1, n) + (1.0 + off) * powers(r + 1, last)) * scale.norm() * (angle + half);
         (lag.times(Expansion::plain(jet)), error)
     }
 
-    /// Bound of |P w²/gain| - 1| from w = 2 pi (n + 1/2)/T on: every factor is 1 + d with |d| known, and |Π(1 + d) - 1| <= e^{Σ|d|} - 1.
+    /// Bound of |P (jw)^degree/gain - 1| from w = 2 pi (n + 1/2)/T on: every factor is 1 + d with |d| known, and |Π(1 + d) - 1| <= e^{Σ|d|} - 1.
     fn off(&self, n: usize) -> f64 {
         let w = TAU * (n as f64 + 0.5) / self.t;
-        let over = |q: &Quadratic| 1.0 / (1.0 - 2.0 * (q.w0 / w).powi(2)).max(0.25).sqrt();
+        let over = |q: &Quadratic| q.over_asymptote(w);
         let body = match &self.body {
+            RigidBody::Rational(r) => r.off(w),
             RigidBody::Spring(q) => (q.w0 * q.w0 / w + 2.0 * (q.damping * q.w0).abs()) / w * over(q),
             RigidBody::Free(rate) => rate / w,
         };
@@ -288,10 +318,10 @@ impl Product {
     }
 }
 
-/// Bound of Σ 1/|a + 2 pi k|³ over |k| > n: the sums are below their integrals, for 1/k³ is convex.
-fn cubes(n: usize) -> f64 {
+/// Bound of Σ 1/|a + 2 pi k|^q over |k| > n: the sums are below their integrals, for 1/k^q is convex.
+fn powers(q: i32, n: usize) -> f64 {
     let n = n as f64;
-    (0.5 / ((n + 0.5) * (n + 0.5)) + 0.5 / (n * n)) / (TAU * TAU * TAU)
+    ((n + 0.5).powi(1 - q) + n.powi(1 - q)) / f64::from(q - 1) / TAU.powi(q)
 }
 
 /// Half the circle.

@@ -51,6 +51,8 @@ pub(super) struct Swept {
     /// L at the first point and its phase from rest.
     first: Complex<f64>,
     phase: f64,
+    /// Poles of the plant outside the unit circle, as stated with the sweep.
+    unstable: usize,
 }
 
 /// Fewest points.
@@ -92,11 +94,14 @@ impl Swept {
                 return Err(VerifyError::Ends { hz: place / TAU, found, low, high });
             }
         }
-        // A positioner's phase lies between +90 and -270 deg at the first point; the sections' is followed from rest.
-        let plant = if p[0].arg() > FRAC_PI_2 { p[0].arg() - TAU } else { p[0].arg() };
+        // A positioner's phase lies between +90 and -270 deg at the first point, an unstable pole turning the value at rest by half a turn; the
+        // sections' is followed from rest.
+        let unstable = frf.unstable_poles();
+        let turned = p[0].arg() + PI * (unstable % 2) as f64;
+        let plant = if turned > FRAC_PI_2 { turned - TAU } else { turned };
         let phase = plant + chain.phase_from_rest(angle[0]) - if hold { 0.5 * angle[0] } else { 0.0 };
         let gain = Range { low: (1.0 - u.gain).max(1e-9).ln(), high: (1.0 + u.gain).ln() };
-        Ok(Swept { chain, angle, gaps, hold, t, gain, least_damping: a.least_damping, first, phase })
+        Ok(Swept { chain, angle, gaps, hold, t, gain, least_damping: a.least_damping, first, phase, unstable })
     }
 
     /// Bands in which what may be hidden keeps L from staying `away` from -1, though the cubic does.
@@ -172,7 +177,7 @@ impl Enclosed for Swept {
     }
 
     fn outside(&self) -> usize {
-        self.chain.outside
+        self.chain.outside + self.unstable
     }
 
     fn sample_time_s(&self) -> f64 {

@@ -17,7 +17,8 @@ use std::f64::consts::{PI, TAU};
 pub struct Uncertainty {
     /// Of the plant's gain.
     pub gain: f64,
-    /// Of every mode's frequencies (zero and pole of one mode together) and the body's.
+    /// Of every mode's frequencies (zero and pole of one mode together) and the body's. Of a rational body: of the modes that
+    /// [`Plant::paired`] takes out of it and of complex pairs of poles left over, whose value at rest stays; other roots stay.
     pub frequency: f64,
     /// Of every damping ratio.
     pub damping: f64,
@@ -30,7 +31,7 @@ impl Uncertainty {
     ///
     /// Zero and pole of a mode move together in frequency; every damping ratio moves on its own.
     pub fn draw(&self, plant: &Plant, random: &mut Random) -> Plant {
-        let mut p = plant.clone();
+        let mut p = plant.paired();
         let corner = random.uniform() < 0.5;
         let mut by = |share: f64| {
             let x = random.between(-1.0, 1.0);
@@ -41,6 +42,21 @@ impl Uncertainty {
         if let Body::SecondOrder { natural_frequency_rad_s, damping_ratio, .. } = &mut p.body {
             *natural_frequency_rad_s *= by(self.frequency);
             *damping_ratio *= by(self.damping);
+        }
+        if let Body::Rational(r) = &mut p.body {
+            for at in (0..r.poles.len()).filter(|&i| r.poles[i].im > 0.0).collect::<Vec<_>>() {
+                let old = r.poles[at];
+                let (f, d) = (by(self.frequency), by(self.damping) * -old.re / old.norm());
+                // A pair stays a pair.
+                let d = d.min(1.0 - 1e-9);
+                let size = old.norm() * f;
+                let moved = Complex::new(-d * size, size * ((1.0 - d) * (1.0 + d)).max(0.0).sqrt());
+                if let Some(other) = r.poles.iter().position(|q| *q == old.conj()) {
+                    r.poles[other] = moved.conj();
+                }
+                r.poles[at] = moved;
+                r.gain *= f * f;
+            }
         }
         for m in &mut p.modes {
             let f = by(self.frequency);
@@ -104,8 +120,10 @@ struct Piece {
 impl Spread {
     pub fn of(p: &Product, u: &super::Uncertainty) -> Spread {
         let mut factors: Vec<Factor> = p.modes.iter().map(|[z, p]| (Some(*z), *p)).collect();
-        if let RigidBody::Spring(q) = p.body {
-            factors.push((None, q));
+        match &p.body {
+            RigidBody::Spring(q) => factors.push((None, *q)),
+            RigidBody::Rational(r) => factors.extend(r.pole_pairs.iter().map(|q| (None, *q))),
+            RigidBody::Free(_) => {}
         }
         let mut spread = Spread {
             factors,

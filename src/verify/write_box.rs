@@ -10,7 +10,7 @@ use super::spectrum_box::Beside;
 use super::write::{bands, of_window, simulate};
 use super::write_piece::{Piece, Question};
 use crate::controller::Controller;
-use crate::lti::{Plant, Section};
+use crate::lti::{Body, Plant, Section};
 use crate::pes::Profile;
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +46,8 @@ pub enum WriteOpen {
     MayClip,
     /// A pole of the plant does not decay.
     NoDecay,
+    /// The plant has roots that no resonance pair and no body of second order holds.
+    OtherRoots,
     /// The record is too long for the circles that the proof has.
     TooLong,
 }
@@ -124,7 +126,12 @@ const TURNED: f64 = 1e-9;
 /// Bounds the write over the box; `harmonics` are further bins that are asked for.
 pub fn bound_write(l: &BoxedLoop<'_>, harmonics: &[usize], settings: &BoxSettings) -> WriteBox {
     let Some(ms) = l.max_sensitivity else { return WriteBox::open(WriteOpen::NotProvedStable) };
-    let family = Family::of(l.plant, l.controller.sample_time_s);
+    let plant = &l.plant.paired();
+    if let Body::Rational(r) = &plant.body {
+        let why = if r.unstable_poles() > 0 { WriteOpen::NoDecay } else { WriteOpen::OtherRoots };
+        return WriteBox::open(why);
+    }
+    let family = Family::of(plant, l.controller.sample_time_s);
     if !family.decays() {
         return WriteBox::open(WriteOpen::NoDecay);
     }
@@ -145,7 +152,7 @@ pub fn bound_write(l: &BoxedLoop<'_>, harmonics: &[usize], settings: &BoxSetting
     judged.extend(bins.iter().map(|k| harmonics.contains(k)));
     judged.push(true);
     let [window_enough, command_enough] = {
-        let nominal = simulate(l.plant, l.sections, l.controller, l.profile);
+        let nominal = simulate(plant, l.sections, l.controller, l.profile);
         let peak = nominal.command.iter().fold(0.0f64, |m, u| m.max(u.abs()));
         [TURNED * l.profile.spiral.distance * n as f64, TURNED * peak]
     };

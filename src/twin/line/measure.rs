@@ -59,6 +59,7 @@ fn feed_forward() -> Result<Feedforward, TwinError> {
             let gain = acceleration_gain * plant.resonance_gain;
             (viscous_rate_per_s / gain, 1.0 / gain)
         }
+        Body::Rational(_) => (0.0, 0.0),
     };
     Ok(Feedforward { factor: 1.0, velocity_s, acceleration_s2 })
 }
