@@ -5,7 +5,8 @@
 //! and then by index, so the result has the same bytes for any number of threads.
 
 use super::polish::Polished;
-use super::search::{Effort, Found, order, refine, walk_back};
+use super::search::{DRAWN, Effort, Found, best_of, fresh, order, refine, simplex, walk_back};
+use super::starts::further;
 use super::{Parameter, TuningProblem};
 use crate::numeric::random::Random;
 use rayon::prelude::*;
@@ -47,7 +48,7 @@ pub(super) fn improve(problem: &TuningProblem, found: &mut Found, effort: &Effor
         let parents = judged.parents(problem, &mut found.ends, exact);
         let Some(best) = parents.first().map(|p| p.score) else { break };
         let repeated = found.at_best(BETTER);
-        let settled = repeated >= REPEATS && repeated as f64 >= SHARE * found.feasible_starts as f64;
+        let settled = repeated >= REPEATS && repeated as f64 >= SHARE * found.starts as f64;
         let patience = if best.violation > 0.0 { HOPELESS_PATIENCE } else { LONG_PATIENCE };
         if round == 0 && settled || waited >= patience || repeated >= REPEATS && waited >= PATIENCE {
             break;
@@ -57,7 +58,14 @@ pub(super) fn improve(problem: &TuningProblem, found: &mut Found, effort: &Effor
             .map(|i| {
                 let mut work = problem.work();
                 let mut random = Random::stream(seed, FIRST_STREAM + (round * tries + i) as u64);
-                let x = walk_back(problem, neighbour(problem, &parents, i, &mut random), &mut work);
+                if i % 2 == 0 {
+                    // Somewhere else altogether: what nobody looked at yet.
+                    let drawn = (0..DRAWN).map(|_| further(problem, &mut random)).collect();
+                    let x = best_of(problem, drawn, &mut work).unwrap_or_else(|| parents[0].x.clone());
+                    let x = simplex(problem, x, effort.simplex_steps, &mut work);
+                    return (fresh(refine(problem, &x, effort.polish_steps, &mut work)), work.evaluations);
+                }
+                let x = walk_back(problem, neighbour(problem, &parents, i / 2, &mut random), &mut work);
                 (refine(problem, &x, effort.polish_steps, &mut work), work.evaluations)
             })
             .collect();
@@ -138,10 +146,6 @@ fn mark(problem: &TuningProblem, x: &[f64]) -> Vec<f64> {
 /// A neighbour of one of the parents; the better ones have more of them.
 fn neighbour(problem: &TuningProblem, parents: &[Polished], i: usize, random: &mut Random) -> Vec<f64> {
     let p = problem.parameters();
-    if i % 5 == 4 {
-        // Somewhere else altogether: what nobody looked at yet.
-        return super::starts::further(problem, random);
-    }
     let share = random.uniform();
     let parent = ((share * share) * parents.len() as f64) as usize;
     let mut x = parents[parent.min(parents.len() - 1)].x.clone();
@@ -153,7 +157,7 @@ fn neighbour(problem: &TuningProblem, parents: &[Polished], i: usize, random: &m
         all
     });
     let pick = |random: &mut Random| filters.get((random.uniform() * filters.len() as f64) as usize).copied();
-    match i % 5 {
+    match i % 4 {
         // One notch anywhere.
         0 => {
             let chosen = pick(random);
@@ -188,7 +192,7 @@ fn neighbour(problem: &TuningProblem, parents: &[Polished], i: usize, random: &m
         _ => {}
     }
     // Every number a little, or in a plain neighbour more.
-    let plain = i % 5 == 3 || filters.is_empty();
+    let plain = i % 4 == 3 || filters.is_empty();
     let shake = if plain { SHAKE * 4f64.powf(random.uniform()) } else { 0.1 * SHAKE };
     for (x, [from, to]) in x.iter_mut().zip(p.bounds()) {
         *x = (*x + shake * random.normal()).clamp(*from, *to);

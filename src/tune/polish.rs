@@ -25,6 +25,8 @@ pub(super) enum Goal {
 pub(super) struct Polished {
     pub x: Vec<f64>,
     pub score: Score,
+    /// From a start of its own, rather than from a neighbour of an end.
+    pub fresh: bool,
 }
 
 /// Trust region at the start and at the end (ln of a parameter).
@@ -121,7 +123,7 @@ pub(super) fn polish(
             radius = 0.3 * size.min(radius);
         }
     }
-    Some(Polished { x, score: here.score })
+    Some(Polished { x, score: here.score, fresh: false })
 }
 
 fn identity(n: usize) -> Vec<f64> {

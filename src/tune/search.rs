@@ -44,10 +44,12 @@ impl Found {
         self.ends.extend(end);
     }
 
-    /// How many polishes ended within `share` of the best; 0 where none meets the limits.
+    /// How many polishes from starts of their own ended within `share` of the best; 0 where none meets the limits. A neighbour of the best that
+    /// falls back to it says nothing.
     pub fn at_best(&self, share: f64) -> usize {
         let Some(best) = self.ends.first().filter(|e| e.score.violation <= 0.0) else { return 0 };
-        let near = |e: &&Polished| e.score.violation <= 0.0 && e.score.objective <= best.score.objective + share;
+        let near =
+            |e: &&Polished| e.fresh && e.score.violation <= 0.0 && e.score.objective <= best.score.objective + share;
         self.ends.iter().filter(near).count()
     }
 }
@@ -72,6 +74,39 @@ const SPREAD: f64 = 1e-3;
 /// Price of a violation for the simplex: a limit missed by a hundredth weighs a tenth of the objective.
 const PRICE: f64 = 10.0;
 
+/// Starts drawn for each one that is polished; scoring one costs a hundredth of polishing it.
+const SCREENED: usize = 6;
+/// Starts by rule, which are polished whatever they score.
+const BY_RULE: usize = 2;
+
+/// The first `kept` starts, and of the others the best of each group, so many that there are about `count` beside the kept ones.
+fn screened(problem: &TuningProblem, starts: Vec<Vec<f64>>, kept: usize, count: usize) -> Vec<Vec<f64>> {
+    let mut work = problem.work();
+    let kept = kept.min(starts.len());
+    let groups = count.saturating_sub(BY_RULE).max(1);
+    let size = (starts.len() - kept).div_ceil(groups).max(1);
+    let mut chosen: Vec<Vec<f64>> = starts[..kept].to_vec();
+    for group in starts[kept..].chunks(size) {
+        chosen.extend(best_of(problem, group.to_vec(), &mut work));
+    }
+    chosen
+}
+
+/// The vector with the least merit; of equals the first.
+pub(super) fn best_of(problem: &TuningProblem, starts: Vec<Vec<f64>>, work: &mut TuningWork) -> Option<Vec<f64>> {
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for x in starts {
+        let merit = problem.score(&x, work).merit(PRICE);
+        if best.as_ref().is_none_or(|(m, _)| merit < *m) {
+            best = Some((merit, x));
+        }
+    }
+    best.map(|(_, x)| x)
+}
+
+/// Starts that are drawn for one further polish.
+pub(super) const DRAWN: usize = SCREENED;
+
 /// Searches from the given vectors, by rule, and from strata under `seed`.
 pub(super) fn search(
     problem: &TuningProblem,
@@ -80,13 +115,14 @@ pub(super) fn search(
     effort: &Effort,
     exact: &Exact<'_>,
 ) -> Found {
-    let from = starts(problem, given, seed, effort.starts);
+    let from = starts(problem, given, seed, effort.starts * SCREENED);
+    let from = screened(problem, from, given.len() + BY_RULE, effort.starts);
     let ends: Vec<(Option<Polished>, usize)> = from
         .into_par_iter()
         .map(|x| {
             let mut work = problem.work();
             let x = simplex(problem, x, effort.simplex_steps, &mut work);
-            (refine(problem, &x, effort.polish_steps, &mut work), work.evaluations)
+            (fresh(refine(problem, &x, effort.polish_steps, &mut work)), work.evaluations)
         })
         .collect();
     let mut found = Found { ends: Vec::new(), evaluations: 0, starts: 0, feasible_starts: 0 };
@@ -95,6 +131,11 @@ pub(super) fn search(
     found.ends.sort_by(|a, b| order(&a.score, &b.score));
     improve(problem, &mut found, effort, seed, exact);
     found
+}
+
+/// Marks an end as one of a start of its own.
+pub(super) fn fresh(end: Option<Polished>) -> Option<Polished> {
+    end.map(|e| Polished { fresh: true, ..e })
 }
 
 /// Feasible before infeasible, then by objective or by violation.
@@ -151,7 +192,7 @@ impl CostFunction for Merit<'_> {
 }
 
 /// A simplex around `x`; the best vertex, moved into the bounds.
-fn simplex(problem: &TuningProblem, x: Vec<f64>, steps: u64, work: &mut TuningWork) -> Vec<f64> {
+pub(super) fn simplex(problem: &TuningProblem, x: Vec<f64>, steps: u64, work: &mut TuningWork) -> Vec<f64> {
     let x = walk_back(problem, x, work);
     if steps == 0 {
         return x;

@@ -34,7 +34,7 @@ impl Default for TuneSettings {
             sample_time_s: None,
             starts: 12,
             simplex_steps: 25,
-            polish_steps: 40,
+            polish_steps: 60,
             rounds: 24,
             nominal_first: false,
         }
