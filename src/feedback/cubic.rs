@@ -29,49 +29,4 @@ impl Cubic {
         }
         (value, slope)
     }
-
-    /// A root of `part` between a and b, where it changes its sign: Illinois steps, which keep the bracket.
-    pub fn root(&self, part: impl Fn(Complex<f64>) -> f64, mut a: f64, mut b: f64) -> f64 {
-        let (mut fa, mut fb) = (part(self.at(a).0), part(self.at(b).0));
-        for _ in 0..12 {
-            if fa == fb || (b - a).abs() < 1e-13 {
-                break;
-            }
-            let x = ((fa * b - fb * a) / (fa - fb)).clamp(a.min(b), a.max(b));
-            let fx = part(self.at(x).0);
-            if fx == 0.0 {
-                return x;
-            }
-            if (fx < 0.0) != (fb < 0.0) {
-                (a, fa) = (b, fb);
-            } else {
-                fa *= 0.5;
-            }
-            (b, fb) = (x, fx);
-        }
-        b
-    }
-
-    /// Where the real part times `sign` is lowest between a and b: the root of its slope, where that rises through 0.
-    pub fn level(&self, sign: f64, mut a: f64, mut b: f64) -> Option<f64> {
-        let slope = |x: f64| sign * self.at(x).1.re;
-        let (mut fa, mut fb) = (slope(a), slope(b));
-        if fa >= 0.0 || fb <= 0.0 {
-            return None;
-        }
-        // The slope is a parabola, so the secant that keeps its bracket is there after a few steps.
-        for _ in 0..8 {
-            let x = (fa * b - fb * a) / (fa - fb);
-            let fx = slope(x);
-            if fx.abs() < 1e-9 {
-                return Some(x);
-            }
-            if fx < 0.0 {
-                (a, fa, fb) = (x, fx, 0.5 * fb);
-            } else {
-                (b, fb, fa) = (x, fx, 0.5 * fa);
-            }
-        }
-        Some(0.5 * (a + b))
-    }
 }

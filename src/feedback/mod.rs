@@ -10,30 +10,39 @@
 //! ```
 
 mod amplitudes;
+mod bandwidth;
 mod crossing;
 mod cubic;
 mod curve;
+mod curve_limit;
 mod described;
 mod events;
 mod gang;
 mod grid;
+mod judge;
+mod loop_power;
 mod margins;
 mod measured;
+mod model_grid;
 mod nyquist;
 mod open_loop;
 mod poles;
 mod pull;
+mod refine;
 mod sampled;
 mod sweep_plan;
 mod trace;
 
 pub use amplitudes::{AmplitudeRow, Amplitudes, DescribedMargins, LimitCycle, described_margins, linear_crossover_hz};
+pub use bandwidth::{BANDWIDTH_LEVEL, closed_loop_bandwidth};
 pub use crossing::Crossing;
 pub use curve::ResponseCurve;
+pub use curve_limit::{CurveLimit, CurveSide, Excess, Magnitude};
 pub use described::{Described, DescribedLoop, DescribedPlant};
 pub use events::{Event, GRAZE, Graze, QuickMargins};
 pub use gang::{GangOfFour, gang_of_four};
 pub use grid::frequency_grid;
+pub use loop_power::{LoopPower, PowerWork, quadrature};
 pub use margins::{Margins, margins};
 pub use measured::{Interval, MarginIntervals, MeasuredLoop, MeasuredMargins, hold, measured_margins};
 pub use nyquist::{NyquistCount, nyquist_count};

@@ -28,11 +28,11 @@ impl SampledPlant {
     fn pull_lanes(&self, [minus, plus]: &[Section; 2], rate: f64, [re, im]: &mut [Vec<f64>; 2]) {
         let (re, _) = re.as_chunks_mut::<LANES>();
         let (im, _) = im.as_chunks_mut::<LANES>();
-        let grid = self.cos.iter().zip(&self.sin).zip(self.cos2.iter().zip(&self.sin2));
-        for (((cos, sin), (cos2, sin2)), (re, im)) in grid.zip(re.iter_mut().zip(im)) {
+        for ((cos, sin), (re, im)) in self.cos.iter().zip(&self.sin).zip(re.iter_mut().zip(im)) {
             for j in 0..LANES {
-                let top = |s: &Section| (s.b0 + s.b1 * cos[j] + s.b2 * cos2[j], -(s.b1 * sin[j] + s.b2 * sin2[j]));
-                let under = |s: &Section| (1.0 + s.a1 * cos[j] + s.a2 * cos2[j], -(s.a1 * sin[j] + s.a2 * sin2[j]));
+                // Times z: a common factor of both products.
+                let top = |s: &Section| (s.b1 + (s.b0 + s.b2) * cos[j], (s.b0 - s.b2) * sin[j]);
+                let under = |s: &Section| (s.a1 + (1.0 + s.a2) * cos[j], (1.0 - s.a2) * sin[j]);
                 let times = |(a, b): (f64, f64), (c, d): (f64, f64)| (a * c - b * d, a * d + b * c);
                 let (p, m) = (times(top(plus), under(minus)), times(top(minus), under(plus)));
                 // ln(p/m) = 2 artanh((p - m)/(p + m)), whose cube is far below rounding.

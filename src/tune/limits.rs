@@ -1,8 +1,8 @@
 //! What a spec demands: `[margins]`, `[limits]` and the curves over frequency.
 
 use super::SpecError;
-use super::requirements::Side;
 use super::spec::{interval, range};
+use crate::feedback::CurveLimit;
 use crate::pes::Profile;
 use serde::{Deserialize, Serialize};
 
@@ -56,62 +56,20 @@ pub struct HarmonicLimit {
     pub amplitude: f64,
 }
 
-/// A response of the loop cut at the plant's input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Response {
-    /// Open loop.
-    L,
-    /// Sensitivity 1/(1 + L).
-    S,
-    /// Complementary sensitivity L/(1 + L).
-    T,
-    /// Compliance: position per disturbance at the plant's input (position_unit/command_unit).
-    PS,
-    /// Command per noise of the sensor (command_unit/position_unit).
-    CS,
-}
-
-/// A limit over frequency: straight in log frequency and dB between its points, nothing outside them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CurveLimit {
-    /// Magnitude of what.
-    pub of: Response,
-    /// Which side is good.
-    pub side: Side,
-    /// Frequencies, ascending (Hz).
-    pub hz: Vec<f64>,
-    /// Levels (dB).
-    pub db: Vec<f64>,
-}
-
-impl CurveLimit {
-    /// The level at `hz` (dB); none outside its points.
-    pub fn at(&self, hz: f64) -> Option<f64> {
-        let (first, last) = (*self.hz.first()?, *self.hz.last()?);
-        if !(first..=last).contains(&hz) {
-            return None;
-        }
-        let i = self.hz.partition_point(|f| *f <= hz).clamp(1, self.hz.len() - 1);
-        let share = (hz / self.hz[i - 1]).ln() / (self.hz[i] / self.hz[i - 1]).ln();
-        Some(self.db[i - 1] + share * (self.db[i] - self.db[i - 1]))
+fn check_curve(index: usize, c: &CurveLimit) -> Result<(), SpecError> {
+    let wrong = |found: String| Err(SpecError::Curve { index, found });
+    if c.hz.len() != c.db.len() || c.hz.len() < 2 {
+        return wrong(format!("{} frequencies and {} levels", c.hz.len(), c.db.len()));
     }
-
-    fn check(&self, index: usize) -> Result<(), SpecError> {
-        let wrong = |found: String| Err(SpecError::Curve { index, found });
-        if self.hz.len() != self.db.len() || self.hz.len() < 2 {
-            return wrong(format!("{} frequencies and {} levels", self.hz.len(), self.db.len()));
-        }
-        if let Some(f) = self.hz.iter().find(|f| !(f.is_finite() && **f > 0.0)) {
-            return wrong(format!("{f} Hz"));
-        }
-        if let Some(d) = self.db.iter().find(|d| !d.is_finite()) {
-            return wrong(format!("{d} dB"));
-        }
-        match self.hz.windows(2).find(|p| p[1] <= p[0]) {
-            Some(p) => wrong(format!("{} Hz after {} Hz", p[1], p[0])),
-            None => Ok(()),
-        }
+    if let Some(f) = c.hz.iter().find(|f| !(f.is_finite() && **f > 0.0)) {
+        return wrong(format!("{f} Hz"));
+    }
+    if let Some(d) = c.db.iter().find(|d| !d.is_finite()) {
+        return wrong(format!("{d} dB"));
+    }
+    match c.hz.windows(2).find(|p| p[1] <= p[0]) {
+        Some(p) => wrong(format!("{} Hz after {} Hz", p[1], p[0])),
+        None => Ok(()),
     }
 }
 
@@ -150,7 +108,7 @@ impl Limits {
         above_zero("limits.command_rms", self.command_rms, f64::INFINITY, ABOVE)?;
         above_zero("limits.overshoot_percent", self.overshoot_percent, f64::INFINITY, ABOVE)?;
         above_zero("limits.settling_s", self.settling_s, f64::INFINITY, "a finite time above 0 s")?;
-        self.curve.iter().enumerate().try_for_each(|(i, c)| c.check(i))?;
+        self.curve.iter().enumerate().try_for_each(|(i, c)| check_curve(i, c))?;
         let Some(profile) = profile else {
             return if self.of_write() {
                 Err(SpecError::NeedsProfile { what: "a limit on the DFT, a harmonic or the command's peak" })

@@ -4,9 +4,10 @@
 //! d violation = Re(pull_by d ln C): margins are analytic in the gains. Limits on where |L| may cross 1 are read as limits on |L| itself
 //! (at least 1 below the range, at most 1 above it), which moves steadily where crossings appear and vanish. Spec: `specs/tuning.md`.
 
-use super::limits::{CurveLimit, Response};
 use super::requirements::{Requirement, Side, What};
-use crate::feedback::{Event, GRAZE, Graze, LoopOnGrid, QuickMargins, SampledPlant};
+use crate::feedback::{
+    BANDWIDTH_LEVEL, CurveLimit, CurveSide, Event, GRAZE, Graze, LoopOnGrid, Magnitude, QuickMargins, SampledPlant,
+};
 use crate::lti::Section;
 use nalgebra::Complex;
 use std::f64::consts::{LOG10_E, TAU};
@@ -42,8 +43,6 @@ impl Row {
     }
 }
 
-/// |T| at the edge of the closed-loop bandwidth, -3 dB.
-pub(super) const BANDWIDTH: f64 = 0.707_945_784_384_137_9;
 /// Rows this far inside their limit (share) cannot decide a step of the search and are left out.
 const FAR: f64 = 0.5;
 /// Violation of a crossover that does not exist.
@@ -163,7 +162,7 @@ pub(super) fn loop_rows(
             }
             What::Bandwidth => {
                 let s = 1.0 / (1.0 + open);
-                (BANDWIDTH.ln() - (open * s).norm().ln(), -s)
+                (BANDWIDTH_LEVEL.ln() - (open * s).norm().ln(), -s)
             }
             What::Curve { index } => {
                 let (ln, by) = magnitude(l.curves[index].of, open, p.plant);
@@ -270,27 +269,21 @@ fn bandwidth_rows(
         let now = if i == 0 { ln_t(0) } else { last[1] };
         if now <= last[0] && now <= next {
             let l = Complex::new(on.re[i], on.im[i]);
-            put(grid[i], BANDWIDTH.ln() - now, -1.0 / (1.0 + l));
+            put(grid[i], BANDWIDTH_LEVEL.ln() - now, -1.0 / (1.0 + l));
         }
         last = [now, next];
     }
 }
 
 /// ln of a magnitude, and its slope over ln C.
-fn magnitude(of: Response, l: Complex<f64>, plant: Complex<f64>) -> (f64, Complex<f64>) {
-    let s = 1.0 / (1.0 + l);
-    match of {
-        Response::L => (l.norm().ln(), real(1.0)),
-        Response::S => (s.norm().ln(), -l * s),
-        Response::T => ((l * s).norm().ln(), s),
-        Response::PS => ((plant * s).norm().ln(), -l * s),
-        Response::CS => ((l * s / plant).norm().ln(), s),
-    }
+fn magnitude(of: Magnitude, l: Complex<f64>, plant: Complex<f64>) -> (f64, Complex<f64>) {
+    let (gain, distance) = (l.norm_sqr(), (1.0 + l).norm_sqr());
+    (0.5 * of.squared(plant.norm_sqr(), gain, distance).ln(), of.share(l))
 }
 
 /// Violation and slope from the ln of a magnitude over its curve.
 fn over_curve(curve: &CurveLimit, w: &Requirement, over: f64, by: Complex<f64>) -> (f64, Complex<f64>) {
-    let sign = if curve.side == Side::AtMost { 1.0 } else { -1.0 };
+    let sign = if curve.side == CurveSide::AtMost { 1.0 } else { -1.0 };
     let ratio = (sign * over).exp() / w.limit;
     (ratio - 1.0, by * (sign * ratio))
 }
@@ -305,18 +298,11 @@ fn curve_rows(
     put: &mut impl FnMut(f64, f64, Complex<f64>),
 ) {
     let (curve, levels, grid) = (&l.curves[index], &l.levels[index], sampled.w_rad_s());
-    let sign = if curve.side == Side::AtMost { 1.0 } else { -1.0 };
+    let sign = if curve.side == CurveSide::AtMost { 1.0 } else { -1.0 };
     let over = |i: usize| {
         let (x, y) = (on.re[i], on.im[i]);
         let (gain, away) = (x * x + y * y, (1.0 + x) * (1.0 + x) + y * y);
-        let p = sampled.value(i).norm_sqr();
-        let power = match curve.of {
-            Response::L => gain,
-            Response::S => 1.0 / away,
-            Response::T => gain / away,
-            Response::PS => p / away,
-            Response::CS => gain / (away * p),
-        };
+        let power = curve.of.squared(sampled.value(i).norm_sqr(), gain, away);
         sign * (0.5 * power.ln() - levels[i])
     };
     let from = levels.iter().position(|x| !x.is_nan()).unwrap_or(grid.len());

@@ -1,8 +1,7 @@
 //! What is tuned: a plant model or a measured response, prepared once for thousands of candidates.
 
-use super::frequency_sum::FrequencySum;
 use super::limits::has_bin;
-use super::linear::{SECTION_STEP, SectionSlope};
+use super::linear::SectionSlope;
 use super::objective::Minimise;
 use super::record_figures::{Asked, RecordFigure};
 use super::requirements::{Requirement, What};
@@ -10,7 +9,7 @@ use super::step_figures::{envelope_from, overshoot, worst_outside};
 use super::write_figures::{WriteBuffers, WriteSource};
 use super::{Spec, TuneError};
 use crate::controller::Controller;
-use crate::feedback::{LoopOnGrid, MeasuredLoop, Pulls, ResponseCurve, SampledPlant, hold};
+use crate::feedback::{LoopOnGrid, LoopPower, Magnitude, MeasuredLoop, PowerWork, ResponseCurve, SampledPlant, hold};
 use crate::frf::Frf;
 use crate::lti::{DiscretePlant, FrequencyResponse, Plant, Section, Sections};
 use crate::pes::{Slopes, StepScene, StepWork};
@@ -109,7 +108,7 @@ pub(super) struct Prepared {
     write: Option<WriteSource>,
     step: Option<StepScene>,
     /// Power of the position and of the command under the disturbance.
-    disturbance: Option<[FrequencySum; 2]>,
+    disturbance: Option<[LoopPower; 2]>,
 }
 
 #[derive(Clone, Debug)]
@@ -130,7 +129,7 @@ pub(super) struct Buffers {
     step: StepWork,
     weights: Vec<f64>,
     sections: Slopes,
-    pulls: Pulls,
+    power: PowerWork,
 }
 
 impl Prepared {
@@ -188,11 +187,10 @@ impl Prepared {
             || asked.any(|f| f == RecordFigure::CommandRms) && spec.profile.is_none();
         let disturbance = match (&spec.disturbance, summed) {
             (Some(d), true) => {
-                let density = |hz: f64| d.two_sided(hz, t);
-                Some([
-                    FrequencySum::of(&sampled, |hz, i| density(hz) * sampled.value(i).norm_sqr(), |_, _| 0.0),
-                    FrequencySum::of(&sampled, |_, _| 0.0, |hz, _| density(hz)),
-                ])
+                let (mut position, mut command) = (LoopPower::on(&sampled), LoopPower::on(&sampled));
+                position.add(&sampled, Magnitude::PS, |hz| d.density(hz, t));
+                command.add(&sampled, Magnitude::T, |hz| d.density(hz, t));
+                Some([position, command])
             }
             (None, true) => return Err(super::SpecError::NeedsDisturbance.into()),
             _ => None,
@@ -224,7 +222,7 @@ impl Prepared {
             step: StepWork::default(),
             weights: Vec::new(),
             sections: Slopes::default(),
-            pulls: Pulls::default(),
+            power: PowerWork::default(),
         }
     }
 
@@ -236,7 +234,7 @@ impl Prepared {
             w.figures(c, chain, asked, &b.on, &mut b.write, &mut b.figures);
         }
         for (at, sum) in self.summed(asked) {
-            b.figures[at] = sum.power(&b.on).sqrt();
+            b.figures[at] = sum.variance(&b.on).max(0.0).sqrt();
         }
         if let Some(scene) = &self.step {
             scene.run(chain, c.feedforward.as_ref(), c.output_limit, asked.step_samples, &mut b.step);
@@ -271,14 +269,11 @@ impl Prepared {
             w.slopes(c, chain, slopes, asked, &self.sampled, &b.on, wanted, &b.figures, &mut b.write, &mut b.slopes);
         }
         let place = |f| asked.place(f).filter(|at| wanted[*at]);
-        if self.summed(asked).any(|(at, _)| wanted[at]) {
-            let around: Vec<[Section; 2]> = slopes.iter().map(|s| s.around).collect();
-            self.sampled.pull(&around, SECTION_STEP, &mut b.pulls);
-        }
         for (at, sum) in self.summed(asked).filter(|(at, _)| wanted[*at]) {
-            sum.slopes(&b.on, &b.pulls, &mut b.slopes[at]);
-            let twice = 2.0 * b.figures[at].max(f64::MIN_POSITIVE);
-            b.slopes[at].iter_mut().for_each(|d| *d /= twice);
+            sum.slopes(&self.sampled, chain, &b.on, &mut b.power, &mut b.sections.sections);
+            let half = 0.5 / b.figures[at].max(f64::MIN_POSITIVE);
+            b.sections.sections.iter_mut().flatten().for_each(|d| *d *= half);
+            in_parameters(&b.sections, slopes, &mut b.slopes[at]);
         }
         if let Some(scene) = &self.step {
             let one_hot = |at: usize, sample: usize, weight: f64, b: &mut Buffers| {
@@ -303,7 +298,7 @@ impl Prepared {
 
 impl Prepared {
     /// The figures that are sums over frequency, by their place.
-    fn summed(&self, asked: &Asked) -> impl Iterator<Item = (usize, &FrequencySum)> {
+    fn summed(&self, asked: &Asked) -> impl Iterator<Item = (usize, &LoopPower)> {
         let position = (asked.minimise == Minimise::Disturbance).then_some(0);
         let command = asked.place(RecordFigure::CommandRms).filter(|_| self.write.is_none());
         let sums = self.disturbance.as_ref();
@@ -334,5 +329,7 @@ pub(super) fn command_rms(m: &Machine<'_>, c: &Controller, d: &super::Disturbanc
     };
     let mut on = LoopOnGrid::default();
     sampled.close(&c.sections()?.chain, &mut on);
-    Ok(FrequencySum::of(&sampled, |_, _| 0.0, |hz, _| d.two_sided(hz, t)).power(&on).sqrt())
+    let mut power = LoopPower::on(&sampled);
+    power.add(&sampled, Magnitude::T, |hz| d.density(hz, t));
+    Ok(power.variance(&on).max(0.0).sqrt())
 }

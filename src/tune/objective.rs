@@ -5,9 +5,8 @@
 
 use super::SpecError;
 use super::spec::{interval, range};
-use crate::pes::{HIGH_BAND_HZ, LOW_BAND_HZ};
+use crate::pes::{HIGH_BAND_HZ, LOW_BAND_HZ, coloured, tabulated};
 use serde::{Deserialize, Serialize};
-use std::f64::consts::TAU;
 use std::path::Path;
 
 /// The quantity that is made smallest.
@@ -98,7 +97,7 @@ pub enum Disturbance {
         /// Corner (Hz).
         corner_hz: f64,
     },
-    /// A one-sided density, straight between its points, 0 outside them.
+    /// A one-sided density, straight in logarithms between its points, 0 outside them.
     Density {
         /// Frequencies, ascending (Hz).
         hz: Vec<f64>,
@@ -109,7 +108,7 @@ pub enum Disturbance {
 
 impl Disturbance {
     /// Reads `frequency_hz,density` rows.
-    pub(super) fn density(file: &Path, text: &str) -> Result<Disturbance, SpecError> {
+    pub(super) fn read(file: &Path, text: &str) -> Result<Disturbance, SpecError> {
         let wrong = |found: String| SpecError::Density { file: file.to_owned(), found };
         let (mut hz, mut density) = (Vec::new(), Vec::new());
         for (number, line) in text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#')) {
@@ -144,25 +143,11 @@ impl Disturbance {
         Ok(())
     }
 
-    /// Density at `hz`, both signs counted apart (command_unit^2/Hz), of a disturbance that steps every `t` seconds.
-    pub fn two_sided(&self, hz: f64, t: f64) -> f64 {
+    /// One-sided density at `hz` (command_unit^2/Hz) of a disturbance with a new value every `t` seconds.
+    pub fn density(&self, hz: f64, t: f64) -> f64 {
         match self {
-            Disturbance::Coloured { rms, corner_hz } => {
-                let keep = (-TAU * corner_hz * t).exp();
-                let (cos, one) = ((TAU * hz * t).cos(), 1.0 - keep);
-                // |1 - keep e^{-jwT}|^2 without cancellation at low frequencies.
-                let back = one * one + 2.0 * keep * (1.0 - cos);
-                rms * rms * t * (1.0 - keep * keep) / back
-            }
-            Disturbance::Density { hz: at, density } => {
-                let i = at.partition_point(|x| *x <= hz);
-                if i == 0 || (i == at.len() && hz > at[i - 1]) {
-                    return 0.0;
-                }
-                let i = i.min(at.len() - 1);
-                let share = (hz - at[i - 1]) / (at[i] - at[i - 1]);
-                0.5 * (density[i - 1] + share * (density[i] - density[i - 1]))
-            }
+            Disturbance::Coloured { rms, corner_hz } => coloured(*rms, *corner_hz, t)(hz),
+            Disturbance::Density { hz: at, density } => tabulated(at, density)(hz),
         }
     }
 }

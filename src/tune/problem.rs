@@ -3,7 +3,6 @@
 //! In: a decision vector. Out: the objective and the largest violation. One [`TuningWork`] a thread holds every buffer, so that a
 //! candidate allocates nothing once they have grown.
 
-use super::limits::CurveLimit;
 use super::loop_rows::{LoopLimits, Moves, Place, Row, loop_rows, places};
 use super::machine::{Buffers, Prepared};
 use super::objective::Minimise;
@@ -12,6 +11,7 @@ use super::record_figures::{Asked, RecordFigure};
 use super::requirements::{CurveFound, Found, Requirement, Side, What};
 use super::{Machine, Parameters, Spec, TuneError};
 use crate::controller::Controller;
+use crate::feedback::CurveLimit;
 use crate::lti::Section;
 use std::f64::consts::{LOG10_E, TAU};
 

@@ -191,7 +191,7 @@ impl SpecFile {
                 Some(Disturbance::Coloured { rms, corner_hz })
             }
             Some(DisturbanceFile { rms: None, corner_hz: None, psd: Some(path) }) => match density(&path)? {
-                Some(text) => Some(Disturbance::density(&path, &text)?),
+                Some(text) => Some(Disturbance::read(&path, &text)?),
                 None => return Err(SpecError::NoDensityText { path }),
             },
             Some(_) => return Err(SpecError::Disturbance),

@@ -4,7 +4,6 @@
 //! expected power, the limits are of the second, which is what `simulate` reports. Response: the write read off the spectrum, noise by its
 //! expected power throughout. A search whose objective looked at one draw alone would learn it by heart.
 
-use super::frequency_sum::FrequencySum;
 use super::linear::{SECTION_STEP, SectionSlope};
 use super::machine::in_parameters;
 use super::objective::Minimise;
@@ -13,7 +12,7 @@ use crate::controller::Controller;
 use crate::feedback::{LoopOnGrid, Pulls, ResponseCurve, SampledPlant};
 use crate::lti::{DiscretePlant, Section};
 use crate::pes::{
-    self, ExpectedNoise, Figure, NoiseWork, PesError, Profile, QuickScene, QuickWork, Record, Slopes, SpectralPes,
+    self, Figure, NoisePower, NoisePowerWork, PesError, Profile, QuickScene, QuickWork, Record, Slopes, SpectralPes,
     SpectralWork, WindowDft,
 };
 
@@ -29,10 +28,8 @@ pub(super) enum WriteSource {
 pub(super) struct ModelWrite {
     scene: QuickScene,
     dft: WindowDft,
-    /// Expected power of the noise in every bin, where the objective is of bins.
-    noise: Option<ExpectedNoise>,
-    /// Variance of the PES under the noise, where the objective is its rms.
-    variance: Option<FrequencySum>,
+    /// Expected power of the noise, where there is any.
+    noise: Option<NoisePower>,
     records: pes::Asked,
 }
 
@@ -40,7 +37,9 @@ pub(super) struct ModelWrite {
 #[derive(Clone, Debug, Default)]
 pub(super) struct WriteBuffers {
     work: QuickWork,
-    noise: NoiseWork,
+    noise: NoisePowerWork,
+    noise_slopes: Slopes,
+    moved: Vec<f64>,
     spectral: SpectralWork,
     /// Amplitudes of the bins: of the objective's record, and of the limits'.
     expected: Vec<f64>,
@@ -61,25 +60,9 @@ impl WriteSource {
     ) -> Result<WriteSource, PesError> {
         let scene = QuickScene::new(profile, plant)?;
         let [first, last] = profile.pes.window;
-        let (n, rate, t) = (last - first, profile.pes.sample_rate_hz, plant.sample_time_s());
+        let (n, rate) = (last - first, profile.pes.sample_rate_hz);
         let dft = WindowDft::new(n, rate, bins(asked, n, rate));
-        let noise = if asked.minimise == Minimise::Dft {
-            ExpectedNoise::of(profile, t, plant.integrators(), plant, &dft)
-        } else {
-            None
-        };
-        let variance = (asked.minimise == Minimise::PesRms && scene.has_noise()).then(|| {
-            let n = &profile.noise;
-            let windage = |hz: f64, i: usize| {
-                if n.windage_rms == 0.0 {
-                    return 0.0;
-                }
-                let (rms, corner_hz) = (n.windage_rms, n.windage_corner_hz);
-                super::objective::Disturbance::Coloured { rms, corner_hz }.two_sided(hz, t)
-                    * sampled.value(i).norm_sqr()
-            };
-            FrequencySum::of(sampled, windage, |_, _| n.encoder_rms * n.encoder_rms * t)
-        });
+        let noise = if asked.minimise.of_write() { NoisePower::of(profile, sampled, &dft) } else { None };
         let limited = |f| !matches!(f, RecordFigure::Objective);
         let whole = |f| matches!(f, RecordFigure::CommandPeak | RecordFigure::CommandRms);
         let records = pes::Asked {
@@ -88,7 +71,7 @@ impl WriteSource {
             whole: asked.any(whole),
             slopes: false,
         };
-        Ok(WriteSource::Model(Box::new(ModelWrite { scene, dft, noise, variance, records })))
+        Ok(WriteSource::Model(Box::new(ModelWrite { scene, dft, noise, records })))
     }
 
     /// A write read off the spectrum of a measured response.
@@ -189,7 +172,9 @@ impl ModelWrite {
         if self.records.still && asked.minimise == Minimise::Dft {
             self.dft.amplitudes(b.work.window(Record::Still), &mut b.expected);
             if let Some(noise) = &self.noise {
-                noise.add(chain, &mut b.noise, &mut b.expected);
+                noise.bins(on, &mut b.noise, &mut b.shares);
+                let powers = b.expected.iter_mut().zip(&b.shares);
+                powers.for_each(|(a, p)| *a = (*a * *a + p.max(0.0)).sqrt());
             }
         }
         if self.records.drawn {
@@ -199,7 +184,8 @@ impl ModelWrite {
         if asked.minimise == Minimise::PesRms {
             let window = b.work.window(Record::Still);
             let mean = window.iter().map(|e| e * e).sum::<f64>() / window.len() as f64;
-            figures[0] = (mean + self.variance.as_ref().map_or(0.0, |v| v.power(on))).sqrt();
+            let variance = self.noise.as_ref().map_or(0.0, |n| n.position.variance(on).max(0.0));
+            figures[0] = (mean + variance).sqrt();
         }
         if let Some(at) = asked.place(RecordFigure::CommandPeak) {
             figures[at] = b.work.peak(Record::Drawn).1;
@@ -260,50 +246,19 @@ impl ModelWrite {
             self.scene.backward(chain, &[seen], &mut b.work, &mut slopes);
             in_parameters(&slopes[0], sections, &mut out[at]);
             b.slopes = slopes;
-            if objective {
-                self.noise_slopes(chain, sections, sampled, on, figures[at], b, &mut out[at]);
+            if let Some(noise) = self.noise.as_ref().filter(|_| objective) {
+                // The shares of the bins' powers still stand in the buffers; of the rms the variance has one.
+                let of_rms = asked.minimise == Minimise::PesRms;
+                let position = if of_rms { 0.5 / figures[at].max(f64::MIN_POSITIVE) } else { 0.0 };
+                let bins: &[f64] = if of_rms { &[] } else { &b.shares };
+                let mut slopes = std::mem::take(&mut b.noise_slopes);
+                noise.slopes(sampled, chain, on, bins, [position, 0.0], &mut b.noise, &mut slopes.sections);
+                in_parameters(&slopes, sections, &mut b.moved);
+                out[at].iter_mut().zip(&b.moved).for_each(|(o, d)| *o += d);
+                b.noise_slopes = slopes;
             }
         }
         b.weights = weights;
-    }
-
-    /// What the expected noise adds to the slopes of the objective.
-    #[allow(clippy::too_many_arguments, reason = "one call site's locals")]
-    fn noise_slopes(
-        &self,
-        chain: &[Section],
-        sections: &[SectionSlope],
-        sampled: &SampledPlant,
-        on: &LoopOnGrid,
-        value: f64,
-        b: &mut WriteBuffers,
-        out: &mut [f64],
-    ) {
-        if let Some(variance) = &self.variance {
-            let around: Vec<[Section; 2]> = sections.iter().map(|s| s.around).collect();
-            sampled.pull(&around, SECTION_STEP, &mut b.pulls);
-            let mut slopes = Vec::new();
-            variance.slopes(on, &b.pulls, &mut slopes);
-            out.iter_mut().zip(&slopes).for_each(|(o, d)| *o += 0.5 * d / value.max(f64::MIN_POSITIVE));
-        }
-        if let Some(noise) = &self.noise {
-            // The shares of the bins' powers still stand in the buffers.
-            let mut moved = chain.to_vec();
-            for (o, s) in out.iter_mut().zip(sections) {
-                let mut side = |section: Section| {
-                    moved[s.section] = section;
-                    b.drawn.clear();
-                    b.drawn.resize(self.dft.bins().len(), 0.0);
-                    noise.add(&moved, &mut b.noise, &mut b.drawn);
-                    moved[s.section] = chain[s.section];
-                    b.drawn.iter().zip(&b.shares).map(|(a, q)| q * a * a).sum::<f64>()
-                };
-                *o += (side(s.around[1]) - side(s.around[0])) / (2.0 * SECTION_STEP);
-            }
-            if self.records.drawn {
-                self.dft.amplitudes(b.work.window(Record::Drawn), &mut b.drawn);
-            }
-        }
     }
 }
 
