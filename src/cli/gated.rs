@@ -6,7 +6,7 @@
 use super::proof::{self, On, Proof};
 use super::{Failure, Screen};
 use crate::controller::Controller;
-use crate::document::sha256_hex;
+use crate::document::{below, sha256_hex, write_text};
 use crate::frf::{ReadSettings, read_file};
 use crate::gate::features::{features, machine_folders, read_machines};
 use crate::gate::{Action, Gate, Table, Verdict};
@@ -134,7 +134,7 @@ pub(super) fn run(job: &Job<'_>, screen: &mut Screen) -> Result<Vec<Row>, Failur
         }
         rows.push(row);
     }
-    crate::document::write_text(&job.out.join(TABLE), &csv(&rows))?;
+    write_text(&job.out.join(TABLE), &csv(&rows))?;
     Ok(rows)
 }
 
@@ -194,7 +194,7 @@ fn tuned(job: &Job<'_>, row: &mut Row, screen: &mut Screen) -> Result<(), Failur
     let met = matches!(outcome, Outcome::Tuned(_));
     row.fate = if met { Fate::Tuned } else { Fate::LimitsNotMet };
     if met || job.keep_infeasible {
-        let gains = job.out.join(&row.id).join(GAINS);
+        let gains = below(job.out, &[&row.id, GAINS])?;
         table.write(&gains)?;
         screen.say(&format!("wrote {}", gains.display()));
         if let Some(spec) = job.certify {

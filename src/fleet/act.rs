@@ -1,0 +1,446 @@
+//! Approve, apply, roll back: a list of slots all or none, the store and the installed files as one.
+//!
+//! In: an [`Order`]. Out: revisions, and files in the folders of the slots. What an apply or a rollback is about to do stands in the store before the
+//! first file takes its name, with the bytes that stood there; when the last one has, the revisions are added. Whoever opens the store next
+//! after a kill finds what was begun and ends it ([`Store::heal`]). One process at a time does this, under a lock that dies with it.
+
+use super::claims::locked;
+use super::installed::{self, Target};
+use super::revision::{Action, New, Revision, add, chain, in_slot, keep_table, table_bytes};
+use super::row::Verdict;
+use super::seal::{ACT_FILES, ACTS, SLOTS, maybe, stop, text};
+use super::store_run::{Stamp, run_named, slot_row};
+use super::{FleetError, Store, table_text};
+use crate::document::sha256_hex;
+use rusqlite::types::Value;
+use rusqlite::{Connection, OptionalExtension, params};
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// Which slots an order is for.
+#[derive(Clone, Copy, Debug)]
+pub enum Which<'a> {
+    /// Every one whose last revision allows it and that no later run judged otherwise.
+    All,
+    /// These: all of them, or none.
+    Slots(&'a [String]),
+}
+
+/// What is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Order<'a> {
+    /// The slots.
+    pub which: Which<'a>,
+    /// Approve, apply or roll back.
+    pub action: Action,
+    /// The run whose proposals are meant; any where none is named.
+    pub run: Option<&'a str>,
+    /// Folder for the gains; a rollback goes to the folder of its apply where none is named.
+    pub out: Option<&'a Path>,
+    /// By whom and when.
+    pub stamp: &'a Stamp,
+    /// Why.
+    pub why: &'a str,
+}
+
+/// What became of an order.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Carried {
+    /// The revisions that were added, each with the run it stands on.
+    pub revisions: Vec<Revision>,
+    /// Slots named whose table was approved already, by the revision that did it.
+    pub already: Vec<Revision>,
+    /// Of all slots those that a later run judged otherwise, with the reason.
+    pub left: Vec<String>,
+    /// Files that were written.
+    pub files: Vec<PathBuf>,
+}
+
+/// What became of an act that a dead process had begun.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Healed {
+    /// Apply or rollback.
+    pub action: String,
+    /// Its slots.
+    pub slots: Vec<String>,
+    /// Who had begun it, and when.
+    pub who: String,
+    /// When it was begun.
+    pub at: String,
+    /// What was done about it.
+    pub end: End,
+}
+
+/// How an unfinished act ended.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum End {
+    /// It is done now: files and store agree.
+    Done,
+    /// It is undone: files and store are as before it; why it could not be done.
+    Undone(String),
+    /// It still waits; why neither could be done.
+    Waits(String),
+}
+
+/// One slot of an act.
+#[derive(Clone, Debug)]
+pub(super) struct Step {
+    pub slot: String,
+    pub folder: Option<PathBuf>,
+    pub sha256: String,
+    /// Digest of what stood in the folder.
+    pub before: Option<String>,
+    /// The slot's last revision when the act began.
+    pub stands_on: i64,
+}
+
+/// An act as the store has it.
+#[derive(Clone, Debug)]
+struct Act {
+    id: i64,
+    action: Action,
+    stamp: Stamp,
+    why: String,
+    steps: Vec<Step>,
+}
+
+/// The lock that one process holds while it installs; none where another holds it and `wait` is not asked for.
+pub(super) fn install_lock(store: &Path, wait: bool) -> Result<Option<File>, FleetError> {
+    locked(store, "install", wait)
+}
+
+impl Store {
+    /// Approves, applies or rolls back. What must come before is asked for; a table that a later run judged otherwise is refused.
+    pub fn carry_out(&mut self, order: &Order<'_>) -> Result<Carried, FleetError> {
+        let _lock = install_lock(&self.file, true)?;
+        let waiting = self.heal_locked()?;
+        let (mut carried, mut steps) = (Carried::default(), Vec::new());
+        let id = self.write("begin an act", |c| {
+            (carried, steps) = plan(c, order, &waiting)?;
+            if steps.iter().all(|s| s.folder.is_none()) {
+                let act = Act::of(0, order, &steps);
+                carried.revisions = act.conclude(c)?;
+                return Ok(None);
+            }
+            for step in &mut steps {
+                if let Some(target) = step.target().map_err(stop)?
+                    && let Some(bytes) = target.bytes().map_err(stop)?
+                {
+                    let sha256 = sha256_hex(&bytes);
+                    keep_table(c, &sha256, &bytes)?;
+                    step.before = Some(sha256);
+                }
+            }
+            Act::of(0, order, &steps).begin(c).map(Some)
+        })?;
+        let Some(id) = id else { return Ok(carried) };
+        let act = Act::of(id, order, &steps);
+        if let Err(error) = self.install(&act) {
+            // Nothing stays of it; where not even that can be done, it waits for the next command.
+            return Err(match self.undo(&act) {
+                Ok(()) => error,
+                Err(_) => {
+                    let slot = act.steps.iter().map(|s| s.slot.as_str()).collect::<Vec<_>>().join(", ");
+                    FleetError::Unfinished { slot, action: order.action.word(), why: error.to_string() }
+                }
+            });
+        }
+        carried.revisions = self.write("end an act", |c| act.conclude(c))?;
+        for step in &act.steps {
+            carried.files.extend(step.target()?.map(|t| t.file));
+        }
+        Ok(carried)
+    }
+
+    /// Ends what dead processes have begun: does it, or undoes it where it cannot be done. Nothing where a living process is at work.
+    pub fn heal(&mut self) -> Result<Vec<Healed>, FleetError> {
+        if self.begun()?.is_empty() {
+            return Ok(Vec::new());
+        }
+        match install_lock(&self.file, false)? {
+            Some(_lock) => self.heal_locked(),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// What was begun and has not ended, by words.
+    pub fn unfinished(&self) -> Result<Vec<Healed>, FleetError> {
+        let waits = || End::Waits("nothing can be written to the store here".into());
+        Ok(self.begun()?.iter().map(|a| a.healed(waits())).collect())
+    }
+
+    fn heal_locked(&mut self) -> Result<Vec<Healed>, FleetError> {
+        let mut all = Vec::new();
+        for act in self.begun()? {
+            let end = match self.install(&act) {
+                Ok(()) => {
+                    self.write("end an act", |c| act.conclude(c))?;
+                    End::Done
+                }
+                Err(FleetError::Damaged { file, what }) => return Err(FleetError::Damaged { file, what }),
+                Err(error) => match self.undo(&act) {
+                    Ok(()) => End::Undone(error.to_string()),
+                    Err(_) => End::Waits(error.to_string()),
+                },
+            };
+            all.push(act.healed(end));
+        }
+        Ok(all)
+    }
+
+    fn begun(&self) -> Result<Vec<Act>, FleetError> {
+        begun(&self.connection).map_err(self.fail("read what was begun"))
+    }
+
+    /// Gives every file of an act its bytes: all are written under other names first, so that a full disk is met before any takes its own.
+    fn install(&self, act: &Act) -> Result<(), FleetError> {
+        let mut ready = Vec::new();
+        for step in &act.steps {
+            let Some(target) = step.target()? else { continue };
+            target.clear();
+            let now = target.bytes()?.map(|b| sha256_hex(&b));
+            if now.as_deref() == Some(&step.sha256) {
+                continue;
+            }
+            if now.is_some() && now != step.before {
+                return Err(FleetError::ChangedMeanwhile { file: target.file, action: act.action.word() });
+            }
+            ready.push(installed::stage(&target, &self.table(&step.sha256)?)?);
+        }
+        ready.into_iter().try_for_each(|t| t.place().map(|_| ()).map_err(FleetError::from))
+    }
+
+    /// Puts back what stood in the folders before an act, and ends it without revisions.
+    fn undo(&mut self, act: &Act) -> Result<(), FleetError> {
+        for step in &act.steps {
+            let Some(target) = step.target()? else { continue };
+            let now = target.bytes()?.map(|b| sha256_hex(&b));
+            if now.as_deref() != Some(&step.sha256) || now == step.before {
+                continue;
+            }
+            match &step.before {
+                Some(sha256) => installed::stage(&target, &self.table(sha256)?)?.place().map(|_| ())?,
+                None => target.remove()?,
+            }
+        }
+        self.write("end an act", |c| act.end(c, "undone"))
+    }
+}
+
+impl Step {
+    fn target(&self) -> Result<Option<Target>, FleetError> {
+        self.folder.as_deref().map(|folder| Target::of(folder, &self.slot)).transpose()
+    }
+}
+
+impl Act {
+    fn of(id: i64, order: &Order<'_>, steps: &[Step]) -> Act {
+        Act { id, action: order.action, stamp: order.stamp.clone(), why: order.why.into(), steps: steps.to_vec() }
+    }
+
+    fn values(&self, id: i64, ended: Option<&str>) -> Vec<Value> {
+        let Stamp { who, at } = &self.stamp;
+        let words = [self.action.word(), who.as_str(), at.as_str(), self.why.as_str()].map(text);
+        [Value::Integer(id)].into_iter().chain(words).chain([maybe(ended)]).collect()
+    }
+
+    /// Writes down what is about to be done; gives its number.
+    fn begin(&self, c: &Connection) -> Result<i64, rusqlite::Error> {
+        let query = "SELECT coalesce((SELECT seq FROM sqlite_sequence WHERE name = 'acts'), 0) + 1";
+        let id: i64 = c.query_row(query, [], |r| r.get(0))?;
+        ACTS.put(c, "INSERT", self.values(id, None))?;
+        for s in &self.steps {
+            let folder = s.folder.as_ref().map(|f| f.to_string_lossy().into_owned());
+            let words = [Some(s.slot.as_str()), folder.as_deref(), Some(s.sha256.as_str()), s.before.as_deref()].map(maybe);
+            let values = [Value::Integer(id)].into_iter().chain(words).chain([Value::Integer(s.stands_on)]);
+            ACT_FILES.put(c, "INSERT", values.collect())?;
+        }
+        Ok(id)
+    }
+
+    /// Adds the revisions, and before each what was found in the folder that nobody knew of.
+    fn conclude(&self, c: &Connection) -> Result<Vec<Revision>, rusqlite::Error> {
+        let mut added = Vec::with_capacity(self.steps.len());
+        for s in &self.steps {
+            let before = chain(c, &s.slot)?;
+            let Some(base) = before.iter().find(|r| r.id == s.stands_on) else {
+                return Err(stop(super::seal::damaged(format!("revision {} of {} is not there", s.stands_on, s.slot))));
+            };
+            let known = in_slot(&before).map(|r| r.sha256.as_str());
+            let strange = s.before.as_deref().filter(|b| Some(*b) != known && *b != s.sha256);
+            if let Some(sha256) = strange {
+                let folder = s.folder.as_deref().map(|f| f.display().to_string()).unwrap_or_default();
+                let why = format!("stood in {folder}");
+                add(c, &New { slot: &s.slot, action: Action::Found, sha256, run: None, why: &why, inputs: "" }, &self.stamp)?;
+            }
+            let new = New {
+                slot: &s.slot,
+                action: self.action,
+                sha256: &s.sha256,
+                run: base.run.as_deref(),
+                why: &self.why,
+                inputs: &base.inputs,
+            };
+            add(c, &new, &self.stamp)?;
+            added.extend(chain(c, &s.slot)?.pop());
+        }
+        if self.id > 0 {
+            self.end(c, "done")?;
+        }
+        Ok(added)
+    }
+
+    fn end(&self, c: &Connection, how: &str) -> Result<(), rusqlite::Error> {
+        ACTS.put(c, "REPLACE", self.values(self.id, Some(how))).map(|_| ())
+    }
+
+    fn healed(&self, end: End) -> Healed {
+        let Stamp { who, at } = self.stamp.clone();
+        let slots = self.steps.iter().map(|s| s.slot.clone()).collect();
+        Healed { action: self.action.word().into(), slots, who, at, end }
+    }
+}
+
+/// Acts that have not ended, oldest first.
+fn begun(c: &Connection) -> Result<Vec<Act>, rusqlite::Error> {
+    let mut all = Vec::new();
+    let mut query = c.prepare(&format!("{} WHERE t.ended IS NULL ORDER BY t.id", ACTS.select()))?;
+    let mut rows = query.query([])?;
+    while let Some(r) = rows.next()? {
+        ACTS.hold(r)?;
+        let action = if r.get::<_, String>(1)? == "rollback" { Action::Rollback } else { Action::Apply };
+        let (id, stamp) = (r.get(0)?, Stamp { who: r.get(2)?, at: r.get(3)? });
+        all.push(Act { id, action, stamp, why: r.get(4)?, steps: steps(c, id)? });
+    }
+    Ok(all)
+}
+
+fn steps(c: &Connection, act: i64) -> Result<Vec<Step>, rusqlite::Error> {
+    let mut query = c.prepare_cached(&format!("{} WHERE t.act = ?1 ORDER BY t.slot", ACT_FILES.select()))?;
+    let rows = query.query_map([act], step_of)?;
+    rows.collect()
+}
+
+fn step_of(r: &rusqlite::Row<'_>) -> Result<Step, rusqlite::Error> {
+    ACT_FILES.hold(r)?;
+    let folder = r.get::<_, Option<String>>(2)?.map(PathBuf::from);
+    Ok(Step { slot: r.get(1)?, folder, sha256: r.get(3)?, before: r.get(4)?, stands_on: r.get(5)? })
+}
+
+/// Where a slot's last apply put its gains: the act that stood on its last approval.
+fn applied_in(c: &Connection, chain: &[Revision]) -> Result<Option<PathBuf>, rusqlite::Error> {
+    let Some(approved) = chain.iter().rev().find(|r| r.action == "approve") else { return Ok(None) };
+    let query = format!(
+        "{} JOIN acts a ON a.id = t.act WHERE t.slot = ?1 AND t.stands_on = ?2 AND a.ended = 'done'",
+        ACT_FILES.select()
+    );
+    let step = c.query_row(&query, params![approved.slot, approved.id], step_of).optional()?;
+    Ok(step.and_then(|s| s.folder))
+}
+
+/// Looks at every slot of an order; refuses it where one of the slots named is not ready.
+fn plan(c: &Connection, order: &Order<'_>, waiting: &[Healed]) -> Result<(Carried, Vec<Step>), rusqlite::Error> {
+    let out = order.out.map(installed::absolute).transpose().map_err(stop)?;
+    let slots: BTreeSet<String> = match order.which {
+        Which::Slots(slots) => slots.iter().cloned().collect(),
+        Which::All => {
+            let query = "SELECT slot FROM revisions r WHERE action = ?1 AND id = (SELECT max(id) FROM revisions WHERE slot = r.slot)";
+            c.prepare(query)?.query_map([order.action.after()], |r| r.get(0))?.collect::<Result<_, _>>()?
+        }
+    };
+    let all = matches!(order.which, Which::All);
+    let (mut carried, mut steps) = (Carried::default(), Vec::new());
+    for slot in slots {
+        let before = chain(c, &slot)?;
+        let Some(last) = before.last() else { return Err(stop(FleetError::NoSuchSlot { slot })) };
+        if order.action == Action::Approve && last.action == "approve" && order.run.is_none_or(|r| last.run.as_deref() == Some(r)) {
+            carried.already.push(last.clone());
+            continue;
+        }
+        let refusal = refused(c, order, last, waiting)?;
+        match refusal {
+            None => {}
+            Some(FleetError::OtherRun { .. }) if all => continue,
+            Some(e @ FleetError::JudgedOtherwise { .. }) if all => {
+                carried.left.push(e.to_string());
+                continue;
+            }
+            Some(e) => return Err(stop(e)),
+        }
+        // What was in the slot before the apply: the last table that was found, applied or rolled back to.
+        let back = before.split_last().and_then(|(_, earlier)| in_slot(earlier));
+        let sha256 = match (order.action, back) {
+            (Action::Rollback, Some(back)) => back.sha256.clone(),
+            (Action::Rollback, None) => {
+                return Err(stop(super::seal::damaged(format!("slot {slot} has an apply and nothing before it"))));
+            }
+            _ => last.sha256.clone(),
+        };
+        table_bytes(c, &sha256)?;
+        let folder = match order.action {
+            Action::Apply => out.clone(),
+            Action::Rollback => {
+                let applied = applied_in(c, &before)?;
+                if let (Some(applied), Some(found)) = (&applied, &out)
+                    && !installed::same(applied, found)
+                {
+                    let (applied, found) = (applied.clone(), found.clone());
+                    return Err(stop(FleetError::OtherFolder { slot, applied, found }));
+                }
+                out.clone().or(applied)
+            }
+            _ => None,
+        };
+        steps.push(Step { sha256, folder, before: None, stands_on: last.id, slot });
+    }
+    Ok((carried, steps))
+}
+
+/// Why a slot is not ready for an order.
+fn refused(
+    c: &Connection,
+    order: &Order<'_>,
+    last: &Revision,
+    waiting: &[Healed],
+) -> Result<Option<FleetError>, rusqlite::Error> {
+    let slot = last.slot.clone();
+    if last.action != order.action.after() {
+        let found = format!("{} {} (revision {}, by {} at {})", last.action, last.sha256, last.id, last.who, last.at);
+        return Ok(Some(FleetError::Revision { slot, expected: order.action.needs(), found }));
+    }
+    let run = last.run.clone().unwrap_or_default();
+    if let Some(asked) = order.run.filter(|r| *r != run) {
+        return Ok(Some(FleetError::OtherRun { slot, found: run, asked: asked.to_owned() }));
+    }
+    for act in waiting {
+        if let End::Waits(why) = &act.end
+            && act.slots.contains(&slot)
+            && order.action != Action::Approve
+        {
+            let action = if act.action == "rollback" { "rollback" } else { "apply" };
+            return Ok(Some(FleetError::Unfinished { slot, action, why: why.clone() }));
+        }
+    }
+    if order.action == Action::Rollback {
+        return Ok(None);
+    }
+    // Rows of a run stand in the store before its proposals do: a run that is still on its way has its say as well.
+    let Some(stood) = run_named(c, &run)? else {
+        return Ok(Some(super::seal::damaged(format!("run {run} of {slot} is not there"))));
+    };
+    let query = format!(
+        "{} JOIN runs r ON r.run = t.run WHERE t.slot = ?1 AND r.seq > ?2 ORDER BY r.seq DESC LIMIT 1",
+        SLOTS.select()
+    );
+    let later = c.query_row(&query, params![slot, stood.seq], |r| Ok((r.get::<_, String>(0)?, slot_row(r)?))).optional()?;
+    let Some((later, row)) = later else { return Ok(None) };
+    let same = match (&row.table, row.verdict) {
+        (Some(t), Verdict::Tuned) => table_text(&t.gains).map_err(stop)?.1 == last.sha256,
+        _ => false,
+    };
+    let verdict = if row.verdict == Verdict::Tuned { "tuned, with another table" } else { row.verdict.word() };
+    Ok((!same).then(|| FleetError::JudgedOtherwise { slot, run, later, verdict: verdict.to_owned() }))
+}
