@@ -68,7 +68,10 @@ fn what_cannot_be_done_any_more_is_undone_and_the_bytes_are_those_from_before() 
     std::fs::write(&b, "theirs").unwrap();
     let healed = store.heal().unwrap();
     assert!(matches!(&healed[0].end, End::Undone(why) if why.contains("was changed")), "{healed:?}");
-    assert_eq!((std::fs::read(&a).unwrap().as_slice(), std::fs::read(&b).unwrap().as_slice()), (&by_hand[..], &b"theirs"[..]));
+    assert_eq!(
+        (std::fs::read(&a).unwrap().as_slice(), std::fs::read(&b).unwrap().as_slice()),
+        (&by_hand[..], &b"theirs"[..])
+    );
     assert!(slots.iter().all(|s| words(&store, s).last().unwrap() == "approve"));
 
     // Neither can be done where a folder stands in the place of the file; the slot waits and says why.
@@ -89,7 +92,10 @@ fn what_cannot_be_done_any_more_is_undone_and_the_bytes_are_those_from_before() 
     assert_eq!(words(&store, &slots[1])[2..], ["approve", "found", "apply"]);
     let back = all(&mut store, Action::Rollback, None).unwrap();
     assert_eq!(back.files, [a.clone(), b.clone()]);
-    assert_eq!((std::fs::read(&a).unwrap().as_slice(), std::fs::read(&b).unwrap().as_slice()), (&by_hand[..], &b"theirs"[..]));
+    assert_eq!(
+        (std::fs::read(&a).unwrap().as_slice(), std::fs::read(&b).unwrap().as_slice()),
+        (&by_hand[..], &b"theirs"[..])
+    );
 }
 
 #[test]
@@ -146,7 +152,8 @@ fn a_rollback_gives_the_bytes_of_the_slot_comments_and_all() {
     assert_eq!(std::fs::read_to_string(installed(&out, &slot)).unwrap(), text);
     // What a killed process left half-written beside it goes with the next act; a living one's stays.
     let beside = installed(&out, &slot).parent().unwrap().to_path_buf();
-    let (dead, living) = (".controller.toml.4999999.0.part", format!(".controller.toml.{}.99.part", std::process::id()));
+    let (dead, living) =
+        (".controller.toml.4999999.0.part", format!(".controller.toml.{}.99.part", std::process::id()));
     std::fs::write(beside.join(dead), "half").unwrap();
     std::fs::write(beside.join(&living), "half").unwrap();
     add_run(&mut store, &context, "run-0002", &own);
@@ -162,7 +169,10 @@ fn a_list_of_slots_is_all_or_none_and_two_who_approve_at_once_both_end_well() {
     let mut store = store_of(&place, &context);
     one(&mut store, &slots[0], Action::Approve, None).unwrap();
     let refused = store.carry_out(&order(Which::Slots(&slots), Action::Apply, Some(&out), &stamp())).unwrap_err();
-    assert!(matches!(&refused, FleetError::Revision { slot, expected: "approved", .. } if *slot == slots[1]), "{refused}");
+    assert!(
+        matches!(&refused, FleetError::Revision { slot, expected: "approved", .. } if *slot == slots[1]),
+        "{refused}"
+    );
     assert_eq!(words(&store, &slots[0]).last().unwrap(), "approve");
     assert!(!out.exists());
     let file = store.file.clone();

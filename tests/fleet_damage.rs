@@ -30,7 +30,8 @@ fn apply(file: &Path, out: &Path) -> Result<Vec<Vec<u8>>, FleetError> {
 fn turned(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
     assert_eq!(from.len(), to.len());
     let mut bytes = bytes.to_vec();
-    let places: Vec<usize> = (0..bytes.len() - from.len()).filter(|&i| bytes[i..].starts_with(from.as_bytes())).collect();
+    let places: Vec<usize> =
+        (0..bytes.len() - from.len()).filter(|&i| bytes[i..].starts_with(from.as_bytes())).collect();
     assert!(!places.is_empty(), "{from}");
     places.iter().for_each(|&i| bytes[i..i + from.len()].copy_from_slice(to.as_bytes()));
     bytes
@@ -114,7 +115,10 @@ fn an_emptied_store_is_not_a_new_one() {
         std::fs::write(&file, &bytes[..length]).unwrap();
         for opened in [Store::open(&file), Store::existing(&file), Store::reading(&file)] {
             let refused = opened.unwrap_err();
-            assert!(matches!(refused, FleetError::Emptied { .. } | FleetError::NoDatabase { .. }), "{length}: {refused}");
+            assert!(
+                matches!(refused, FleetError::Emptied { .. } | FleetError::NoDatabase { .. }),
+                "{length}: {refused}"
+            );
         }
         assert_eq!(std::fs::read(&file).unwrap().len(), length);
     }
@@ -191,9 +195,17 @@ fn a_store_of_the_version_before_is_brought_up_or_refused_where_a_table_has_chan
         c.execute_batch(BEFORE).unwrap();
         c.execute_batch("INSERT INTO runs VALUES (1, 'old', 'c', 1, 't', 'w', NULL, NULL, NULL, 'then')").unwrap();
         let r = &rows()[0];
-        c.execute("INSERT INTO slots VALUES ('old', 0, ?1, ?2, ?3, ?4)", [r.id(), r.digest.clone(), r.verdict.word().into(), row.clone()]).unwrap();
+        c.execute(
+            "INSERT INTO slots VALUES ('old', 0, ?1, ?2, ?3, ?4)",
+            [r.id(), r.digest.clone(), r.verdict.word().into(), row.clone()],
+        )
+        .unwrap();
         c.execute("INSERT INTO gain_tables VALUES (?1, ?2)", [sha256.as_str(), gains]).unwrap();
-        c.execute("INSERT INTO revisions VALUES (7, ?1, 'found', ?2, 'old', NULL, 'w', 't', 'y', 'i')", [&r.id(), &sha256]).unwrap();
+        c.execute(
+            "INSERT INTO revisions VALUES (7, ?1, 'found', ?2, 'old', NULL, 'w', 't', 'y', 'i')",
+            [&r.id(), &sha256],
+        )
+        .unwrap();
     };
     make(gains);
     // To be read only it stays as it is, and says so.

@@ -17,8 +17,36 @@ use std::process::Command;
 /// Names that would leave the folder, name a device, be too long, or be a command to a terminal or a spreadsheet.
 fn bad() -> Vec<String> {
     let words = [
-        "..", "../victim", "../../victim", "a/../../victim", "/abs/victim", "victim/..", ".", "", "a/b", "a\\b", "C:\\victim", "~", "CON", "nul",
-        "aux.txt", "COM1", "lpt9", "=1+2", "+1", "-rf", "@sum", "\u{1b}[31m", "\u{202e}cba", "ä", "a\tb", "*", "$(id)", "%2e%2e", "|", "a:b",
+        "..",
+        "../victim",
+        "../../victim",
+        "a/../../victim",
+        "/abs/victim",
+        "victim/..",
+        ".",
+        "",
+        "a/b",
+        "a\\b",
+        "C:\\victim",
+        "~",
+        "CON",
+        "nul",
+        "aux.txt",
+        "COM1",
+        "lpt9",
+        "=1+2",
+        "+1",
+        "-rf",
+        "@sum",
+        "\u{1b}[31m",
+        "\u{202e}cba",
+        "ä",
+        "a\tb",
+        "*",
+        "$(id)",
+        "%2e%2e",
+        "|",
+        "a:b",
     ];
     words.iter().map(|w| (*w).to_owned()).chain(["x".repeat(65), "x".repeat(240)]).collect()
 }
@@ -55,15 +83,21 @@ fn every_bad_name_is_a_row_and_no_file_leaves_the_output_folder() {
     let place = folder("names");
     let inner = place.join("deep/inner");
     good_slot(&inner.join("good"));
-    let mut table = "tester,slot,response,pes,log,controller,temperature_c\nT001,S01,good/response.bod,good/pes.csv,,,\n".to_owned();
+    let mut table =
+        "tester,slot,response,pes,log,controller,temperature_c\nT001,S01,good/response.bod,good/pes.csv,,,\n"
+            .to_owned();
     let names = bad();
     for name in &names {
         let field = quoted(name);
-        table += &format!("{field},S01,good/response.bod,good/pes.csv,,,\nT002,{field},good/response.bod,good/pes.csv,,,\n");
+        table +=
+            &format!("{field},S01,good/response.bod,good/pes.csv,,,\nT002,{field},good/response.bod,good/pes.csv,,,\n");
     }
     // Temperatures in words, or of no machine; devices, folders and pipes in the place of files.
     let words = ["\"24,5 C\"", "22 C", "abc", "-300", "1e12", "nan", "inf"];
-    words.iter().enumerate().for_each(|(i, c)| table += &format!("T003,S{i:02},good/response.bod,good/pes.csv,,,{c}\n"));
+    words
+        .iter()
+        .enumerate()
+        .for_each(|(i, c)| table += &format!("T003,S{i:02},good/response.bod,good/pes.csv,,,{c}\n"));
     let devices = ["/dev/zero", "/dev/full", "/dev/stdin", "good"];
     devices.iter().enumerate().for_each(|(i, d)| table += &format!("T004,S{i:02},good/response.bod,{d},,,\n"));
     std::fs::write(inner.join("slots.csv"), &table).unwrap();
@@ -113,7 +147,10 @@ fn every_bad_name_is_a_row_and_no_file_leaves_the_output_folder() {
     for table in ["slots.csv", "work_list.csv"] {
         let mut reader = csv::Reader::from_path(out.join(table)).unwrap();
         for field in reader.records().flat_map(|r| r.unwrap().iter().map(str::to_owned).collect::<Vec<_>>()) {
-            assert!(!field.starts_with(['=', '+', '@']) && (!field.starts_with('-') || field.parse::<f64>().is_ok()), "{field}");
+            assert!(
+                !field.starts_with(['=', '+', '@']) && (!field.starts_with('-') || field.parse::<f64>().is_ok()),
+                "{field}"
+            );
         }
     }
 }
@@ -134,8 +171,13 @@ fn folders_of_a_tree_are_held_to_the_alphabet_and_links_are_read_only() {
     #[cfg(unix)]
     {
         std::os::unix::fs::symlink("/dev/zero", place.join("testers/T001/slots/S01/log.toml.new")).unwrap();
-        std::fs::rename(place.join("testers/T001/slots/S01/log.toml.new"), place.join("testers/T001/slots/S01/log.toml")).unwrap();
-        let source = FileSource::of(Path::new("f"), &Input { tree: Some(place.join("testers")), ..Input::default() }).unwrap();
+        std::fs::rename(
+            place.join("testers/T001/slots/S01/log.toml.new"),
+            place.join("testers/T001/slots/S01/log.toml"),
+        )
+        .unwrap();
+        let source =
+            FileSource::of(Path::new("f"), &Input { tree: Some(place.join("testers")), ..Input::default() }).unwrap();
         let slot = (0..3).find(|&i| source.name(i).id() == "T001/S01").map(|i| source.load(i)).unwrap();
         assert!(slot.problems.iter().any(|p| p.contains("a device")), "{:?}", slot.problems);
     }

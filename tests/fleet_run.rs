@@ -41,7 +41,9 @@ fn outcome(
 
 fn floor(slots: usize) -> (TwinSource, PathBuf, Context) {
     let folder = folder(&format!("floor{slots}-{:?}", std::thread::current().id()).replace(['(', ')'], ""));
-    let context = Context::of(&Fleet::read(&fleet(&folder, &format!("twin = {{ slots = {slots}, seed = 3 }}"))).unwrap()).unwrap();
+    let context =
+        Context::of(&Fleet::read(&fleet(&folder, &format!("twin = {{ slots = {slots}, seed = 3 }}"))).unwrap())
+            .unwrap();
     (TwinSource::of(&TwinInput { slots, seed: 3, run: 0 }), folder, context)
 }
 

@@ -48,7 +48,9 @@ fn a_machine_that_broke_after_its_proposal_gets_no_gains() {
         // Of all slots it alone is left out, and said.
         let carried = all(&mut store, action, None).unwrap();
         assert_eq!((carried.revisions.len(), carried.left.len()), (tuned().len() - 1, 1));
-        assert!(carried.left[0].contains(&slot) && carried.revisions.iter().all(|r| r.run.as_deref() == Some("run-0001")));
+        assert!(
+            carried.left[0].contains(&slot) && carried.revisions.iter().all(|r| r.run.as_deref() == Some("run-0001"))
+        );
         // When the run has ended the proposal is withdrawn, once.
         store.propose(&context, &run).unwrap();
         store.propose(&context, &run).unwrap();

@@ -69,7 +69,7 @@ pub fn check_name(name: &str) -> Result<(), NameError> {
     }
     let stem = name.split('.').next().unwrap_or_default().trim_end().to_ascii_uppercase();
     let numbered = |d: &&str| stem.strip_prefix(*d).is_some_and(|n| matches!(n.as_bytes(), [b'1'..=b'9']));
-    if DEVICES.contains(&stem.as_str()) || NUMBERED_DEVICES.iter().any(|d| numbered(&d)) {
+    if DEVICES.contains(&stem.as_str()) || NUMBERED_DEVICES.iter().any(numbered) {
         return Err(NameError::Device { shown: shown() });
     }
     Ok(())
@@ -118,7 +118,9 @@ mod tests {
         for path in ["..", ".", "../a", "/a", "a/b", "a\\b", "C:", "a..b", ".hidden", "a.", " a", "a ", "a  b"] {
             assert!(matches!(check_name(path), Err(NameError::Character { .. })), "{path}");
         }
-        for sign in ["=1", "+1", "-1", "@a", "a\nb", "a\0", "a\u{1b}[2J", "\u{202e}a", "ä", "a,b", "a\"b", "<b>", "*", "~"] {
+        for sign in
+            ["=1", "+1", "-1", "@a", "a\nb", "a\0", "a\u{1b}[2J", "\u{202e}a", "ä", "a,b", "a\"b", "<b>", "*", "~"]
+        {
             assert!(matches!(check_name(sign), Err(NameError::Character { .. })), "{sign}");
         }
         for device in ["CON", "nul", "Aux.txt", "com1", "LPT9.toml", "prn .x"] {

@@ -79,7 +79,8 @@ fn abandoned(path: &Path) -> bool {
     let mut words = inner.rsplit('.');
     let [Some(count), Some(process)] = [words.next(), words.next()] else { return false };
     let number = |w: &str| !w.is_empty() && w.bytes().all(|b| b.is_ascii_digit());
-    if !(number(count) && number(process)) || !path.symlink_metadata().is_ok_and(|m| m.is_file()) {
+    let file = path.symlink_metadata().is_ok_and(|m| m.is_file());
+    if !(file && number(count) && number(process)) {
         return false;
     }
     // A living process holds the lock, on this machine or another; one of this machine is seen even before it has it.

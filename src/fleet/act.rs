@@ -6,44 +6,17 @@
 
 use super::claims::locked;
 use super::installed::{self, Target};
-use super::revision::{Action, New, Revision, add, chain, in_slot, keep_table, table_bytes};
-use super::row::Verdict;
-use super::seal::{ACT_FILES, ACTS, SLOTS, maybe, stop, text};
-use super::store_run::{Stamp, run_named, slot_row};
-use super::{FleetError, Store, table_text};
+use super::order::{Order, plan};
+use super::revision::{Action, New, Revision, add, chain, in_slot, keep_table};
+use super::seal::{ACT_FILES, ACTS, damaged, maybe, stop, text};
+use super::store_run::Stamp;
+use super::{FleetError, Store};
 use crate::document::sha256_hex;
+use rusqlite::Connection;
 use rusqlite::types::Value;
-use rusqlite::{Connection, OptionalExtension, params};
 use serde::Serialize;
-use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-
-/// Which slots an order is for.
-#[derive(Clone, Copy, Debug)]
-pub enum Which<'a> {
-    /// Every one whose last revision allows it and that no later run judged otherwise.
-    All,
-    /// These: all of them, or none.
-    Slots(&'a [String]),
-}
-
-/// What is asked for.
-#[derive(Clone, Copy, Debug)]
-pub struct Order<'a> {
-    /// The slots.
-    pub which: Which<'a>,
-    /// Approve, apply or roll back.
-    pub action: Action,
-    /// The run whose proposals are meant; any where none is named.
-    pub run: Option<&'a str>,
-    /// Folder for the gains; a rollback goes to the folder of its apply where none is named.
-    pub out: Option<&'a Path>,
-    /// By whom and when.
-    pub stamp: &'a Stamp,
-    /// Why.
-    pub why: &'a str,
-}
 
 /// What became of an order.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -254,7 +227,8 @@ impl Act {
         ACTS.put(c, "INSERT", self.values(id, None))?;
         for s in &self.steps {
             let folder = s.folder.as_ref().map(|f| f.to_string_lossy().into_owned());
-            let words = [Some(s.slot.as_str()), folder.as_deref(), Some(s.sha256.as_str()), s.before.as_deref()].map(maybe);
+            let words =
+                [Some(s.slot.as_str()), folder.as_deref(), Some(s.sha256.as_str()), s.before.as_deref()].map(maybe);
             let values = [Value::Integer(id)].into_iter().chain(words).chain([Value::Integer(s.stands_on)]);
             ACT_FILES.put(c, "INSERT", values.collect())?;
         }
@@ -267,14 +241,18 @@ impl Act {
         for s in &self.steps {
             let before = chain(c, &s.slot)?;
             let Some(base) = before.iter().find(|r| r.id == s.stands_on) else {
-                return Err(stop(super::seal::damaged(format!("revision {} of {} is not there", s.stands_on, s.slot))));
+                return Err(stop(damaged(format!("revision {} of {} is not there", s.stands_on, s.slot))));
             };
             let known = in_slot(&before).map(|r| r.sha256.as_str());
             let strange = s.before.as_deref().filter(|b| Some(*b) != known && *b != s.sha256);
             if let Some(sha256) = strange {
                 let folder = s.folder.as_deref().map(|f| f.display().to_string()).unwrap_or_default();
                 let why = format!("stood in {folder}");
-                add(c, &New { slot: &s.slot, action: Action::Found, sha256, run: None, why: &why, inputs: "" }, &self.stamp)?;
+                add(
+                    c,
+                    &New { slot: &s.slot, action: Action::Found, sha256, run: None, why: &why, inputs: "" },
+                    &self.stamp,
+                )?;
             }
             let new = New {
                 slot: &s.slot,
@@ -324,123 +302,8 @@ fn steps(c: &Connection, act: i64) -> Result<Vec<Step>, rusqlite::Error> {
     rows.collect()
 }
 
-fn step_of(r: &rusqlite::Row<'_>) -> Result<Step, rusqlite::Error> {
+pub(super) fn step_of(r: &rusqlite::Row<'_>) -> Result<Step, rusqlite::Error> {
     ACT_FILES.hold(r)?;
     let folder = r.get::<_, Option<String>>(2)?.map(PathBuf::from);
     Ok(Step { slot: r.get(1)?, folder, sha256: r.get(3)?, before: r.get(4)?, stands_on: r.get(5)? })
-}
-
-/// Where a slot's last apply put its gains: the act that stood on its last approval.
-fn applied_in(c: &Connection, chain: &[Revision]) -> Result<Option<PathBuf>, rusqlite::Error> {
-    let Some(approved) = chain.iter().rev().find(|r| r.action == "approve") else { return Ok(None) };
-    let query = format!(
-        "{} JOIN acts a ON a.id = t.act WHERE t.slot = ?1 AND t.stands_on = ?2 AND a.ended = 'done'",
-        ACT_FILES.select()
-    );
-    let step = c.query_row(&query, params![approved.slot, approved.id], step_of).optional()?;
-    Ok(step.and_then(|s| s.folder))
-}
-
-/// Looks at every slot of an order; refuses it where one of the slots named is not ready.
-fn plan(c: &Connection, order: &Order<'_>, waiting: &[Healed]) -> Result<(Carried, Vec<Step>), rusqlite::Error> {
-    let out = order.out.map(installed::absolute).transpose().map_err(stop)?;
-    let slots: BTreeSet<String> = match order.which {
-        Which::Slots(slots) => slots.iter().cloned().collect(),
-        Which::All => {
-            let query = "SELECT slot FROM revisions r WHERE action = ?1 AND id = (SELECT max(id) FROM revisions WHERE slot = r.slot)";
-            c.prepare(query)?.query_map([order.action.after()], |r| r.get(0))?.collect::<Result<_, _>>()?
-        }
-    };
-    let all = matches!(order.which, Which::All);
-    let (mut carried, mut steps) = (Carried::default(), Vec::new());
-    for slot in slots {
-        let before = chain(c, &slot)?;
-        let Some(last) = before.last() else { return Err(stop(FleetError::NoSuchSlot { slot })) };
-        if order.action == Action::Approve && last.action == "approve" && order.run.is_none_or(|r| last.run.as_deref() == Some(r)) {
-            carried.already.push(last.clone());
-            continue;
-        }
-        let refusal = refused(c, order, last, waiting)?;
-        match refusal {
-            None => {}
-            Some(FleetError::OtherRun { .. }) if all => continue,
-            Some(e @ FleetError::JudgedOtherwise { .. }) if all => {
-                carried.left.push(e.to_string());
-                continue;
-            }
-            Some(e) => return Err(stop(e)),
-        }
-        // What was in the slot before the apply: the last table that was found, applied or rolled back to.
-        let back = before.split_last().and_then(|(_, earlier)| in_slot(earlier));
-        let sha256 = match (order.action, back) {
-            (Action::Rollback, Some(back)) => back.sha256.clone(),
-            (Action::Rollback, None) => {
-                return Err(stop(super::seal::damaged(format!("slot {slot} has an apply and nothing before it"))));
-            }
-            _ => last.sha256.clone(),
-        };
-        table_bytes(c, &sha256)?;
-        let folder = match order.action {
-            Action::Apply => out.clone(),
-            Action::Rollback => {
-                let applied = applied_in(c, &before)?;
-                if let (Some(applied), Some(found)) = (&applied, &out)
-                    && !installed::same(applied, found)
-                {
-                    let (applied, found) = (applied.clone(), found.clone());
-                    return Err(stop(FleetError::OtherFolder { slot, applied, found }));
-                }
-                out.clone().or(applied)
-            }
-            _ => None,
-        };
-        steps.push(Step { sha256, folder, before: None, stands_on: last.id, slot });
-    }
-    Ok((carried, steps))
-}
-
-/// Why a slot is not ready for an order.
-fn refused(
-    c: &Connection,
-    order: &Order<'_>,
-    last: &Revision,
-    waiting: &[Healed],
-) -> Result<Option<FleetError>, rusqlite::Error> {
-    let slot = last.slot.clone();
-    if last.action != order.action.after() {
-        let found = format!("{} {} (revision {}, by {} at {})", last.action, last.sha256, last.id, last.who, last.at);
-        return Ok(Some(FleetError::Revision { slot, expected: order.action.needs(), found }));
-    }
-    let run = last.run.clone().unwrap_or_default();
-    if let Some(asked) = order.run.filter(|r| *r != run) {
-        return Ok(Some(FleetError::OtherRun { slot, found: run, asked: asked.to_owned() }));
-    }
-    for act in waiting {
-        if let End::Waits(why) = &act.end
-            && act.slots.contains(&slot)
-            && order.action != Action::Approve
-        {
-            let action = if act.action == "rollback" { "rollback" } else { "apply" };
-            return Ok(Some(FleetError::Unfinished { slot, action, why: why.clone() }));
-        }
-    }
-    if order.action == Action::Rollback {
-        return Ok(None);
-    }
-    // Rows of a run stand in the store before its proposals do: a run that is still on its way has its say as well.
-    let Some(stood) = run_named(c, &run)? else {
-        return Ok(Some(super::seal::damaged(format!("run {run} of {slot} is not there"))));
-    };
-    let query = format!(
-        "{} JOIN runs r ON r.run = t.run WHERE t.slot = ?1 AND r.seq > ?2 ORDER BY r.seq DESC LIMIT 1",
-        SLOTS.select()
-    );
-    let later = c.query_row(&query, params![slot, stood.seq], |r| Ok((r.get::<_, String>(0)?, slot_row(r)?))).optional()?;
-    let Some((later, row)) = later else { return Ok(None) };
-    let same = match (&row.table, row.verdict) {
-        (Some(t), Verdict::Tuned) => table_text(&t.gains).map_err(stop)?.1 == last.sha256,
-        _ => false,
-    };
-    let verdict = if row.verdict == Verdict::Tuned { "tuned, with another table" } else { row.verdict.word() };
-    Ok((!same).then(|| FleetError::JudgedOtherwise { slot, run, later, verdict: verdict.to_owned() }))
 }

@@ -76,7 +76,13 @@ impl Store {
         match store.unfinished() {
             Ok(acts) => found.problems.extend(acts.iter().map(|a| {
                 let why = if let End::Waits(why) = &a.end { why.as_str() } else { "" };
-                format!("{} of {}, begun by {} at {}, is not finished ({why})", a.action, a.slots.join(", "), a.who, a.at)
+                format!(
+                    "{} of {}, begun by {} at {}, is not finished ({why})",
+                    a.action,
+                    a.slots.join(", "),
+                    a.who,
+                    a.at
+                )
             })),
             Err(e) => found.problems.push(e.to_string()),
         }

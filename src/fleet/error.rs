@@ -68,11 +68,15 @@ pub enum FleetError {
     Name { what: String, source: NameError },
     #[error("{}: {found}; expected a file of gains or nothing, at most 1 MiB: move it away", file.display())]
     Installed { file: PathBuf, found: &'static str },
-    #[error("slot {slot}: the table proposed by run {run} no longer holds: run {later} judged the slot {verdict}; it stays as it is")]
+    #[error(
+        "slot {slot}: the table proposed by run {run} no longer holds: run {later} judged the slot {verdict}; it stays as it is"
+    )]
     JudgedOtherwise { slot: String, run: String, later: String, verdict: String },
     #[error("slot {slot}: its table was proposed by run {found}, not by {asked}")]
     OtherRun { slot: String, found: String, asked: String },
-    #[error("slot {slot}: an earlier {action} is not finished: {why}; the next command of the fleet ends it when that is mended")]
+    #[error(
+        "slot {slot}: an earlier {action} is not finished: {why}; the next command of the fleet ends it when that is mended"
+    )]
     Unfinished { slot: String, action: &'static str, why: String },
     #[error("slot {slot}: its gains were applied in {}; found --out {}: name that folder, or leave --out out", applied.display(), found.display())]
     OtherFolder { slot: String, applied: PathBuf, found: PathBuf },

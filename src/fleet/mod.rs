@@ -1,7 +1,7 @@
 //! The fleet: gain tables for every slot of every tester.
 //!
 //! In: FLEET.toml, a source of slots. Out: a row for each slot, tables for each slot and shared ones, all in a store from which every other
-//! output is derived. Reading order: `settings`, `source`, `context`, `evidence`, `prove`, `row`, `library`, `slot`, `pilot`, `store`, `run`, `revision`, `act`.
+//! output is derived. Reading order: `settings`, `source`, `context`, `evidence`, `prove`, `row`, `library`, `slot`, `pilot`, `store`, `run`, `revision`, `order`, `act`.
 //! Convention: a slot's row depends on the slot, the settings and the library only, so bytes are equal for any number of threads and after
 //! any interruption. Spec: `specs/fleet.md`.
 
@@ -20,6 +20,7 @@ mod grow;
 mod installed;
 mod leftovers;
 mod library;
+mod order;
 mod output;
 #[cfg(feature = "parquet")]
 mod parquet;
@@ -41,7 +42,7 @@ mod store_run;
 mod table_source;
 mod work_list;
 
-pub use act::{Carried, End, Healed, Order, Which};
+pub use act::{Carried, End, Healed};
 pub use certified::{Certified, certified};
 pub use check::Checked;
 pub use claims::Worker;
@@ -52,8 +53,9 @@ pub use drift::{SlotDrift, Trend, drift};
 pub use error::FleetError;
 pub use evidence::Evidence;
 pub use explain::{Cause, Change, Explained, Remedy};
-pub use library::{Candidate, Library};
 pub use leftovers::clear_pages;
+pub use library::{Candidate, Library};
+pub use order::{Order, Which};
 pub use output::{Asked, gain_table, gain_table_of, page_file, write_tables};
 pub use pilot::{Pilot, pilot, places};
 pub use prove::{Proved, UNSTABLE, prove};

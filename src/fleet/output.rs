@@ -3,13 +3,13 @@
 //! In: a store and a run. Out: slots, shared tables, coverage, work list, drift, and a gain table for each tuned slot. The same run gives the same bytes.
 
 use super::drift::{SlotDrift, Trend};
+use super::leftovers::clear_tables;
 use super::prove::Proved;
 use super::row::{SlotRow, Verdict};
 use super::share::assigned;
 use super::store_run::json;
 use super::{Context, FleetError, Store};
 use crate::controller::Controller;
-use super::leftovers::clear_tables;
 use crate::document::{DocumentError, Temporary, below, check_name};
 use crate::gate::features::csv_field;
 use crate::tune::{GainTable, InputDigest, Provenance, Route, Summary};

@@ -140,9 +140,8 @@ pub(super) fn add(c: &Connection, new: &New<'_>, stamp: &Stamp) -> Result<(), ru
     let id: i64 = c
         .prepare_cached("SELECT coalesce((SELECT seq FROM sqlite_sequence WHERE name = 'revisions'), 0) + 1")?
         .query_row([], |r| r.get(0))?;
-    let previous: Option<i64> = c
-        .prepare_cached("SELECT max(id) FROM revisions WHERE slot = ?1")?
-        .query_row([new.slot], |r| r.get(0))?;
+    let previous: Option<i64> =
+        c.prepare_cached("SELECT max(id) FROM revisions WHERE slot = ?1")?.query_row([new.slot], |r| r.get(0))?;
     let values = vec![
         Value::Integer(id),
         text(new.slot),

@@ -18,11 +18,8 @@ pub(super) struct Sealed {
     pub key: usize,
 }
 
-pub(super) const RUNS: Sealed = Sealed {
-    table: "runs",
-    columns: &["seq", "run", "config", "slots", "started", "who", "list", "finished"],
-    key: 2,
-};
+pub(super) const RUNS: Sealed =
+    Sealed { table: "runs", columns: &["seq", "run", "config", "slots", "started", "who", "list", "finished"], key: 2 };
 pub(super) const PARTS: Sealed = Sealed { table: "parts", columns: &["run", "part", "found"], key: 2 };
 pub(super) const PILOTS: Sealed = Sealed { table: "pilots", columns: &["run", "place", "found"], key: 2 };
 pub(super) const EXPLAINED: Sealed = Sealed { table: "explained", columns: &["run", "place", "found"], key: 2 };

@@ -5,8 +5,8 @@
 //! it. Every row is held to its seal when it is read, the whole file to the database's own check when it is opened. Times are handed in as
 //! text: no clock is read here. Spec: `specs/fleet.md`, "The store".
 
-use super::schema::{self, BEFORE, SCHEMA};
 use super::FleetError;
+use super::schema::{self, BEFORE, SCHEMA};
 use rusqlite::{Connection, ErrorCode, OpenFlags};
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
@@ -257,5 +257,3 @@ pub(super) fn failure(file: &Path, action: &'static str, source: rusqlite::Error
         },
     }
 }
-
-

@@ -277,9 +277,7 @@ impl Store {
     /// Adds rows in one transaction; a row that is there stays as it is.
     pub fn add_rows(&mut self, run: &str, rows: &[SlotRow]) -> Result<(), FleetError> {
         let rows = rows.iter().map(|r| row_values(run, r)).collect::<Result<Vec<_>, _>>()?;
-        self.write("add slots", |c| {
-            rows.into_iter().try_for_each(|v| SLOTS.put(c, "INSERT OR IGNORE", v).map(|_| ()))
-        })
+        self.write("add slots", |c| rows.into_iter().try_for_each(|v| SLOTS.put(c, "INSERT OR IGNORE", v).map(|_| ())))
     }
 
     /// Places of a run that are done, within `from..to`.
