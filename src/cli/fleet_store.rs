@@ -5,7 +5,7 @@ use super::fleet_arguments::{
     FleetCheckArguments, FleetDiffArguments, FleetHistoryArguments, FleetReviseArguments, FleetRunsArguments,
 };
 use super::{Ending, Failure, Screen};
-use crate::fleet::{Action, End, Healed, Order, Revision, Run, SlotRow, Store, Which};
+use crate::fleet::{Action, End, FleetError, Healed, Order, Revision, Run, SlotRow, Store, Which};
 use crate::report::number::NumberFormat;
 use crate::report::table::{Column, Table};
 use serde::Serialize;
@@ -14,6 +14,7 @@ use std::path::Path;
 
 /// The store at a path, to be read. What a dead process has begun is ended first where that can be written, and said where not.
 fn reading(file: &Path, screen: &mut Screen) -> Result<Store, Failure> {
+    brought_up(file)?;
     let store = Store::reading(file)?;
     let unfinished = store.unfinished()?;
     if unfinished.is_empty() {
@@ -25,6 +26,17 @@ fn reading(file: &Path, screen: &mut Screen) -> Result<Store, Failure> {
         Err(_) => say_healed(&unfinished, screen),
     }
     Ok(Store::reading(file)?)
+}
+
+/// A store of an earlier version is brought up to this one, where it can be written.
+fn brought_up(file: &Path) -> Result<(), Failure> {
+    match Store::reading(file) {
+        Err(FleetError::Schema { found, expected, .. }) if found < expected => {
+            Store::existing(file)?;
+        }
+        _ => {}
+    }
+    Ok(())
 }
 
 /// Says what became of acts that had not ended.
@@ -241,6 +253,7 @@ pub(super) fn revise(a: &FleetReviseArguments, action: Action, screen: &mut Scre
 }
 
 pub(super) fn check(a: &FleetCheckArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    brought_up(&a.store.store)?;
     let found = Store::check(&a.store.store, a.out.as_deref())?;
     let mut text = format!(
         "{} rows, {} tables of gains, {} slots, {} installed files: ",

@@ -4,9 +4,9 @@
 //! first file takes its name, with the bytes that stood there; when the last one has, the revisions are added. Whoever opens the store next
 //! after a kill finds what was begun and ends it ([`Store::heal`]). One process at a time does this, under a lock that dies with it.
 
-use super::claims::locked;
+use super::claims::install_lock;
 use super::installed::{self, Target};
-use super::order::{Order, plan};
+use super::order::{Carried, End, Healed, Order, Step, plan, step_of};
 use super::revision::{Action, New, Revision, add, chain, in_slot, keep_table};
 use super::seal::{ACT_FILES, ACTS, damaged, maybe, stop, text};
 use super::store_run::Stamp;
@@ -14,61 +14,6 @@ use super::{FleetError, Store};
 use crate::document::sha256_hex;
 use rusqlite::Connection;
 use rusqlite::types::Value;
-use serde::Serialize;
-use std::fs::File;
-use std::path::{Path, PathBuf};
-
-/// What became of an order.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Carried {
-    /// The revisions that were added, each with the run it stands on.
-    pub revisions: Vec<Revision>,
-    /// Slots named whose table was approved already, by the revision that did it.
-    pub already: Vec<Revision>,
-    /// Of all slots those that a later run judged otherwise, with the reason.
-    pub left: Vec<String>,
-    /// Files that were written.
-    pub files: Vec<PathBuf>,
-}
-
-/// What became of an act that a dead process had begun.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Healed {
-    /// Apply or rollback.
-    pub action: String,
-    /// Its slots.
-    pub slots: Vec<String>,
-    /// Who had begun it, and when.
-    pub who: String,
-    /// When it was begun.
-    pub at: String,
-    /// What was done about it.
-    pub end: End,
-}
-
-/// How an unfinished act ended.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum End {
-    /// It is done now: files and store agree.
-    Done,
-    /// It is undone: files and store are as before it; why it could not be done.
-    Undone(String),
-    /// It still waits; why neither could be done.
-    Waits(String),
-}
-
-/// One slot of an act.
-#[derive(Clone, Debug)]
-pub(super) struct Step {
-    pub slot: String,
-    pub folder: Option<PathBuf>,
-    pub sha256: String,
-    /// Digest of what stood in the folder.
-    pub before: Option<String>,
-    /// The slot's last revision when the act began.
-    pub stands_on: i64,
-}
 
 /// An act as the store has it.
 #[derive(Clone, Debug)]
@@ -78,11 +23,6 @@ struct Act {
     stamp: Stamp,
     why: String,
     steps: Vec<Step>,
-}
-
-/// The lock that one process holds while it installs; none where another holds it and `wait` is not asked for.
-pub(super) fn install_lock(store: &Path, wait: bool) -> Result<Option<File>, FleetError> {
-    locked(store, "install", wait)
 }
 
 impl Store {
@@ -300,10 +240,4 @@ fn steps(c: &Connection, act: i64) -> Result<Vec<Step>, rusqlite::Error> {
     let mut query = c.prepare_cached(&format!("{} WHERE t.act = ?1 ORDER BY t.slot", ACT_FILES.select()))?;
     let rows = query.query_map([act], step_of)?;
     rows.collect()
-}
-
-pub(super) fn step_of(r: &rusqlite::Row<'_>) -> Result<Step, rusqlite::Error> {
-    ACT_FILES.hold(r)?;
-    let folder = r.get::<_, Option<String>>(2)?.map(PathBuf::from);
-    Ok(Step { slot: r.get(1)?, folder, sha256: r.get(3)?, before: r.get(4)?, stands_on: r.get(5)? })
 }

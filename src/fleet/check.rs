@@ -3,8 +3,8 @@
 //!
 //! In: a store's file, and where asked for the folder of installed gains. Out: [`Checked`]; nothing is changed. Spec: `specs/fleet.md`, "The store".
 
-use super::act::End;
 use super::installed::Target;
+use super::order::End;
 use super::revision::{chain, in_slot};
 use super::schema::{SCHEMA, held};
 use super::seal::ALL;

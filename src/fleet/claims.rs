@@ -40,8 +40,13 @@ fn door(folder: &Path) -> Result<File, FleetError> {
 /// Files that are nobody's: locks that several processes take in turn.
 const STAY: [&str; 2] = ["door", "install"];
 
+/// The lock that one process holds while it installs; none where another holds it and `wait` is not asked for.
+pub(super) fn install_lock(store: &Path, wait: bool) -> Result<Option<File>, FleetError> {
+    locked(store, "install", wait)
+}
+
 /// A lock of a store by its name, held until the file is dropped; none where another process holds it and `wait` is not asked for.
-pub(super) fn locked(store: &Path, name: &str, wait: bool) -> Result<Option<File>, FleetError> {
+fn locked(store: &Path, name: &str, wait: bool) -> Result<Option<File>, FleetError> {
     let folder = folder(store);
     let file = folder.join(name);
     let fail = |action| {

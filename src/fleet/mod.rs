@@ -42,7 +42,6 @@ mod store_run;
 mod table_source;
 mod work_list;
 
-pub use act::{Carried, End, Healed};
 pub use certified::{Certified, certified};
 pub use check::Checked;
 pub use claims::Worker;
@@ -55,7 +54,7 @@ pub use evidence::Evidence;
 pub use explain::{Cause, Change, Explained, Remedy};
 pub use leftovers::clear_pages;
 pub use library::{Candidate, Library};
-pub use order::{Order, Which};
+pub use order::{Carried, End, Healed, Order, Which};
 pub use output::{Asked, gain_table, gain_table_of, page_file, write_tables};
 pub use pilot::{Pilot, pilot, places};
 pub use prove::{Proved, UNSTABLE, prove};

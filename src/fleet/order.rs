@@ -2,7 +2,6 @@
 //!
 //! In: an [`Order`] and the store. Out: the steps of an act, or a refusal that names the slot. A list of slots is ready as a whole or not at all.
 
-use super::act::{Carried, End, Healed, Step, step_of};
 use super::installed;
 use super::revision::{Action, Revision, chain, in_slot, table_bytes};
 use super::row::Verdict;
@@ -10,6 +9,7 @@ use super::seal::{ACT_FILES, SLOTS, damaged, stop};
 use super::store_run::{Stamp, run_named, slot_row};
 use super::{FleetError, table_text};
 use rusqlite::{Connection, OptionalExtension, params};
+use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -37,6 +37,64 @@ pub struct Order<'a> {
     pub stamp: &'a Stamp,
     /// Why.
     pub why: &'a str,
+}
+
+/// What became of an order.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Carried {
+    /// The revisions that were added, each with the run it stands on.
+    pub revisions: Vec<Revision>,
+    /// Slots named whose table was approved already, by the revision that did it.
+    pub already: Vec<Revision>,
+    /// Of all slots those that a later run judged otherwise, with the reason.
+    pub left: Vec<String>,
+    /// Files that were written.
+    pub files: Vec<PathBuf>,
+}
+
+/// What became of an act that a dead process had begun.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Healed {
+    /// Apply or rollback.
+    pub action: String,
+    /// Its slots.
+    pub slots: Vec<String>,
+    /// Who had begun it, and when.
+    pub who: String,
+    /// When it was begun.
+    pub at: String,
+    /// What was done about it.
+    pub end: End,
+}
+
+/// How an unfinished act ended.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum End {
+    /// It is done now: files and store agree.
+    Done,
+    /// It is undone: files and store are as before it; why it could not be done.
+    Undone(String),
+    /// It still waits; why neither could be done.
+    Waits(String),
+}
+
+/// One slot of an act.
+#[derive(Clone, Debug)]
+pub(super) struct Step {
+    pub slot: String,
+    pub folder: Option<PathBuf>,
+    pub sha256: String,
+    /// Digest of what stood in the folder.
+    pub before: Option<String>,
+    /// The slot's last revision when the act began.
+    pub stands_on: i64,
+}
+
+pub(super) fn step_of(r: &rusqlite::Row<'_>) -> Result<Step, rusqlite::Error> {
+    ACT_FILES.hold(r)?;
+    let folder = r.get::<_, Option<String>>(2)?.map(PathBuf::from);
+    Ok(Step { slot: r.get(1)?, folder, sha256: r.get(3)?, before: r.get(4)?, stands_on: r.get(5)? })
 }
 
 /// Where a slot's last apply put its gains: the act that stood on its last approval.

@@ -8,7 +8,7 @@
 //!              └──────────┴──► withdraw: a later run judged the slot otherwise
 //! ```
 
-use super::act::install_lock;
+use super::claims::install_lock;
 use super::row::{SlotRow, Verdict};
 use super::schema::held;
 use super::seal::{REVISIONS, maybe, stop, text};
