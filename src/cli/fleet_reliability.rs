@@ -45,6 +45,16 @@ fn done(words: &[&str]) -> Result<Output, Failure> {
     program(words)?.stderr(Stdio::piped()).output().map_err(fail(&words.join(" ")))
 }
 
+/// A command that nobody disturbs; one that is refused ends the study.
+fn undisturbed(words: &[&str]) -> Result<(), Failure> {
+    let out = done(words)?;
+    if out.status.success() {
+        return Ok(());
+    }
+    let said = String::from_utf8_lossy(&out.stderr).into_owned();
+    Err(Failure::Child { what: words.join(" "), source: std::io::Error::other(said) })
+}
+
 /// `approve`, `apply` or `rollback` of all slots of the store in a folder.
 fn act(action: &str, place: &Path) -> [String; 9] {
     let [store, out] = [text(&place.join("fleet.db")), text(&place.join("inst"))];
@@ -264,13 +274,20 @@ pub(super) fn reliability(
     let mut stages: Vec<Stage> = Vec::new();
     let mut now = place.at("stage0");
     copy(&calm, &now).map_err(fail("copy a store"))?;
+    // Always in one folder: a rollback goes to the folder of its apply.
+    let work = place.at("work");
+    copy(&calm, &work).map_err(fail("copy a store"))?;
     for (action, from) in [("approve", "propose"), ("apply", "approve"), ("rollback", "apply")] {
         let next = place.at(&format!("stage{}", stages.len() + 1));
-        copy(&now, &next).map_err(fail("copy a store"))?;
         let begun = Instant::now();
-        done(&words(&act(action, &next)))?;
+        undisturbed(&words(&act(action, &work)))?;
         let seconds = begun.elapsed().as_secs_f64();
+        copy(&work, &next).map_err(fail("copy a store"))?;
         let files = [installed(&now, &slots), installed(&next, &slots)];
+        if last_actions(&next, &slots)?.iter().any(|a| a != action) || (action != "approve" && files[0] == files[1]) {
+            let source = std::io::Error::other("it changed nothing");
+            return Err(Failure::Child { what: action.to_owned(), source });
+        }
         stages.push(Stage { place: now, action, from, files, seconds });
         now = next;
     }
@@ -280,7 +297,7 @@ pub(super) fn reliability(
         let (mut count, mut tried) = (Count::default(), 0);
         while count.kills < kills / 4 {
             let wait = random.between(0.0, stage.seconds);
-            kill(stage, &slots, &place.at("killed"), wait, NEXT[tried % NEXT.len()], &mut count)?;
+            kill(stage, &slots, &work, wait, NEXT[tried % NEXT.len()], &mut count)?;
             tried += 1;
         }
         rows += &format!(
