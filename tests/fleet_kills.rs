@@ -42,7 +42,9 @@ fn killed_runs_end_with_the_bytes_of_an_undisturbed_one() {
             kills += 1;
         }
         child.wait().unwrap();
-        assert!(Store::open(&killed.join("fleet.db")).unwrap().sound().unwrap());
+        if killed.join("fleet.db").exists() {
+            assert!(Store::check(&killed.join("fleet.db"), None).unwrap().problems.is_empty());
+        }
     }
     // The first instant is before any run of five slots can have ended.
     assert!(kills >= 1);

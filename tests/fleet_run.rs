@@ -1,9 +1,12 @@
 //! Runs of a fleet: equal bytes whoever does them and whatever interrupts them, and a store that loses nothing.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+mod fleet_common;
+
+use fleet_common::{Quiet, fleet, folder, one, stamp};
 use servotune::fleet::{
-    Action, Asked, Context, Effort, Fleet, FleetError, Job, Loaded, SlotName, SlotSource, Stage, Stamp, Store,
-    TwinInput, Verdict, Watch, Worker, run, write_tables,
+    Action, Asked, Context, Effort, Fleet, FleetError, Inputs, Job, Loaded, SlotName, SlotSource, Store, TwinInput,
+    Verdict, Worker, run, write_tables,
 };
 use servotune::study::TwinSource;
 use std::path::{Path, PathBuf};
@@ -11,39 +14,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Slots of the floor in these tests: enough for several chunks, few enough for a debug build.
 const SLOTS: usize = 8;
-
-/// A folder of its own, emptied.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fleet").join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
-/// A floor without a gate: two pilots, three cases.
-fn fleet(folder: &Path, slots: usize) -> PathBuf {
-    let specs = Path::new(env!("CARGO_MANIFEST_DIR")).join("specs");
-    let text = format!(
-        "spec = {:?}\ncontroller = {:?}\n[input]\ntwin = {{ slots = {slots}, seed = 3 }}\n[robust]\ndraws = 1\n\
-         [temperature]\ncases_c = [18.0, 30.0]\ngain_per_c = -1.2e-3\nfrequency_per_c = -2.5e-4\n\
-         [tables]\npilots = 2\ncandidates = 6\nmost = 4\n[untunable]\nexplained = 0\n",
-        specs.join("limits/paper.toml"),
-        specs.join("controllers/nominal.toml"),
-    );
-    let file = folder.join("FLEET.toml");
-    std::fs::write(&file, text).unwrap();
-    file
-}
-
-struct Quiet;
-
-impl Watch for Quiet {
-    fn step(&self, _: Stage, _: usize, _: usize) {}
-}
-
-fn stamp() -> Stamp {
-    Stamp { who: "tester".into(), at: "2026-01-01T00:00:00Z".into() }
-}
 
 /// Runs a source and gives the files' bytes by name.
 fn outcome(
@@ -71,7 +41,9 @@ fn outcome(
 
 fn floor(slots: usize) -> (TwinSource, PathBuf, Context) {
     let folder = folder(&format!("floor{slots}-{:?}", std::thread::current().id()).replace(['(', ')'], ""));
-    let context = Context::of(&Fleet::read(&fleet(&folder, slots)).unwrap()).unwrap();
+    let context =
+        Context::of(&Fleet::read(&fleet(&folder, &format!("twin = {{ slots = {slots}, seed = 3 }}"))).unwrap())
+            .unwrap();
     (TwinSource::of(&TwinInput { slots, seed: 3, run: 0 }), folder, context)
 }
 
@@ -123,7 +95,7 @@ fn threads_chunks_a_full_disk_and_a_power_cut_leave_the_bytes_as_they_are() {
             Err(FleetError::Full { file, .. }) => assert_eq!(file, full.join("fleet.db")),
             Err(other) => panic!("{other}"),
         }
-        assert!(Store::open(&full.join("fleet.db")).unwrap().sound().unwrap());
+        assert!(Store::check(&full.join("fleet.db"), None).unwrap().problems.is_empty());
         refused += 1;
         pages += 4;
         assert!(refused < 100, "the limit rises by four pages a time");
@@ -199,13 +171,13 @@ fn a_bad_slot_is_a_row_and_revisions_keep_everything() {
     assert!(tuned.table.as_ref().unwrap().proved.passes);
 
     // What is out of order is refused, with what was found.
-    let refused = store.revise(&slot, Action::Apply, &stamp(), "too early").unwrap_err();
+    let refused = one(&mut store, &slot, Action::Apply, None).unwrap_err();
     assert!(
         matches!(&refused, FleetError::Revision { slot: s, expected: "approved", found } if *s == slot && found.starts_with("propose"))
     );
-    store.revise(&slot, Action::Approve, &stamp(), "looked at").unwrap();
-    let applied = store.revise(&slot, Action::Apply, &stamp(), "installed").unwrap();
-    let back = store.revise(&slot, Action::Rollback, &stamp(), "PES rose").unwrap();
+    one(&mut store, &slot, Action::Approve, None).unwrap();
+    let applied = one(&mut store, &slot, Action::Apply, None).unwrap().revisions.swap_remove(0);
+    let back = one(&mut store, &slot, Action::Rollback, None).unwrap().revisions.swap_remove(0);
     let all = store.history(&slot).unwrap();
     let words: Vec<&str> = all.iter().map(|r| r.action.as_str()).collect();
     assert_eq!(words, ["found", "propose", "approve", "apply", "rollback"]);
@@ -224,10 +196,13 @@ fn a_bad_slot_is_a_row_and_revisions_keep_everything() {
     ] {
         assert!(other.execute(words, []).is_err(), "{words}");
     }
-    // Another spec under the same name is refused; without a name it is a new run.
-    assert!(matches!(
-        store.begin(Some("one"), "other", 4, &stamp()),
-        Err(FleetError::OtherInputs { key: "settings", .. })
-    ));
-    assert_eq!(store.begin(None, "other", 4, &stamp()).unwrap().run, "run-0002");
+    // Another spec or another list of slots under the same name is refused; without a name it is a new run.
+    let begun = store.run("one").unwrap();
+    let same = Inputs { config: begun.config, slots: 4, list: begun.list };
+    let (spec, list) = (Inputs { config: "b".into(), ..same.clone() }, Inputs { list: "b".into(), ..same.clone() });
+    let refused = |e| matches!(e, Err(FleetError::OtherInputs { .. }));
+    assert!(refused(store.begin(Some("one"), &spec, &stamp())) && refused(store.begin(Some("one"), &list, &stamp())));
+    assert_eq!(store.begin(Some("one"), &same, &stamp()).unwrap().seq, 1);
+    assert_eq!(store.begin(None, &list, &stamp()).unwrap().run, "run-0002");
+    assert!(matches!(store.begin(Some("../one"), &list, &stamp()), Err(FleetError::Name { .. })));
 }

@@ -347,9 +347,12 @@ pub(super) struct StudyArguments {
     /// Sizes of the floor (study `fleet-scale`)
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [1_000, 10_000, 100_000])]
     pub sizes: Vec<usize>,
-    /// Kills (study `fleet-kills`)
-    #[arg(long, value_name = "N", default_value_t = 500)]
-    pub kills: usize,
+    /// Kills (studies `fleet-kills`, 500 unless told, and `reliability-fleet`, 300)
+    #[arg(long, value_name = "N")]
+    pub kills: Option<usize>,
+    /// Changed bytes (study `reliability-fleet`)
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    pub changes: usize,
     /// Folder with the measured records (studies `mirror`, `motor`, `hdd`)
     #[arg(long, value_name = "DIR", default_value = "../shared/data")]
     pub data: PathBuf,
@@ -382,6 +385,8 @@ pub(super) enum StudyName {
     Fleet,
     /// A run killed 500 times
     FleetKills,
+    /// Kills of run, approve, apply and rollback, and changed bytes of the store
+    ReliabilityFleet,
     /// Slots per second and memory over the size of the floor
     FleetScale,
     /// Coverage over the number of shared tables for 1000 slots

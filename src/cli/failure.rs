@@ -100,8 +100,6 @@ pub enum Failure {
     Fleet(#[from] FleetError),
     #[error("cannot {what}: {source}")]
     Child { what: String, source: std::io::Error },
-    #[error("{}: no such store; `servotune fleet run` makes one", file.display())]
-    NoStore { file: PathBuf },
     #[error(transparent)]
     Study(#[from] StudyError),
     /// Two algorithms that share no code disagree: no answer can be trusted.

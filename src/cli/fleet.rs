@@ -7,7 +7,7 @@ use super::{Ending, Failure, Screen, fleet_page, fleet_progress, fleet_slot, fle
 use crate::document::write_text;
 use crate::fleet::{
     self, Action, Asked, Context, Effort, FileSource, Fleet, Job, SlotRow, SlotSource, Stamp, Store, Verdict, Worker,
-    write_tables,
+    clear_pages, page_file, write_tables,
 };
 use crate::study::TwinSource;
 use serde::Serialize;
@@ -56,6 +56,7 @@ pub(super) fn run(a: &FleetArguments, screen: &mut Screen) -> Result<Ending, Fai
         FleetCommand::Runs(a) => fleet_store::runs(a, screen),
         FleetCommand::History(a) => fleet_store::history(a, screen),
         FleetCommand::Diff(a) => fleet_store::diff(a, screen),
+        FleetCommand::Check(a) => fleet_store::check(a, screen),
         FleetCommand::Approve(a) => fleet_store::revise(a, Action::Approve, screen),
         FleetCommand::Apply(a) => fleet_store::revise(a, Action::Apply, screen),
         FleetCommand::Rollback(a) => fleet_store::revise(a, Action::Rollback, screen),
@@ -112,6 +113,7 @@ pub(super) fn make(a: &FleetRunArguments, screen: &mut Screen) -> Result<(Docume
     let source = Clocked::of(source(&a.fleet, &fleet)?);
     let store_file = fleet.file.store.clone().unwrap_or_else(|| a.out.join("fleet.db"));
     let mut store = Store::open(&store_file)?;
+    fleet_store::say_healed(&store.heal()?, screen);
     let worker = Worker::at(&store_file, &format!("process-{}", std::process::id()))?;
     let job = Job {
         source: &source,
@@ -198,7 +200,7 @@ fn slot_pages(
     })?;
     let (mut files, mut slots) = (Vec::new(), BTreeSet::new());
     for (_, row) in &worst {
-        let file = a.out.join(fleet_slot::file(row));
+        let file = page_file(&a.out, row)?;
         match fleet_slot::html(context, source, row) {
             Ok(Some(page)) => {
                 write_text(&file, &page)?;
@@ -209,6 +211,7 @@ fn slot_pages(
             Err(e) => screen.say(&format!("note: no page of {}: {e}", row.id())),
         }
     }
+    clear_pages(&a.out, &files)?;
     Ok((files, slots))
 }
 

@@ -20,6 +20,7 @@ pub(super) enum FleetCommand {
     Runs(FleetRunsArguments),
     History(FleetHistoryArguments),
     Diff(FleetDiffArguments),
+    Check(FleetCheckArguments),
     Approve(FleetReviseArguments),
     Apply(FleetReviseArguments),
     Rollback(FleetReviseArguments),
@@ -32,7 +33,8 @@ pub(super) enum FleetCommand {
   servotune fleet run FLEET.toml --out results --run 2026-week-47 --threads 8
 
 The store keeps what is done: start the same command again after any interruption. A second process
-on the same store shares the work. Files in DIR are written at the end, from the store.")]
+on the same store shares the work. Files in DIR are written at the end, from the store; those of another run
+in DIR are removed. A list of slots that is not the one the run began with is another run.")]
 pub(super) struct FleetRunArguments {
     /// The fleet: slots, gate, spec, settings
     #[arg(value_name = "FLEET.toml")]
@@ -40,7 +42,7 @@ pub(super) struct FleetRunArguments {
     /// Folder for tables and report; the store lies there too unless FLEET.toml names one
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Name of the run [default: the last one where it is not finished, else a new one]
+    /// Name of the run, up to 64 letters, digits, `_`, `-`, `.` and blanks [default: the last one where it is not finished, else a new one]
     #[arg(long, value_name = "NAME")]
     pub run: Option<String>,
     /// Threads [default: as many as the machine has]
@@ -129,13 +131,33 @@ pub(super) struct FleetDiffArguments {
     pub top: usize,
 }
 
-/// Approves a proposed table, applies an approved one, or puts the gains before it back
+/// Looks at all of a store: its pages, every row and table against its SHA-256, what was begun and not ended
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  servotune fleet check --store results/fleet.db
+  servotune fleet check --store results/fleet.db --out installed
+
+Nothing is changed. Ends with 1 where anything is not as it was written, one line each. A damaged store is
+replaced by a copy of it, or a new one is begun with `fleet run` and another --out.")]
+pub(super) struct FleetCheckArguments {
+    #[command(flatten)]
+    pub store: StoreArguments,
+    /// Folder of installed gains, to be held to what the store says is in the slots
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Approves a proposed table, applies an approved one, or puts the bytes before it back; a list of slots all or none
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   servotune fleet approve T001/S03 --store results/fleet.db --why \"looked at the report\"
-  servotune fleet approve --all --store results/fleet.db --why \"week 47\"
+  servotune fleet approve --all --run run-0002 --store results/fleet.db --why \"week 47\"
   servotune fleet apply --all --store results/fleet.db --out installed --why \"week 47\"
-  servotune fleet rollback T001/S03 --store results/fleet.db --out installed --why \"PES rose\"")]
+  servotune fleet rollback T001/S03 --store results/fleet.db --why \"PES rose\"
+
+A table stands on the run that proposed it. Where a later run judged the slot otherwise it is refused by
+name; --all leaves it out, says so and ends with 1. Apply and rollback write the file and the store as one:
+after a kill the next command of the fleet ends what was begun, or undoes it, and says so.")]
 #[command(group = clap::ArgGroup::new("which").required(true))]
 pub(super) struct FleetReviseArguments {
     /// Tester and slot; several may be given
@@ -144,6 +166,9 @@ pub(super) struct FleetReviseArguments {
     /// Every slot whose last revision allows it
     #[arg(long, group = "which")]
     pub all: bool,
+    /// Only tables proposed by this run
+    #[arg(long, value_name = "RUN")]
+    pub run: Option<String>,
     #[command(flatten)]
     pub store: StoreArguments,
     /// Why; kept with the revision
@@ -152,7 +177,7 @@ pub(super) struct FleetReviseArguments {
     /// Who [default: the user's name]
     #[arg(long, value_name = "WHO")]
     pub who: Option<String>,
-    /// Folder for the gains that are to be in the slots now: TESTER/SLOT/controller.toml
+    /// Folder for the gains that are to be in the slots now: TESTER/SLOT/controller.toml [default of rollback: the folder of the apply]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

@@ -72,8 +72,8 @@ pub(super) fn kills(out: &Path, kills: usize, screen: &mut Screen) -> Result<Vec
             done += 1;
             let file = result.join("fleet.db");
             if file.exists() {
+                unsound += usize::from(!crate::fleet::Store::check(&file, None)?.problems.is_empty());
                 let store = crate::fleet::Store::open(&file)?;
-                unsound += usize::from(!store.sound()?);
                 let rows = store.runs()?.first().map_or(Ok(0), |r| store.count_done(&r.run))?;
                 // What was committed must still be there.
                 lost += most.saturating_sub(rows);

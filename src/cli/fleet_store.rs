@@ -1,22 +1,58 @@
-//! `servotune fleet runs | history | diff | approve | apply | rollback`: what the store knows, and revisions by hand.
+//! `servotune fleet runs | history | diff | check | approve | apply | rollback`: what the store knows, and revisions by hand.
 
 use super::fleet::stamp;
-use super::fleet_arguments::{FleetDiffArguments, FleetHistoryArguments, FleetReviseArguments, FleetRunsArguments};
+use super::fleet_arguments::{
+    FleetCheckArguments, FleetDiffArguments, FleetHistoryArguments, FleetReviseArguments, FleetRunsArguments,
+};
 use super::{Ending, Failure, Screen};
-use crate::document::write_text;
-use crate::fleet::{Action, Revision, Run, SlotRow, Store};
+use crate::fleet::{Action, End, FleetError, Healed, Order, Revision, Run, SlotRow, Store, Which};
 use crate::report::number::NumberFormat;
 use crate::report::table::{Column, Table};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The store at a path; one that is not there is refused, not made.
-fn open(file: &Path) -> Result<Store, Failure> {
-    if file.exists() { Ok(Store::open(file)?) } else { Err(Failure::NoStore { file: file.into() }) }
+/// The store at a path, to be read. What a dead process has begun is ended first where that can be written, and said where not.
+fn reading(file: &Path, screen: &mut Screen) -> Result<Store, Failure> {
+    brought_up(file)?;
+    let store = Store::reading(file)?;
+    let unfinished = store.unfinished()?;
+    if unfinished.is_empty() {
+        return Ok(store);
+    }
+    drop(store);
+    match Store::existing(file).and_then(|mut s| s.heal()) {
+        Ok(healed) => say_healed(&healed, screen),
+        Err(_) => say_healed(&unfinished, screen),
+    }
+    Ok(Store::reading(file)?)
+}
+
+/// A store of an earlier version is brought up to this one, where it can be written.
+fn brought_up(file: &Path) -> Result<(), Failure> {
+    match Store::reading(file) {
+        Err(FleetError::Schema { found, expected, .. }) if found < expected => {
+            Store::existing(file)?;
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// Says what became of acts that had not ended.
+pub(super) fn say_healed(all: &[Healed], screen: &mut Screen) {
+    for h in all {
+        let what = format!("{} of {} begun by {} at {}", h.action, h.slots.join(", "), h.who, h.at);
+        screen.say(&match &h.end {
+            End::Done => format!("note: the {what} had not ended; it is done now"),
+            End::Undone(why) => format!("note: the {what} had not ended and could not be done; it is undone ({why})"),
+            End::Waits(why) => format!("warning: the {what} has not ended: {why}"),
+        });
+    }
 }
 
 pub(super) fn runs(a: &FleetRunsArguments, screen: &mut Screen) -> Result<Ending, Failure> {
-    let store = open(&a.store.store)?;
+    let store = reading(&a.store.store, screen)?;
     let all: Vec<Run> = store.runs()?;
     let columns = ["run", "slots", "started", "finished", "who"].map(Column::words).to_vec();
     let mut t = Table::new("Runs", columns);
@@ -44,11 +80,12 @@ struct Shown {
 }
 
 pub(super) fn history(a: &FleetHistoryArguments, screen: &mut Screen) -> Result<Ending, Failure> {
-    let store = open(&a.store.store)?;
+    let store = reading(&a.store.store, screen)?;
     let mut all = Vec::new();
     let mut text = format!("{}\n", a.slot);
     for revision in store.history(&a.slot)? {
-        let gains = if a.gains { Some(store.table(&revision.sha256)?) } else { None };
+        let bytes = if a.gains { Some(store.table(&revision.sha256)?) } else { None };
+        let gains = bytes.map(|b| String::from_utf8_lossy(&b).into_owned());
         let r = &revision;
         let run = r.run.as_deref().unwrap_or("-");
         text += &format!(
@@ -115,7 +152,7 @@ struct Differences {
 }
 
 pub(super) fn diff(a: &FleetDiffArguments, screen: &mut Screen) -> Result<Ending, Failure> {
-    let store = open(&a.store.store)?;
+    let store = reading(&a.store.store, screen)?;
     let (before, after) = (store.run(&a.before)?, store.run(&a.after)?);
     let mut d = Differences {
         before: before.run.clone(),
@@ -196,23 +233,39 @@ fn most_first(all: &mut [Difference]) {
 }
 
 pub(super) fn revise(a: &FleetReviseArguments, action: Action, screen: &mut Screen) -> Result<Ending, Failure> {
-    let mut store = open(&a.store.store)?;
-    let before = match action {
-        Action::Approve => Action::Propose,
-        Action::Apply => Action::Approve,
-        _ => Action::Apply,
-    };
-    let slots = if a.all { store.slots_at(before)? } else { a.slots.clone() };
+    let mut store = Store::existing(&a.store.store)?;
+    say_healed(&store.heal()?, screen);
     let stamp = stamp(a.who.as_deref());
-    let mut done: Vec<Revision> = Vec::with_capacity(slots.len());
-    for slot in &slots {
-        let revision = store.revise(slot, action, &stamp, &a.why)?;
-        if let Some(out) = a.out.as_ref().filter(|_| action != Action::Approve) {
-            write_text(&out.join(slot).join("controller.toml"), &store.table(&revision.sha256)?)?;
-        }
-        done.push(revision);
+    let which = if a.all { Which::All } else { Which::Slots(&a.slots) };
+    let out = a.out.as_deref().filter(|_| action != Action::Approve);
+    let order = Order { which, action, run: a.run.as_deref(), out, stamp: &stamp, why: &a.why };
+    let carried = store.carry_out(&order)?;
+    let runs: BTreeSet<&str> = carried.revisions.iter().filter_map(|r| r.run.as_deref()).collect();
+    let runs: Vec<&str> = runs.into_iter().collect();
+    let on = if runs.is_empty() { String::new() } else { format!(", on {}", runs.join(", ")) };
+    let mut text = format!("{} slots: {}{on}\n", carried.revisions.len(), action.word());
+    for r in &carried.already {
+        text += &format!("{}: approved already, by {} at {}\n", r.slot, r.who, r.at);
     }
-    let text = format!("{} slots: {}\n", done.len(), action.word());
-    screen.result(&done, &text)?;
-    Ok(Ending::Accepted)
+    carried.left.iter().for_each(|why| screen.say(&format!("note: {why}")));
+    screen.result(&carried, &text)?;
+    Ok(if carried.left.is_empty() { Ending::Accepted } else { Ending::Rejected })
+}
+
+pub(super) fn check(a: &FleetCheckArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    brought_up(&a.store.store)?;
+    let found = Store::check(&a.store.store, a.out.as_deref())?;
+    let mut text = format!(
+        "{} rows, {} tables of gains, {} slots, {} installed files: ",
+        found.rows, found.tables, found.slots, found.installed
+    );
+    text += &match found.problems.len() {
+        0 => "all as they were written\n".to_owned(),
+        n => format!(
+            "{n} problems\n{}\nPut a copy of the store in its place, or begin a new one with `fleet run` and another --out.\n",
+            found.problems.join("\n")
+        ),
+    };
+    screen.result(&found, &text)?;
+    Ok(if found.problems.is_empty() { Ending::Accepted } else { Ending::Rejected })
 }

@@ -6,7 +6,7 @@
 use super::proof::{self, OnSweep, Proof};
 use super::{Failure, Screen};
 use crate::controller::Controller;
-use crate::document::sha256_hex;
+use crate::document::{below, sha256_hex, write_text};
 use crate::frf::{ReadSettings, read_file};
 use crate::gate::features::{features, machine_folders, read_machines};
 use crate::gate::{Action, Gate, Table, Verdict};
@@ -133,7 +133,7 @@ pub(super) fn run(job: &Job<'_>, screen: &mut Screen) -> Result<Vec<Row>, Failur
         }
         rows.push(row);
     }
-    crate::document::write_text(&job.out.join(TABLE), &csv(&rows))?;
+    write_text(&job.out.join(TABLE), &csv(&rows))?;
     Ok(rows)
 }
 
@@ -182,7 +182,7 @@ fn tuned(job: &Job<'_>, row: &mut Row, screen: &mut Screen) -> Result<(), Failur
     let digest = |role: &str, sha256: &str| InputDigest { role: role.into(), sha256: sha256.into() };
     let mut inputs = vec![digest("frf", &sweep.source_digest), digest("gate", &job.gate_sha256)];
     inputs.extend(job.start.as_ref().map(|s| digest("controller", &s.1)));
-    let gains = job.out.join(&row.id).join(GAINS);
+    let gains = below(job.out, &[&row.id, GAINS])?;
     let start = job.start.as_ref().map(|s| &s.0);
     let (outcome, mut table, certificate) = match job.certify {
         Some(spec_file) => {

@@ -20,6 +20,7 @@ mod fleet_clock;
 mod fleet_kills;
 mod fleet_page;
 mod fleet_progress;
+mod fleet_reliability;
 mod fleet_slot;
 mod fleet_store;
 mod fleet_study;

@@ -1,6 +1,7 @@
-//! What a person sees: results on stdout, messages and progress on stderr.
+//! What a person sees: results on stdout, messages and progress on stderr. Names and texts of files reach a terminal as words, never as commands.
 
 use super::Failure;
+use crate::document::printable;
 use serde::Serialize;
 use std::error::Error;
 use std::io::Write;
@@ -21,7 +22,7 @@ impl Screen {
         let out = if self.json {
             serde_json::to_string_pretty(document).map_err(|source| Failure::Json { source })? + "\n"
         } else {
-            text.to_owned()
+            printable(text)
         };
         match std::io::stdout().lock().write_all(out.as_bytes()) {
             Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Stdout { source: e }),
@@ -32,7 +33,7 @@ impl Screen {
     /// A message beside the result.
     pub(super) fn say(&mut self, text: &str) {
         // There is nowhere to report that stderr is closed.
-        let _ = writeln!(std::io::stderr().lock(), "{text}");
+        let _ = writeln!(std::io::stderr().lock(), "{}", printable(text));
     }
 
     /// The refusal and its causes.

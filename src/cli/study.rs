@@ -1,7 +1,7 @@
 //! `servotune study`: the tables and pictures of `results/`, made again.
 
 use super::arguments::{StudyArguments, StudyName};
-use super::{Ending, Failure, Screen, fleet_kills, fleet_study};
+use super::{Ending, Failure, Screen, fleet_kills, fleet_reliability, fleet_study};
 use crate::document::write_text;
 use crate::study;
 use serde::Serialize;
@@ -15,7 +15,10 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
     // Those of the fleet run this program as other processes and write their own pages.
     let own = match a.study {
         StudyName::Fleet => Some(fleet_study::floor(&a.out, screen)?),
-        StudyName::FleetKills => Some(fleet_kills::kills(&a.out, a.kills, screen)?),
+        StudyName::FleetKills => Some(fleet_kills::kills(&a.out, a.kills.unwrap_or(500), screen)?),
+        StudyName::ReliabilityFleet => {
+            Some(fleet_reliability::reliability(&a.out, a.kills.unwrap_or(300), a.changes, screen)?)
+        }
         StudyName::FleetScale => Some(fleet_study::scale(&a.out, &a.sizes, screen)?),
         StudyName::FleetShared => Some(fleet_study::shared(&a.out, screen)?),
         _ => None,
@@ -41,9 +44,11 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::Recordings => study::recordings(&a.data)?,
         StudyName::Motor => study::motor(&a.data)?,
         StudyName::Hdd => study::hdd(&a.data)?,
-        StudyName::Fleet | StudyName::FleetKills | StudyName::FleetScale | StudyName::FleetShared => {
-            study::Study::default()
-        }
+        StudyName::Fleet
+        | StudyName::FleetKills
+        | StudyName::ReliabilityFleet
+        | StudyName::FleetScale
+        | StudyName::FleetShared => study::Study::default(),
     };
     let mut written = Written { files: Vec::new() };
     for (name, content) in &made.files {

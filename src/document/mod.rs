@@ -1,13 +1,15 @@
-//! Documents on disk: a TOML text into a struct with a located error, whole-file writing, digests.
+//! Documents on disk: a TOML text into a struct with a located error, whole-file writing, digests, names.
 //!
 //! In: paths and texts. Out: values, or an error that names file, line, column and what was expected.
 //! No control meaning lives here; the rooms define what stands in their files. Files: `../shared/contract.md` is
 //! restated in `specs/files.md`.
 
 mod digest;
+mod name;
 mod read;
 mod write;
 
 pub use digest::sha256_hex;
+pub use name::{A_NAME, LONGEST_NAME, NameError, below, check_name, printable};
 pub use read::{DocumentError, parse_toml, read_text, read_toml, way_on};
-pub use write::{check_target, temporary_beside, write_text, write_whole};
+pub use write::{Temporary, check_target, clear_abandoned, write_text, write_whole};

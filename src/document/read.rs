@@ -1,5 +1,6 @@
 //! Reading a TOML document: the error says file, line, column, what was found and what was expected.
 
+use super::NameError;
 use serde::de::DeserializeOwned;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -18,6 +19,12 @@ pub enum DocumentError {
     /// The text is not the document expected: a syntax error, a wrong type, a missing or an unknown key.
     #[error("{}:{line}:{column}: {found}", file.display())]
     Content { file: PathBuf, line: usize, column: usize, found: String },
+    /// A name that would become a path is none.
+    #[error("below {}: {source}", folder.display())]
+    Name { folder: PathBuf, source: NameError },
+    /// A link stands where a file or folder of our own is to be written.
+    #[error("{}: found a link; expected a file or folder of its own, so that nothing is written elsewhere: remove it, or name another folder", file.display())]
+    Link { file: PathBuf },
 }
 
 impl DocumentError {

@@ -1,6 +1,9 @@
 //! Writing whole files: a temporary name beside the target, flushed to disk, then renamed over it.
+//!
+//! A temporary file is locked while it is written, so that what a dead process left behind can be told from what a living one writes.
 
 use super::DocumentError;
+use std::fs::File;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -8,11 +11,81 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Files begun by this process: two threads that write one file must not share its temporary name.
 static BEGUN: AtomicUsize = AtomicUsize::new(0);
 
-/// A name beside `file` that nobody else writes to, for what is not whole yet.
-pub fn temporary_beside(file: &Path) -> PathBuf {
-    let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let (process, count) = (std::process::id(), BEGUN.fetch_add(1, Ordering::Relaxed));
-    file.with_file_name(format!(".{name}.{process}.{count}.part"))
+/// A file that is not whole yet, under a hidden name beside its own, gone when it is dropped before [`Temporary::place`].
+#[derive(Debug)]
+pub struct Temporary {
+    /// The open file; locked where the system has locks.
+    pub out: File,
+    path: PathBuf,
+    file: PathBuf,
+}
+
+impl Temporary {
+    /// Begins a file that is to be `file`; its folder is made.
+    pub fn begin(file: &Path) -> Result<Temporary, DocumentError> {
+        let fail = |action| move |source| DocumentError::Io { file: file.into(), action, source };
+        check_target(file)?;
+        std::fs::create_dir_all(folder_of(file)).map_err(fail("make its folder"))?;
+        let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let (process, count) = (std::process::id(), BEGUN.fetch_add(1, Ordering::Relaxed));
+        let path = file.with_file_name(format!(".{name}.{process}.{count}.part"));
+        let out = File::create(&path).map_err(fail("write"))?;
+        // Without locks on this file system nothing is told apart, and nothing is cleared.
+        let _ = out.try_lock();
+        Ok(Temporary { out, path, file: file.into() })
+    }
+
+    /// Flushes the file to disk.
+    pub fn sync(&self) -> Result<(), DocumentError> {
+        self.out.sync_all().map_err(|source| self.io(source))
+    }
+
+    /// Gives the file its own name, over what stood there; it must have been flushed.
+    pub fn place(self) -> Result<PathBuf, DocumentError> {
+        std::fs::rename(&self.path, &self.file).map_err(|source| self.io(source))?;
+        // The name reaches the disk with its folder; where a folder cannot be flushed, the system does it in its own time.
+        let _ = File::open(folder_of(&self.file)).and_then(|f| f.sync_all());
+        Ok(self.file.clone())
+    }
+
+    fn io(&self, source: std::io::Error) -> DocumentError {
+        DocumentError::Io { file: self.file.clone(), action: "write", source }
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // After a rename there is nothing left of that name.
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Removes from a folder what dead processes began there and did not end (`.NAME.PROCESS.COUNT.part`), and says which.
+pub fn clear_abandoned(folder: &Path) -> Vec<PathBuf> {
+    // A folder that cannot be listed has nothing to be cleared.
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let left = entries.map(|e| e.path()).filter(|p| abandoned(p));
+    left.filter(|p| std::fs::remove_file(p).is_ok()).collect()
+}
+
+/// Whether a path is a temporary file of a process that is no more.
+fn abandoned(path: &Path) -> bool {
+    let Some(name) = path.file_name().and_then(|n| n.to_str()) else { return false };
+    let Some(inner) = name.strip_prefix('.').and_then(|n| n.strip_suffix(".part")) else { return false };
+    let mut words = inner.rsplit('.');
+    let [Some(count), Some(process)] = [words.next(), words.next()] else { return false };
+    let number = |w: &str| !w.is_empty() && w.bytes().all(|b| b.is_ascii_digit());
+    let file = path.symlink_metadata().is_ok_and(|m| m.is_file());
+    if !(file && number(count) && number(process)) {
+        return false;
+    }
+    // A living process holds the lock, on this machine or another; one of this machine is seen even before it has it.
+    let here = Path::new("/proc").join(process).exists();
+    !here && File::open(path).is_ok_and(|f| f.try_lock().is_ok())
 }
 
 /// Refuses a place where no file can be written: a folder stands there, or the way to it leads through a file. A long command asks
@@ -32,25 +105,36 @@ pub fn check_target(file: &Path) -> Result<(), DocumentError> {
 
 /// Writes `bytes` so that the file is either the old one or the new one, never a part of either.
 pub fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), DocumentError> {
-    let fail = |action| move |source| DocumentError::Io { file: file.into(), action, source };
-    let folder = match file.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    check_target(file)?;
-    std::fs::create_dir_all(folder).map_err(fail("make its folder"))?;
-    let temporary = temporary_beside(file);
-    let written = std::fs::File::create(&temporary)
-        .and_then(|mut f| f.write_all(bytes).and_then(|()| f.sync_all()))
-        .and_then(|()| std::fs::rename(&temporary, file));
-    written.map_err(|source| {
-        // The half-written file is of no use to anybody; the error that matters is the one being reported.
-        let _ = std::fs::remove_file(&temporary);
-        fail("write")(source)
-    })
+    let mut temporary = Temporary::begin(file)?;
+    temporary.out.write_all(bytes).map_err(|source| temporary.io(source))?;
+    temporary.sync()?;
+    temporary.place().map(|_| ())
 }
 
 /// [`write_whole`] for text.
 pub fn write_text(file: &Path, text: &str) -> Result<(), DocumentError> {
     write_whole(file, text.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn only_what_dead_processes_left_is_cleared() {
+        let folder = std::env::temp_dir().join(format!("servotune-parts-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).unwrap();
+        // No process has a number beyond 2^22 on Linux; one without /proc is held by its lock alone.
+        for name in [".a.toml.4999999.0.part", "b.part", ".c.part", ".d.x.0.part", "e.4999999.0.part"] {
+            std::fs::write(folder.join(name), "half").unwrap();
+        }
+        let living = Temporary::begin(&folder.join("f.toml")).unwrap();
+        assert_eq!(clear_abandoned(&folder), [folder.join(".a.toml.4999999.0.part")]);
+        living.sync().unwrap();
+        assert_eq!(living.place().unwrap(), folder.join("f.toml"));
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 5);
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
 }

@@ -37,6 +37,35 @@ fn door(folder: &Path) -> Result<File, FleetError> {
     Ok(door)
 }
 
+/// Files that are nobody's: locks that several processes take in turn.
+const STAY: [&str; 2] = ["door", "install"];
+
+/// The lock that one process holds while it installs; none where another holds it and `wait` is not asked for.
+pub(super) fn install_lock(store: &Path, wait: bool) -> Result<Option<File>, FleetError> {
+    locked(store, "install", wait)
+}
+
+/// A lock of a store by its name, held until the file is dropped; none where another process holds it and `wait` is not asked for.
+fn locked(store: &Path, name: &str, wait: bool) -> Result<Option<File>, FleetError> {
+    let folder = folder(store);
+    let file = folder.join(name);
+    let fail = |action| {
+        let file = file.clone();
+        move |source| FleetError::Lock { file, action, source }
+    };
+    std::fs::create_dir_all(&folder).map_err(fail("made"))?;
+    let lock = open(&file).map_err(fail("opened"))?;
+    if wait {
+        lock.lock().map_err(fail("locked"))?;
+        return Ok(Some(lock));
+    }
+    match lock.try_lock() {
+        Ok(()) => Ok(Some(lock)),
+        Err(TryLockError::WouldBlock) => Ok(None),
+        Err(TryLockError::Error(source)) => Err(fail("locked")(source)),
+    }
+}
+
 fn open(file: &Path) -> std::io::Result<File> {
     OpenOptions::new().write(true).create(true).truncate(false).open(file)
 }
@@ -52,7 +81,7 @@ impl Worker {
         for entry in std::fs::read_dir(&folder).map_err(list)? {
             let path = entry.map_err(list)?.path();
             let dead = || File::open(&path).is_ok_and(|f| f.try_lock().is_ok());
-            if path.file_name().is_some_and(|n| n != "door") && dead() {
+            if path.file_name().is_some_and(|n| !STAY.contains(&n.to_string_lossy().as_ref())) && dead() {
                 // A file that stays is harmless: nobody holds it.
                 let _ = std::fs::remove_file(&path);
             }

@@ -21,6 +21,8 @@ pub struct Context {
     pub guarded: Spec,
     /// The gains of slots that name none; the shape of every table.
     pub base: Controller,
+    /// The text that they were read from.
+    pub base_text: String,
     /// The gate.
     pub gate: Option<Gate>,
     /// Whether responses contain the hold.
@@ -80,6 +82,7 @@ impl Context {
             file: f.clone(),
             spec,
             base,
+            base_text: text,
             gate,
             inputs,
         })

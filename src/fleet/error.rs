@@ -1,7 +1,7 @@
 //! Why the fleet could not be worked on.
 
 use crate::controller::ControllerError;
-use crate::document::DocumentError;
+use crate::document::{DocumentError, NameError};
 use crate::gate::GateError;
 use crate::tune::{GainTableError, SpecError, TuneError};
 use std::path::PathBuf;
@@ -54,6 +54,36 @@ pub enum FleetError {
     Foreign { file: PathBuf, tables: i64 },
     #[error("{}: the store has schema {found}; this program knows {expected}: use the version that made it, or name another store", file.display())]
     Schema { file: PathBuf, found: i64, expected: i64 },
+    #[error("{}: no such store; `servotune fleet run` makes one, as DIR/fleet.db unless FLEET.toml names another", file.display())]
+    NoStore { file: PathBuf },
+    #[error("{}: the store is empty or cut off: what stood in it is lost; put a copy in its place, or move it away to begin a new one", file.display())]
+    Emptied { file: PathBuf },
+    #[error("{0}: the store is not there, but its log {0}-wal is: put the store back beside it, or move the log away to begin a new one", file.display())]
+    LogAlone { file: PathBuf },
+    #[error("{0}: nothing can be written beside the store, and it was left with a log ({0}-wal): copy both to a folder that can be written, and read them there", file.display())]
+    LogUnread { file: PathBuf },
+    #[error("{0}: the store is damaged: {what}; nothing was changed. Put a copy of the store in its place, or begin a new one with `fleet run` and another --out; `servotune fleet check --store {0}` lists all that is damaged", file.display())]
+    Damaged { file: PathBuf, what: String },
+    #[error("{what}: {source}")]
+    Name { what: String, source: NameError },
+    #[error("{}: {found}; expected a file of gains or nothing, at most 1 MiB: move it away", file.display())]
+    Installed { file: PathBuf, found: &'static str },
+    #[error(
+        "slot {slot}: the table proposed by run {run} no longer holds: run {later} judged the slot {verdict}; it stays as it is"
+    )]
+    JudgedOtherwise { slot: String, run: String, later: String, verdict: String },
+    #[error("slot {slot}: its table was proposed by run {found}, not by {asked}")]
+    OtherRun { slot: String, found: String, asked: String },
+    #[error(
+        "slot {slot}: an earlier {action} is not finished: {why}; the next command of the fleet ends it when that is mended"
+    )]
+    Unfinished { slot: String, action: &'static str, why: String },
+    #[error("slot {slot}: its gains were applied in {}; found --out {}: name that folder, or leave --out out", applied.display(), found.display())]
+    OtherFolder { slot: String, applied: PathBuf, found: PathBuf },
+    #[error("--out {}: its path is no UTF-8 text and cannot be kept in the store; name another folder", folder.display())]
+    FolderName { folder: PathBuf },
+    #[error("{}: was changed after {action} had begun; move it away, then run any command of the fleet again", file.display())]
+    ChangedMeanwhile { file: PathBuf, action: &'static str },
     #[error("{}: the store is full ({action}): nothing is lost, free space and run again", file.display())]
     Full { file: PathBuf, action: &'static str },
     #[error("{}: the file cannot be {action}: {source}", file.display())]

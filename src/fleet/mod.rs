@@ -1,11 +1,13 @@
 //! The fleet: gain tables for every slot of every tester.
 //!
 //! In: FLEET.toml, a source of slots. Out: a row for each slot, tables for each slot and shared ones, all in a store from which every other
-//! output is derived. Reading order: `settings`, `source`, `context`, `evidence`, `prove`, `row`, `library`, `slot`, `pilot`, `store`, `run`.
+//! output is derived. Reading order: `settings`, `source`, `context`, `evidence`, `prove`, `row`, `library`, `slot`, `pilot`, `store`, `run`, `revision`, `order`, `act`.
 //! Convention: a slot's row depends on the slot, the settings and the library only, so bytes are equal for any number of threads and after
 //! any interruption. Spec: `specs/fleet.md`.
 
+mod act;
 mod certified;
+mod check;
 mod claims;
 mod cluster;
 mod context;
@@ -15,7 +17,10 @@ mod error;
 mod evidence;
 mod explain;
 mod grow;
+mod installed;
+mod leftovers;
 mod library;
+mod order;
 mod output;
 #[cfg(feature = "parquet")]
 mod parquet;
@@ -26,6 +31,8 @@ mod rest;
 mod revision;
 mod row;
 mod run;
+mod schema;
+mod seal;
 mod settings;
 mod share;
 mod slot;
@@ -36,6 +43,7 @@ mod table_source;
 mod work_list;
 
 pub use certified::{Certified, certified};
+pub use check::Checked;
 pub use claims::Worker;
 pub use cluster::{LEVELS, Level, looks, nearest};
 pub use context::Context;
@@ -44,8 +52,10 @@ pub use drift::{SlotDrift, Trend, drift};
 pub use error::FleetError;
 pub use evidence::Evidence;
 pub use explain::{Cause, Change, Explained, Remedy};
+pub use leftovers::clear_pages;
 pub use library::{Candidate, Library};
-pub use output::{Asked, gain_table, gain_table_of, write_tables};
+pub use order::{Carried, End, Healed, Order, Which};
+pub use output::{Asked, gain_table, gain_table_of, page_file, write_tables};
 pub use pilot::{Pilot, pilot, places};
 pub use prove::{Proved, UNSTABLE, prove};
 pub use ready::{Quick, Ready};
@@ -57,5 +67,5 @@ pub use share::{Shared, SharedTable, assigned};
 pub use slot::work;
 pub use source::{FileSource, Loaded, SlotName, SlotSource};
 pub use store::Store;
-pub use store_run::{Run, Stamp};
+pub use store_run::{Inputs, Run, Stamp};
 pub use work_list::{WorkItem, work_list};

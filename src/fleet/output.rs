@@ -3,15 +3,17 @@
 //! In: a store and a run. Out: slots, shared tables, coverage, work list, drift, and a gain table for each tuned slot. The same run gives the same bytes.
 
 use super::drift::{SlotDrift, Trend};
+use super::leftovers::clear_tables;
 use super::prove::Proved;
 use super::row::{SlotRow, Verdict};
 use super::share::assigned;
 use super::store_run::json;
 use super::{Context, FleetError, Store};
 use crate::controller::Controller;
-use crate::document::{DocumentError, temporary_beside};
+use crate::document::{DocumentError, Temporary, below, check_name};
 use crate::gate::features::csv_field;
 use crate::tune::{GainTable, InputDigest, Provenance, Route, Summary};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -19,41 +21,39 @@ use std::path::{Path, PathBuf};
 /// A file that takes its name only when it is whole.
 pub(super) struct WholeFile {
     out: BufWriter<File>,
-    temporary: PathBuf,
+    temporary: Temporary,
     file: PathBuf,
 }
 
 impl WholeFile {
     pub fn begin(file: &Path) -> Result<WholeFile, FleetError> {
-        let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let temporary = temporary_beside(file);
-        let made = std::fs::create_dir_all(folder).and_then(|()| File::create(&temporary));
-        let out = made.map_err(|source| io(file, "write", source))?;
+        let temporary = Temporary::begin(file)?;
+        let out = temporary.out.try_clone().map_err(|source| io(file, source))?;
         Ok(WholeFile { out: BufWriter::new(out), temporary, file: file.into() })
     }
 
     pub fn line(&mut self, text: &str) -> Result<(), FleetError> {
         let wrote = self.out.write_all(text.as_bytes()).and_then(|()| self.out.write_all(b"\n"));
-        wrote.map_err(|source| io(&self.file, "write", source))
+        wrote.map_err(|source| io(&self.file, source))
     }
 
     pub fn end(mut self) -> Result<PathBuf, FleetError> {
-        let done = self.out.flush().and_then(|()| self.out.get_ref().sync_all());
-        let done = done.and_then(|()| std::fs::rename(&self.temporary, &self.file));
-        done.map_err(|source| io(&self.file, "write", source))?;
-        Ok(self.file.clone())
+        self.out.flush().map_err(|source| io(&self.file, source))?;
+        self.temporary.sync()?;
+        Ok(self.temporary.place()?)
     }
 }
 
-impl Drop for WholeFile {
-    fn drop(&mut self) {
-        // After a rename there is nothing left of that name.
-        let _ = std::fs::remove_file(&self.temporary);
-    }
+fn io(file: &Path, source: std::io::Error) -> FleetError {
+    FleetError::Document(DocumentError::Io { file: file.into(), action: "write", source })
 }
 
-fn io(file: &Path, action: &'static str, source: std::io::Error) -> FleetError {
-    FleetError::Document(DocumentError::Io { file: file.into(), action, source })
+/// Where the page of a slot lies in an output folder: `slots/TESTER_SLOT.html`.
+pub fn page_file(out: &Path, row: &SlotRow) -> Result<PathBuf, FleetError> {
+    for name in [&row.tester, &row.slot] {
+        check_name(name).map_err(|source| FleetError::Name { what: "page of a slot".into(), source })?;
+    }
+    Ok(below(out, &["slots"])?.join(format!("{}_{}.html", row.tester, row.slot)))
 }
 
 /// Columns of slots.csv.
@@ -202,6 +202,7 @@ pub fn write_tables(
         let columns: Vec<(&str, bool)> = COLUMNS.split(',').map(|c| (c, !WORDS.contains(&c))).collect();
         super::parquet::ParquetTable::begin(&out.join("slots.parquet"), &columns)?
     };
+    let mut tuned: BTreeSet<PathBuf> = BTreeSet::new();
     store.each_row(run, None, |row| {
         let table = row.verdict.served().then(|| assigned(&row, &chosen)).flatten();
         let fields = fields(&row, table.and_then(name));
@@ -213,10 +214,14 @@ pub fn write_tables(
             && row.verdict == Verdict::Tuned
             && let Some(table) = gain_table(context, &row)?
         {
-            table.write(&out.join("gains").join(&row.tester).join(&row.slot).join("gains.toml"))?;
+            let file = below(out, &["gains", &row.tester, &row.slot, "gains.toml"])?;
+            table.write(&file)?;
+            tuned.insert(file);
         }
         Ok(())
     })?;
+    // Before the list takes its name: what stands beside it is of this run.
+    clear_tables(out, &tuned, chosen.len())?;
     let mut files = vec![csv.end()?, lines.end()?];
     #[cfg(feature = "parquet")]
     files.push(parquet.end()?);
@@ -250,6 +255,11 @@ pub fn write_tables(
     if !asked.before.is_empty() {
         let runs: Vec<String> = asked.before.iter().cloned().chain([run.to_owned()]).collect();
         text("drift.csv", &drift_csv(&super::drift(store, &runs)?))?;
+    } else {
+        for name in ["drift.csv", "drift.parquet"] {
+            // Of another run; there is none in most folders.
+            let _ = std::fs::remove_file(out.join(name));
+        }
     }
     #[cfg(feature = "parquet")]
     for name in ["coverage.csv", "work_list.csv", "drift.csv"] {

@@ -4,6 +4,7 @@
 //! doubles, everything else as text. Rows go out in groups, so that memory does not grow with the floor.
 
 use super::FleetError;
+use crate::document::Temporary;
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
@@ -69,7 +70,7 @@ pub(super) struct ParquetTable {
     writer: SerializedFileWriter<File>,
     numbers: Vec<bool>,
     rows: Vec<Vec<String>>,
-    temporary: PathBuf,
+    temporary: Temporary,
     file: PathBuf,
 }
 
@@ -82,8 +83,8 @@ impl ParquetTable {
         };
         let schema = format!("message slots {{ {} }}", columns.iter().map(field).collect::<String>());
         let schema = Arc::new(parse_message_type(&schema).map_err(fail(file))?);
-        let temporary = file.with_extension(format!("{}.part", std::process::id()));
-        let made = File::create(&temporary).map_err(io(file, "made"))?;
+        let temporary = Temporary::begin(file)?;
+        let made = temporary.out.try_clone().map_err(io(file, "made"))?;
         let writer = SerializedFileWriter::new(made, schema, Arc::new(WriterProperties::builder().build()));
         let numbers = columns.iter().map(|c| c.1).collect();
         Ok(ParquetTable {
@@ -132,8 +133,8 @@ impl ParquetTable {
         }
         let ParquetTable { writer, temporary, file, .. } = self;
         writer.close().map_err(fail(&file))?;
-        std::fs::rename(&temporary, &file).map_err(io(&file, "renamed"))?;
-        Ok(file)
+        temporary.sync()?;
+        Ok(temporary.place()?)
     }
 }
 

@@ -1,27 +1,36 @@
-//! The revisions of every slot's gains: found, proposed, approved, applied, rolled back. Nothing is ever changed or lost.
+//! The revisions of every slot's gains: found, proposed, withdrawn, approved, applied, rolled back. Nothing is ever changed or lost.
 //!
-//! In: who, when, why, and a table. Out: a chain for each slot. A table is named by the digest of its text and kept once, whoever proposes it.
+//! In: who, when, why, and a table. Out: a chain for each slot. A table is named by the digest of its bytes and kept once, whoever proposes it.
+//! What is in a slot is the last of `found`, `apply`, `rollback`.
 //!
 //! ```text
 //! found ──► propose ──► approve ──► apply ──► rollback ──► propose ...
+//!              └──────────┴──► withdraw: a later run judged the slot otherwise
 //! ```
 
+use super::claims::install_lock;
 use super::row::{SlotRow, Verdict};
+use super::schema::held;
+use super::seal::{REVISIONS, maybe, stop, text};
 use super::store_run::{Run, Stamp};
 use super::{Context, FleetError, Store};
 use crate::controller::Controller;
 use crate::document::sha256_hex;
+use rusqlite::types::Value;
 use rusqlite::{Connection, OptionalExtension, params};
 use serde::Serialize;
+use std::collections::BTreeSet;
 
 /// What happened to a slot's gains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Action {
-    /// Gains that a run found in the slot.
+    /// Gains that a run, or an apply, found in the slot.
     Found,
     /// A run proposes a table.
     Propose,
+    /// A later run judged the slot otherwise: what was proposed or approved before no longer stands.
+    Withdraw,
     /// A person approves what was proposed.
     Approve,
     /// The approved table is in the slot.
@@ -36,28 +45,27 @@ impl Action {
         match self {
             Action::Found => "found",
             Action::Propose => "propose",
+            Action::Withdraw => "withdraw",
             Action::Approve => "approve",
             Action::Apply => "apply",
             Action::Rollback => "rollback",
         }
     }
 
-    /// Which action must be the slot's last one before this.
-    fn after(self) -> &'static [&'static str] {
+    /// The action that must be the slot's last one before this.
+    pub(super) fn after(self) -> &'static str {
         match self {
-            Action::Approve => &["propose"],
-            Action::Apply => &["approve"],
-            Action::Rollback => &["apply"],
-            Action::Found | Action::Propose => &[],
+            Action::Apply => "approve",
+            Action::Rollback => "apply",
+            _ => "propose",
         }
     }
 
-    fn needs(self) -> &'static str {
+    pub(super) fn needs(self) -> &'static str {
         match self {
-            Action::Approve => "proposed",
             Action::Apply => "approved",
             Action::Rollback => "applied",
-            Action::Found | Action::Propose => "there",
+            _ => "proposed",
         }
     }
 }
@@ -71,9 +79,9 @@ pub struct Revision {
     pub slot: String,
     /// What happened.
     pub action: String,
-    /// SHA-256 of the table's text.
+    /// SHA-256 of the table's bytes.
     pub sha256: String,
-    /// The run it came from.
+    /// The run it stands on; none for gains that an apply found.
     pub run: Option<String>,
     /// The slot's revision before this one.
     pub previous: Option<i64>,
@@ -87,9 +95,8 @@ pub struct Revision {
     pub inputs: String,
 }
 
-const REVISION: &str = "SELECT id, slot, action, sha256, run, previous, who, at, why, inputs FROM revisions";
-
 fn revision_of(r: &rusqlite::Row<'_>) -> Result<Revision, rusqlite::Error> {
+    REVISIONS.hold(r)?;
     Ok(Revision {
         id: r.get(0)?,
         slot: r.get(1)?,
@@ -104,30 +111,74 @@ fn revision_of(r: &rusqlite::Row<'_>) -> Result<Revision, rusqlite::Error> {
     })
 }
 
-fn last(c: &Connection, slot: &str) -> Result<Option<Revision>, rusqlite::Error> {
-    c.query_row(&format!("{REVISION} WHERE slot = ?1 ORDER BY id DESC LIMIT 1"), [slot], revision_of).optional()
+/// Every revision of a slot, oldest first.
+pub(super) fn chain(c: &Connection, slot: &str) -> Result<Vec<Revision>, rusqlite::Error> {
+    let query = format!("{} WHERE t.slot = ?1 ORDER BY t.id", REVISIONS.select());
+    let mut query = c.prepare_cached(&query)?;
+    let rows = query.query_map([slot], revision_of)?;
+    rows.collect()
+}
+
+/// Of a slot's revisions the last that says what is in the slot.
+pub(super) fn in_slot(chain: &[Revision]) -> Option<&Revision> {
+    chain.iter().rev().find(|r| matches!(r.action.as_str(), "found" | "apply" | "rollback"))
 }
 
 /// A revision to be added.
-struct New<'a> {
-    slot: &'a str,
-    action: Action,
-    sha256: &'a str,
-    run: Option<&'a str>,
-    why: &'a str,
-    inputs: &'a str,
+pub(super) struct New<'a> {
+    pub slot: &'a str,
+    pub action: Action,
+    pub sha256: &'a str,
+    pub run: Option<&'a str>,
+    pub why: &'a str,
+    pub inputs: &'a str,
 }
 
-fn add(c: &Connection, new: &New<'_>, stamp: &Stamp) -> Result<(), rusqlite::Error> {
-    // A proposal that is already there stays: the index says so. Anything else that cannot be added is an error.
-    let or = if matches!(new.action, Action::Found | Action::Propose) { "OR IGNORE" } else { "" };
-    let query = format!(
-        "INSERT {or} INTO revisions (slot, action, sha256, run, previous, who, at, why, inputs) \
-         VALUES (?1, ?2, ?3, ?4, (SELECT max(id) FROM revisions WHERE slot = ?1), ?5, ?6, ?7, ?8)"
-    );
-    let New { slot, action, sha256, run, why, inputs } = *new;
-    c.prepare_cached(&query)?.execute(params![slot, action.word(), sha256, run, stamp.who, stamp.at, why, inputs])?;
+pub(super) fn add(c: &Connection, new: &New<'_>, stamp: &Stamp) -> Result<(), rusqlite::Error> {
+    // What a run has said already stays: the indices say so. Anything else that cannot be added is an error.
+    let once = matches!(new.action, Action::Found | Action::Propose | Action::Withdraw);
+    let id: i64 = c
+        .prepare_cached("SELECT coalesce((SELECT seq FROM sqlite_sequence WHERE name = 'revisions'), 0) + 1")?
+        .query_row([], |r| r.get(0))?;
+    let previous: Option<i64> =
+        c.prepare_cached("SELECT max(id) FROM revisions WHERE slot = ?1")?.query_row([new.slot], |r| r.get(0))?;
+    let values = vec![
+        Value::Integer(id),
+        text(new.slot),
+        text(new.action.word()),
+        text(new.sha256),
+        maybe(new.run),
+        previous.map_or(Value::Null, Value::Integer),
+        text(stamp.who.as_str()),
+        text(stamp.at.as_str()),
+        text(new.why),
+        text(new.inputs),
+    ];
+    REVISIONS.put(c, if once { "INSERT OR IGNORE" } else { "INSERT" }, values).map(|_| ())
+}
+
+/// Keeps the bytes of a table under their digest; bytes that are no text are kept as they are.
+pub(super) fn keep_table(c: &Connection, sha256: &str, bytes: &[u8]) -> Result<(), rusqlite::Error> {
+    let value = match std::str::from_utf8(bytes) {
+        Ok(words) => text(words),
+        Err(_) => Value::Blob(bytes.to_vec()),
+    };
+    c.prepare_cached("INSERT OR IGNORE INTO gain_tables (sha256, gains) VALUES (?1, ?2)")?
+        .execute(params![sha256, value])?;
     Ok(())
+}
+
+/// The bytes of a table, held to the digest that it is kept under.
+pub(super) fn table_bytes(c: &Connection, sha256: &str) -> Result<Vec<u8>, rusqlite::Error> {
+    let found = c
+        .prepare_cached("SELECT gains FROM gain_tables WHERE sha256 = ?1")?
+        .query_row([sha256], |r| Ok(r.get_ref(0)?.as_bytes()?.to_vec()))
+        .optional()?;
+    let Some(bytes) = found else {
+        return Err(stop(super::seal::damaged(format!("the table of gains {sha256} is not there"))));
+    };
+    held(sha256, &bytes).map_err(stop)?;
+    Ok(bytes)
 }
 
 /// The text of a table, and its digest.
@@ -137,110 +188,111 @@ pub fn table_text(gains: &Controller) -> Result<(String, String), FleetError> {
     Ok((text, sha256))
 }
 
+/// Whether two texts hold the same gains, however they are written.
+fn same_gains(a: &[u8], b: &str) -> bool {
+    let read = |t: &str| toml::from_str::<Controller>(t).ok();
+    let a = std::str::from_utf8(a).ok().and_then(read);
+    a.is_some() && a == read(b)
+}
+
+/// What a row says about its slot's revisions.
+struct Said {
+    slot: String,
+    inputs: String,
+    verdict: Verdict,
+    /// Gains in the slot; none where the slot could not be read.
+    found: Option<(String, String)>,
+    own: Option<(String, String)>,
+}
+
+impl Said {
+    fn of(context: &Context, row: &SlotRow) -> Result<Said, FleetError> {
+        let mut inputs = format!("slot {}", row.digest);
+        context.inputs.iter().for_each(|(name, sha256)| inputs += &format!("; {name} {sha256}"));
+        let with_digest = |text: &String| (text.clone(), sha256_hex(text.as_bytes()));
+        let found = match (&row.own_text, &row.own_gains) {
+            _ if row.error.is_some() => None,
+            (Some(text), _) => Some(with_digest(text)),
+            (None, Some(gains)) => Some(table_text(gains)?),
+            (None, None) => Some(with_digest(&context.base_text)),
+        };
+        let own = row.table.as_ref().filter(|_| row.verdict == Verdict::Tuned).map(|t| table_text(&t.gains));
+        Ok(Said { slot: row.id(), inputs, verdict: row.verdict, found, own: own.transpose()? })
+    }
+
+    /// `later` are the runs begun after this one.
+    fn put(&self, c: &Connection, run: &Run, later: &BTreeSet<String>, stamp: &Stamp) -> Result<(), rusqlite::Error> {
+        let before = chain(c, &self.slot)?;
+        let add_one = |action, sha256: &str, why: &str| {
+            let (slot, inputs, run) = (self.slot.as_str(), self.inputs.as_str(), Some(run.run.as_str()));
+            add(c, &New { slot, action, sha256, run, why, inputs }, stamp)
+        };
+        // What this run has said already is not said again, and a later run knows better.
+        let spoken = |r: &Revision| r.run.as_ref().is_some_and(|name| *name == run.run || later.contains(name));
+        if before.iter().any(spoken) {
+            return Ok(());
+        }
+        if let Some((words, sha256)) = &self.found {
+            // Gains are recorded where they are not those that the chain says are there.
+            let known = match in_slot(&before) {
+                Some(r) => r.sha256 == *sha256 || same_gains(&table_bytes(c, &r.sha256)?, words),
+                None => false,
+            };
+            if !known {
+                keep_table(c, sha256, words.as_bytes())?;
+                add_one(Action::Found, sha256, "in the slot when the run began")?;
+            }
+        }
+        if let Some((words, sha256)) = &self.own {
+            keep_table(c, sha256, words.as_bytes())?;
+            return add_one(Action::Propose, sha256, "meets every limit in every case");
+        }
+        match before.last() {
+            Some(r) if matches!(r.action.as_str(), "propose" | "approve") => {
+                add_one(Action::Withdraw, &r.sha256, &format!("judged {} by this run", self.verdict.word()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Proposals in one transaction.
 const TOGETHER: usize = 256;
 
 impl Store {
-    /// Records the gains found in every slot of a run, and proposes the tables that were found for those to be tuned. Done once for a run,
-    /// however often it is asked for; the stamp is that of the run, so that it does not tell when it was resumed.
+    /// Records the gains found in every slot of a run, proposes the tables that were found for those to be tuned, and withdraws what earlier runs
+    /// proposed for the others. Done once for a run, however often it is asked for; the stamp is that of the run, so that it does not tell when it
+    /// was resumed. A run that is older than another that has spoken leaves the chains as they are.
     pub fn propose(&mut self, context: &Context, run: &Run) -> Result<(), FleetError> {
-        let inputs = |row: &SlotRow| {
-            let mut words = format!("slot {}", row.digest);
-            context.inputs.iter().for_each(|(name, sha256)| words += &format!("; {name} {sha256}"));
-            words
-        };
         let stamp = Stamp { who: run.who.clone(), at: run.started.clone() };
-        let reader = Store::open(&self.file)?;
-        let mut together: Vec<SlotRow> = Vec::with_capacity(TOGETHER);
-        let mut put = |rows: &mut Vec<SlotRow>| -> Result<(), FleetError> {
-            let mut texts = Vec::with_capacity(rows.len());
-            for row in rows.iter() {
-                let found = table_text(row.own_gains.as_ref().unwrap_or(&context.base))?;
-                let own = row.table.as_ref().filter(|_| row.verdict == Verdict::Tuned).map(|t| table_text(&t.gains));
-                texts.push((row.id(), inputs(row), found, own.transpose()?));
-            }
-            self.write("propose tables", |c| {
-                for (slot, inputs, found, own) in &texts {
-                    let one = |action, (text, sha256): &(String, String), why| {
-                        c.prepare_cached("INSERT OR IGNORE INTO gain_tables (sha256, gains) VALUES (?1, ?2)")?
-                            .execute(params![sha256, text])?;
-                        add(c, &New { slot, action, sha256, run: Some(&run.run), why, inputs }, &stamp)
-                    };
-                    let before = last(c, slot)?;
-                    // Gains are recorded where they are not those that the chain says are there.
-                    if before.as_ref().is_none_or(|b| {
-                        b.sha256 != found.1 && matches!(b.action.as_str(), "found" | "apply" | "rollback")
-                    }) {
-                        one(Action::Found, found, "in the slot when the run began")?;
-                    }
-                    if let Some(own) = own {
-                        one(Action::Propose, own, "meets every limit in every case")?;
-                    }
-                }
-                Ok(())
-            })?;
-            rows.clear();
+        // An apply on its way must find the chains as it left them.
+        let _lock = install_lock(&self.file, true)?;
+        let reader = self.again()?;
+        let later = self.runs()?.into_iter().filter(|r| r.seq > run.seq).map(|r| r.run).collect::<BTreeSet<_>>();
+        let mut together: Vec<Said> = Vec::with_capacity(TOGETHER);
+        let mut put = |said: &mut Vec<Said>| -> Result<(), FleetError> {
+            self.write("propose tables", |c| said.iter().try_for_each(|s| s.put(c, run, &later, &stamp)))?;
+            said.clear();
             Ok(())
         };
         reader.each_row(&run.run, None, |row| {
-            if row.error.is_none() {
-                together.push(row);
-            }
+            together.push(Said::of(context, &row)?);
             if together.len() == TOGETHER { put(&mut together) } else { Ok(()) }
         })?;
         put(&mut together)
     }
 
-    /// Approves, applies or rolls back a slot's table. What must come before is asked for.
-    pub fn revise(&mut self, slot: &str, action: Action, stamp: &Stamp, why: &str) -> Result<Revision, FleetError> {
-        let found = self.write("add a revision", |c| {
-            let Some(before) = last(c, slot)? else { return Ok(Err(None)) };
-            if !action.after().contains(&before.action.as_str()) {
-                return Ok(Err(Some(format!("{} {} (revision {})", before.action, before.sha256, before.id))));
-            }
-            let sha256 = match action {
-                // What was in the slot before the apply: the last table that was found, applied or rolled back to.
-                Action::Rollback => c.query_row(
-                    "SELECT sha256 FROM revisions WHERE slot = ?1 AND id < ?2 AND action IN ('found', 'apply', 'rollback') ORDER BY id DESC LIMIT 1",
-                    params![slot, before.id],
-                    |r| r.get::<_, String>(0),
-                )?,
-                _ => before.sha256.clone(),
-            };
-            let run = before.run.as_deref();
-            add(c, &New { slot, action, sha256: &sha256, run, why, inputs: &before.inputs }, stamp)?;
-            last(c, slot).map(|r| r.ok_or(None))
-        })?;
-        found.map_err(|found| match found {
-            None => FleetError::NoSuchSlot { slot: slot.to_owned() },
-            Some(found) => FleetError::Revision { slot: slot.to_owned(), expected: action.needs(), found },
-        })
-    }
-
     /// Every revision of a slot, oldest first.
     pub fn history(&self, slot: &str) -> Result<Vec<Revision>, FleetError> {
-        let fail = self.fail("read a history");
-        let mut query = self.connection.prepare(&format!("{REVISION} WHERE slot = ?1 ORDER BY id")).map_err(&fail)?;
-        let rows: Vec<Revision> =
-            query.query_map([slot], revision_of).map_err(&fail)?.collect::<Result<_, _>>().map_err(&fail)?;
-        if rows.is_empty() {
+        let all = chain(&self.connection, slot).map_err(self.fail("read a history"))?;
+        if all.is_empty() {
             return Err(FleetError::NoSuchSlot { slot: slot.to_owned() });
         }
-        Ok(rows)
+        Ok(all)
     }
 
-    /// Slots whose last revision is of this kind.
-    pub fn slots_at(&self, action: Action) -> Result<Vec<String>, FleetError> {
-        let fail = self.fail("list slots");
-        let query = "SELECT slot FROM revisions r WHERE action = ?1 AND id = (SELECT max(id) FROM revisions WHERE slot = r.slot) ORDER BY slot";
-        let mut query = self.connection.prepare(query).map_err(&fail)?;
-        let rows = query.query_map([action.word()], |r| r.get(0)).map_err(&fail)?;
-        rows.collect::<Result<_, _>>().map_err(&fail)
-    }
-
-    /// The text of a table by its digest.
-    pub fn table(&self, sha256: &str) -> Result<String, FleetError> {
-        let query = "SELECT gains FROM gain_tables WHERE sha256 = ?1";
-        self.connection.query_row(query, [sha256], |r| r.get(0)).map_err(self.fail("read a table"))
+    /// The bytes of a table by its digest, to which they are held.
+    pub fn table(&self, sha256: &str) -> Result<Vec<u8>, FleetError> {
+        table_bytes(&self.connection, sha256).map_err(self.fail("read a table"))
     }
 }

@@ -145,6 +145,9 @@ pub struct SlotRow {
     pub model: Option<ModelRow>,
     /// The gains in the slot, where they differ from the fleet's.
     pub own_gains: Option<Controller>,
+    /// The bytes of the slot's file of gains, where they differ from the fleet's: what a rollback puts back.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub own_text: Option<String>,
     /// The gains in the slot, judged.
     pub current: Option<Proved>,
     /// The table found for it.

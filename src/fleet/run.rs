@@ -13,8 +13,9 @@ use super::row::{SlotRow, Verdict};
 use super::share::share;
 use super::slot::{Prepared, work};
 use super::source::SlotSource;
-use super::store_run::{Part, Places, Stamp};
+use super::store_run::{Inputs, Part, Places, Stamp};
 use super::{Context, FleetError, Store};
+use crate::document::sha256_hex;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -85,7 +86,8 @@ pub fn run(job: &Job<'_>, watch: &dyn Watch) -> Result<String, FleetError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(job.effort.threads).build();
     let pool = pool.map_err(|source| FleetError::Threads { source })?;
     let mut store = open(job)?;
-    let run = store.begin(job.run, &job.context.digest, job.source.count(), &job.stamp)?.run;
+    let inputs = inputs(job);
+    let run = store.begin(job.run, &inputs, &job.stamp)?.run;
     let library = library(job, &mut store, &run, &pool, watch)?;
     slots(job, &mut store, &run, &library, &pool, watch)?;
     // One process concludes, the others wait for it.
@@ -97,6 +99,13 @@ pub fn run(job: &Job<'_>, watch: &dyn Watch) -> Result<String, FleetError> {
         }
     }
     Ok(run)
+}
+
+/// What the run works on: the names of all slots, in order, are part of it.
+fn inputs(job: &Job<'_>) -> Inputs {
+    let slots = job.source.count();
+    let names: String = (0..slots).map(|i| job.source.name(i).id() + "\n").collect();
+    Inputs { config: job.context.digest.clone(), slots, list: sha256_hex(names.as_bytes()) }
 }
 
 /// What comes after the last slot: explanations, shared tables, proposals.
@@ -220,7 +229,10 @@ fn slots(
     let plants = library.plants();
     let one = |i: usize| work(job.context, library, &plants, i, job.source.name(i), job.source.load(i));
     let chunk = job.effort.chunk.max(1);
-    let mut writer_store = open(job)?;
+    let mut writer_store = store.again()?;
+    if let Some(pages) = job.effort.limit_pages {
+        writer_store.limit_pages(pages)?;
+    }
     std::thread::scope(|scope| {
         let (send, receive) = sync_channel::<Vec<SlotRow>>(UNDERWAY);
         let writer = scope.spawn(move || write(&mut writer_store, run, &receive));

@@ -6,7 +6,7 @@
 use super::settings::Input;
 use super::{FleetError, table_source};
 use crate::controller::Controller;
-use crate::document::{read_toml, sha256_hex};
+use crate::document::{check_name, parse_toml, printable, read_text, sha256_hex};
 use crate::gate::features::{RawMachine, read_files};
 use std::path::{Path, PathBuf};
 
@@ -24,6 +24,15 @@ impl SlotName {
     pub fn id(&self) -> String {
         format!("{}/{}", self.tester, self.slot)
     }
+
+    /// Holds both to the alphabet of names.
+    pub fn check(&self) -> Result<(), FleetError> {
+        let named = |what: &str, name: &str| {
+            check_name(name).map_err(|source| FleetError::Name { what: what.to_owned(), source })
+        };
+        named("tester", &self.tester)?;
+        named("slot", &self.slot)
+    }
 }
 
 /// One slot as loaded.
@@ -33,6 +42,8 @@ pub struct Loaded {
     pub machine: RawMachine,
     /// The gains in the slot; none where it names none.
     pub controller: Option<Controller>,
+    /// The text of its file.
+    pub controller_text: Option<String>,
     /// Temperature while it was measured (deg C), where known.
     pub temperature_c: Option<f64>,
     /// What is broken, in words.
@@ -61,6 +72,8 @@ pub(super) struct SlotFiles {
     pub controller: PathBuf,
     pub controller_named: bool,
     pub temperature_c: Option<f64>,
+    /// What is wrong with the slot's place in the input; then none of its files is read.
+    pub refused: Option<String>,
 }
 
 /// Slots in files.
@@ -71,6 +84,10 @@ pub struct FileSource {
 
 /// Keys of a log that hold the temperature while the slot was measured (deg C), the first that is there.
 const TEMPERATURE: [&str; 2] = ["base_temperature_c", "temperature_c"];
+
+/// Temperatures of a base that are taken (deg C), and how that is said.
+pub(super) const CELSIUS: std::ops::RangeInclusive<f64> = -100.0..=200.0;
+pub(super) const EXPECTED_CELSIUS: &str = "degrees Celsius from -100 to 200";
 
 impl FileSource {
     /// The slots of a FLEET.toml's input; made-up ones are refused, the command line draws them.
@@ -93,7 +110,11 @@ impl FileSource {
             for place in folders(&inside)? {
                 let word = |p: &Path| p.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
                 let name = SlotName { tester: word(&tester), slot: word(&place) };
-                slots.push((name, SlotFiles::in_folder(&place)));
+                let shown = || printable(&place.display().to_string());
+                slots.push(match name.check() {
+                    Ok(()) => (name, SlotFiles::in_folder(&place)),
+                    Err(e) => SlotFiles::refused(slots.len(), format!("{}: {e}", shown())),
+                });
             }
         }
         if slots.is_empty() {
@@ -104,6 +125,20 @@ impl FileSource {
 }
 
 impl SlotFiles {
+    /// A slot that is a row and nothing else: its name stands outside the alphabet of names, so that it is no other slot's and no path.
+    pub(super) fn refused(index: usize, why: String) -> (SlotName, SlotFiles) {
+        let name = SlotName { tester: "?".into(), slot: format!("input {}", index + 1) };
+        (name, SlotFiles { refused: Some(why), ..SlotFiles::default() })
+    }
+
+    /// What is no file to be read: a device, a pipe or a folder in its place.
+    fn irregular(&self) -> Vec<String> {
+        let files = [&self.response, &self.pes, &self.log, &self.controller];
+        let there = |f: &&&PathBuf| f.metadata().is_ok_and(|m| !m.is_file());
+        let words = |f: &PathBuf| format!("{}: found a folder, a pipe or a device; expected a file", f.display());
+        files.iter().filter(there).map(|f| words(f)).collect()
+    }
+
     pub(super) fn in_folder(folder: &Path) -> SlotFiles {
         SlotFiles {
             response: folder.join("response.bod"),
@@ -111,7 +146,7 @@ impl SlotFiles {
             log: folder.join("log.toml"),
             controller: folder.join("controller.toml"),
             controller_named: false,
-            temperature_c: None,
+            ..SlotFiles::default()
         }
     }
 }
@@ -141,26 +176,41 @@ impl SlotSource for FileSource {
 
     fn load(&self, index: usize) -> Loaded {
         let (name, files) = &self.slots[index];
-        let (machine, problems) = read_files(name.id(), &files.response, &files.pes, &files.log);
-        let mut problems: Vec<String> = problems.iter().map(|p| p.reason.to_string()).collect();
-        let mut controller = None;
+        let mut problems: Vec<String> = files.refused.iter().cloned().chain(files.irregular()).collect();
+        if !problems.is_empty() {
+            let digest = sha256_hex(problems.join("\n").as_bytes());
+            let machine = RawMachine { id: name.id(), ..RawMachine::default() };
+            return Loaded { machine, problems, digest, ..Loaded::default() };
+        }
+        let (machine, broken) = read_files(name.id(), &files.response, &files.pes, &files.log);
+        problems.extend(broken.iter().map(|p| p.reason.to_string()));
+        let (mut controller, mut controller_text) = (None, None);
         if files.controller_named || files.controller.exists() {
-            match read_toml::<Controller>(&files.controller) {
-                Ok(c) => match c.check() {
-                    Ok(()) => controller = Some(c),
+            let read = read_text(&files.controller);
+            match read.and_then(|text| Ok((parse_toml::<Controller>(&files.controller, &text)?, text))) {
+                Ok((c, text)) => match c.check() {
+                    Ok(()) => (controller, controller_text) = (Some(c), Some(text)),
                     Err(e) => problems.push(format!("{}: {e}", files.controller.display())),
                 },
                 Err(e) => problems.push(e.to_string()),
             }
         }
-        let logged = || TEMPERATURE.iter().find_map(|k| machine.log.iter().find(|e| e.key == *k)).map(|e| e.value);
-        let temperature_c = files.temperature_c.or_else(logged);
+        let logged = || TEMPERATURE.iter().find_map(|k| machine.log.iter().find(|e| e.key == *k));
+        let mut temperature_c = files.temperature_c;
+        if let Some(entry) = logged().filter(|_| temperature_c.is_none()) {
+            temperature_c = Some(entry.value);
+            if !CELSIUS.contains(&entry.value) {
+                let (file, key, found) = (files.log.display(), &entry.key, entry.value);
+                problems.push(format!("{file}: {key} = {found}: expected {EXPECTED_CELSIUS}"));
+            }
+        }
         let mut text = format!("{temperature_c:?}\n");
         for file in [&files.response, &files.pes, &files.log, &files.controller] {
             // A file that cannot be read is already among the problems.
             let bytes = std::fs::read(file).unwrap_or_default();
             text += &sha256_hex(&bytes);
         }
-        Loaded { machine, controller, temperature_c, problems, digest: sha256_hex(text.as_bytes()) }
+        let digest = sha256_hex(text.as_bytes());
+        Loaded { machine, controller, controller_text, temperature_c, problems, digest }
     }
 }

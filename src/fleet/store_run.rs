@@ -5,8 +5,11 @@
 
 use super::explain::Explained;
 use super::row::{SlotRow, Verdict};
+use super::seal::{EXPLAINED, PARTS, PILOTS, RUNS, SLOTS, Sealed, maybe, stop, text};
 use super::{FleetError, Store};
-use rusqlite::{OptionalExtension, params};
+use crate::document::check_name;
+use rusqlite::types::Value;
+use rusqlite::{Connection, OptionalExtension, params};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
@@ -22,6 +25,8 @@ pub struct Run {
     pub config: String,
     /// Slots of its input.
     pub slots: usize,
+    /// Digest of their names, in order; empty for a run of an earlier version.
+    pub list: String,
     /// When it was begun, as it was told.
     pub started: String,
     /// By whom.
@@ -39,9 +44,8 @@ pub struct Stamp {
     pub at: String,
 }
 
-const RUN: &str = "SELECT seq, run, config, slots, started, who, finished FROM runs";
-
 fn run_of(r: &rusqlite::Row<'_>) -> Result<Run, rusqlite::Error> {
+    RUNS.hold(r)?;
     Ok(Run {
         seq: r.get(0)?,
         run: r.get(1)?,
@@ -49,8 +53,41 @@ fn run_of(r: &rusqlite::Row<'_>) -> Result<Run, rusqlite::Error> {
         slots: r.get::<_, i64>(3)?.unsigned_abs() as usize,
         started: r.get(4)?,
         who: r.get(5)?,
-        finished: r.get(6)?,
+        list: r.get(6)?,
+        finished: r.get(7)?,
     })
+}
+
+/// A run by its name.
+pub(super) fn run_named(c: &Connection, name: &str) -> Result<Option<Run>, rusqlite::Error> {
+    c.query_row(&format!("{} WHERE t.run = ?1", RUNS.select()), [name], run_of).optional()
+}
+
+fn put_run(c: &Connection, verb: &str, run: &Run) -> Result<(), rusqlite::Error> {
+    let Run { seq, run, config, slots, started, who, list, finished } = run;
+    let slots = Value::Integer(*slots as i64);
+    let values = vec![
+        Value::Integer(*seq),
+        text(run.as_str()),
+        text(config.as_str()),
+        slots,
+        text(started.as_str()),
+        text(who.as_str()),
+        text(list.as_str()),
+        maybe(finished.as_deref()),
+    ];
+    RUNS.put(c, verb, values).map(|_| ())
+}
+
+/// What a run works on, by which it is told whether it may go on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Inputs {
+    /// Digest of settings, spec, gains, gate and program.
+    pub config: String,
+    /// Slots.
+    pub slots: usize,
+    /// Digest of their names, in order.
+    pub list: String,
 }
 
 pub(super) fn json(value: &impl Serialize) -> Result<String, FleetError> {
@@ -70,7 +107,7 @@ pub(super) enum Part {
 }
 
 impl Part {
-    fn column(self) -> &'static str {
+    fn word(self) -> &'static str {
         match self {
             Part::Library => "library",
             Part::Rest => "rest",
@@ -87,10 +124,10 @@ pub(super) enum Places {
 }
 
 impl Places {
-    fn table(self) -> &'static str {
+    fn table(self) -> &'static Sealed {
         match self {
-            Places::Pilots => "pilots",
-            Places::Explained => "explained",
+            Places::Pilots => &PILOTS,
+            Places::Explained => &EXPLAINED,
         }
     }
 }
@@ -99,16 +136,14 @@ impl Store {
     /// All runs, oldest first.
     pub fn runs(&self) -> Result<Vec<Run>, FleetError> {
         let fail = self.fail("list its runs");
-        let mut query = self.connection.prepare(&format!("{RUN} ORDER BY seq")).map_err(&fail)?;
+        let mut query = self.connection.prepare(&format!("{} ORDER BY t.seq", RUNS.select())).map_err(&fail)?;
         let rows = query.query_map([], run_of).map_err(&fail)?;
         rows.collect::<Result<_, _>>().map_err(&fail)
     }
 
     /// A run by its name.
     pub fn run(&self, name: &str) -> Result<Run, FleetError> {
-        let query = format!("{RUN} WHERE run = ?1");
-        let found = self.connection.query_row(&query, [name], run_of).optional().map_err(self.fail("find a run"))?;
-        match found {
+        match run_named(&self.connection, name).map_err(self.fail("find a run"))? {
             Some(run) => Ok(run),
             None => {
                 let names: Vec<String> = self.runs()?.into_iter().map(|r| r.run).collect();
@@ -117,29 +152,41 @@ impl Store {
         }
     }
 
-    /// Begins a run, or goes on with it: by its name; without one the last run where it has the same settings and is not finished, else a new
-    /// one. A name that stands for other settings is refused.
-    pub fn begin(&mut self, name: Option<&str>, config: &str, slots: usize, stamp: &Stamp) -> Result<Run, FleetError> {
+    /// Begins a run, or goes on with it: by its name; without one the last run where it has the same inputs and is not finished, else a new
+    /// one. A name that stands for other inputs is refused: other settings, or another list of slots.
+    pub fn begin(&mut self, name: Option<&str>, inputs: &Inputs, stamp: &Stamp) -> Result<Run, FleetError> {
+        if let Some(name) = name {
+            check_name(name).map_err(|source| FleetError::Name { what: "name of the run".into(), source })?;
+        }
         let run = self.write("begin a run", |c| {
-            let last = c.query_row(&format!("{RUN} ORDER BY seq DESC LIMIT 1"), [], run_of).optional()?;
-            let same = |r: &Run| r.config == config && r.slots == slots;
-            let name = match (name, &last) {
+            let last = c.query_row(&format!("{} ORDER BY t.seq DESC LIMIT 1", RUNS.select()), [], run_of).optional()?;
+            let same = |r: &Run| r.config == inputs.config && r.slots == inputs.slots && r.list == inputs.list;
+            let seq = last.as_ref().map_or(0, |r| r.seq) + 1;
+            let name = match (name, last) {
                 (Some(name), _) => name.to_owned(),
-                (None, Some(r)) if same(r) && r.finished.is_none() => r.run.clone(),
-                (None, last) => format!("run-{:04}", last.as_ref().map_or(0, |r| r.seq) + 1),
+                (None, Some(r)) if same(&r) && r.finished.is_none() => r.run,
+                (None, _) => format!("run-{seq:04}"),
             };
-            let query = "INSERT OR IGNORE INTO runs (run, config, slots, started, who) VALUES (?1, ?2, ?3, ?4, ?5)";
-            c.execute(query, params![name, config, slots as i64, stamp.at, stamp.who])?;
-            c.query_row(&format!("{RUN} WHERE run = ?1"), [&name], run_of)
+            if let Some(run) = run_named(c, &name)? {
+                return Ok(run);
+            }
+            let Inputs { config, slots, list } = inputs.clone();
+            let (started, who) = (stamp.at.clone(), stamp.who.clone());
+            let run = Run { seq, run: name, config, slots, started, who, list, finished: None };
+            put_run(c, "INSERT", &run)?;
+            Ok(run)
         })?;
         let other = |key, stored: String, found: String| {
             Err(FleetError::OtherInputs { run: run.run.clone(), key, stored, found })
         };
-        if run.config != config {
-            return other("settings", run.config.clone(), config.to_owned());
+        if run.config != inputs.config {
+            return other("settings", run.config.clone(), inputs.config.clone());
         }
-        if run.slots != slots {
-            return other("slots", run.slots.to_string(), slots.to_string());
+        if run.slots != inputs.slots {
+            return other("slots", run.slots.to_string(), inputs.slots.to_string());
+        }
+        if run.list != inputs.list {
+            return other("another list of slots, with the digest", run.list.clone(), inputs.list.clone());
         }
         Ok(run)
     }
@@ -147,7 +194,9 @@ impl Store {
     /// Says that a run is finished, once.
     pub fn finish(&mut self, run: &str, stamp: &Stamp) -> Result<(), FleetError> {
         self.write("finish a run", |c| {
-            c.execute("UPDATE runs SET finished = ?2 WHERE run = ?1 AND finished IS NULL", params![run, stamp.at])?;
+            if let Some(found) = run_named(c, run)?.filter(|r| r.finished.is_none()) {
+                put_run(c, "REPLACE", &Run { finished: Some(stamp.at.clone()), ..found })?;
+            }
             c.execute("DELETE FROM claims WHERE run = ?1", [run])
         })?;
         Ok(())
@@ -155,38 +204,37 @@ impl Store {
 
     /// A part of a run.
     pub(super) fn part<T: DeserializeOwned>(&self, run: &str, part: Part) -> Result<Option<T>, FleetError> {
-        let query = format!("SELECT {} FROM runs WHERE run = ?1", part.column());
-        let text: Option<String> =
-            self.connection.query_row(&query, [run], |r| r.get(0)).map_err(self.fail("read a part of a run"))?;
-        text.map(|t| of_json(&t)).transpose()
+        let query = format!("{} WHERE t.run = ?1 AND t.part = ?2", PARTS.select());
+        let found = |r: &rusqlite::Row<'_>| PARTS.hold(r).and_then(|()| r.get::<_, String>(2));
+        let text = self.connection.query_row(&query, [run, part.word()], found).optional();
+        text.map_err(self.fail("read a part of a run"))?.map(|t| of_json(&t)).transpose()
     }
 
     /// Keeps a part of a run, unless it is there.
     pub(super) fn keep_part(&mut self, run: &str, part: Part, value: &impl Serialize) -> Result<(), FleetError> {
-        let text = json(value)?;
-        let query = format!("UPDATE runs SET {0} = ?2 WHERE run = ?1 AND {0} IS NULL", part.column());
-        self.write("keep a part of a run", |c| c.execute(&query, params![run, text]))?;
+        let values = vec![text(run), text(part.word()), text(json(value)?)];
+        self.write("keep a part of a run", |c| PARTS.put(c, "INSERT OR IGNORE", values))?;
         Ok(())
     }
 
     /// What stands in a table of places, by place.
     pub(super) fn places<T: DeserializeOwned>(&self, run: &str, places: Places) -> Result<Vec<(usize, T)>, FleetError> {
         let fail = self.fail("read a part of a run");
-        let query = format!("SELECT place, found FROM {} WHERE run = ?1 ORDER BY place", places.table());
+        let table = places.table();
+        let query = format!("{} WHERE t.run = ?1 ORDER BY t.place", table.select());
         let mut query = self.connection.prepare(&query).map_err(&fail)?;
-        let rows = query.query_map([run], |r| Ok((r.get::<_, i64>(0)?, r.get::<_, String>(1)?))).map_err(&fail)?;
-        let mut all = Vec::new();
-        for row in rows {
-            let (place, text) = row.map_err(&fail)?;
-            all.push((place.unsigned_abs() as usize, of_json(&text)?));
-        }
-        Ok(all)
+        let found = |r: &rusqlite::Row<'_>| {
+            table.hold(r)?;
+            Ok((r.get::<_, i64>(1)?.unsigned_abs() as usize, r.get::<_, String>(2)?))
+        };
+        let rows = query.query_map([run], found).map_err(&fail)?;
+        rows.map(|row| row.map_err(&fail).and_then(|(place, text)| Ok((place, of_json(&text)?)))).collect()
     }
 
     /// Which places are there.
     pub(super) fn places_done(&self, run: &str, places: Places) -> Result<BTreeSet<usize>, FleetError> {
         let fail = self.fail("read a part of a run");
-        let query = format!("SELECT place FROM {} WHERE run = ?1", places.table());
+        let query = format!("SELECT place FROM {} WHERE run = ?1", places.table().table);
         let mut query = self.connection.prepare(&query).map_err(&fail)?;
         let rows = query.query_map([run], |r| r.get::<_, i64>(0)).map_err(&fail)?;
         rows.map(|r| r.map(|p| p.unsigned_abs() as usize)).collect::<Result<_, _>>().map_err(&fail)
@@ -205,18 +253,11 @@ impl Store {
         found: &[(usize, Explained)],
         served: &[SlotRow],
     ) -> Result<(), FleetError> {
-        let texts = found.iter().map(|(p, f)| Ok((*p as i64, json(f)?))).collect::<Result<Vec<_>, FleetError>>()?;
-        let rows = served
-            .iter()
-            .map(|r| Ok((r.index as i64, r.verdict.word(), json(r)?)))
-            .collect::<Result<Vec<_>, FleetError>>()?;
+        let found = found.iter().map(|(p, f)| place_values(run, *p, f)).collect::<Result<Vec<_>, _>>()?;
+        let served = served.iter().map(|r| row_values(run, r)).collect::<Result<Vec<_>, _>>()?;
         self.write("add explanations", |c| {
-            let mut insert =
-                c.prepare_cached("INSERT OR IGNORE INTO explained (run, place, found) VALUES (?1, ?2, ?3)")?;
-            texts.iter().try_for_each(|(p, text)| insert.execute(params![run, p, text]).map(|_| ()))?;
-            let mut update =
-                c.prepare_cached("UPDATE slots SET verdict = ?3, row = ?4 WHERE run = ?1 AND place = ?2")?;
-            rows.iter().try_for_each(|(p, verdict, row)| update.execute(params![run, p, verdict, row]).map(|_| ()))
+            found.into_iter().try_for_each(|v| EXPLAINED.put(c, "INSERT OR IGNORE", v).map(|_| ()))?;
+            served.into_iter().try_for_each(|v| SLOTS.put(c, "REPLACE", v).map(|_| ()))
         })
     }
 
@@ -227,26 +268,16 @@ impl Store {
         places: Places,
         found: &[(usize, T)],
     ) -> Result<(), FleetError> {
-        let texts = found.iter().map(|(p, f)| Ok((*p as i64, json(f)?))).collect::<Result<Vec<_>, FleetError>>()?;
-        let query = format!("INSERT OR IGNORE INTO {} (run, place, found) VALUES (?1, ?2, ?3)", places.table());
+        let found = found.iter().map(|(p, f)| place_values(run, *p, f)).collect::<Result<Vec<_>, _>>()?;
         self.write("add to a run", |c| {
-            let mut insert = c.prepare_cached(&query)?;
-            texts.iter().try_for_each(|(p, text)| insert.execute(params![run, p, text]).map(|_| ()))
+            found.into_iter().try_for_each(|v| places.table().put(c, "INSERT OR IGNORE", v).map(|_| ()))
         })
     }
 
     /// Adds rows in one transaction; a row that is there stays as it is.
     pub fn add_rows(&mut self, run: &str, rows: &[SlotRow]) -> Result<(), FleetError> {
-        let texts = rows.iter().map(json).collect::<Result<Vec<_>, FleetError>>()?;
-        self.write("add slots", |c| {
-            let query =
-                "INSERT OR IGNORE INTO slots (run, place, slot, digest, verdict, row) VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
-            let mut insert = c.prepare_cached(query)?;
-            for (row, text) in rows.iter().zip(&texts) {
-                insert.execute(params![run, row.index as i64, row.id(), row.digest, row.verdict.word(), text])?;
-            }
-            Ok(())
-        })
+        let rows = rows.iter().map(|r| row_values(run, r)).collect::<Result<Vec<_>, _>>()?;
+        self.write("add slots", |c| rows.into_iter().try_for_each(|v| SLOTS.put(c, "INSERT OR IGNORE", v).map(|_| ())))
     }
 
     /// Places of a run that are done, within `from..to`.
@@ -266,7 +297,7 @@ impl Store {
         Ok(count.unsigned_abs() as usize)
     }
 
-    /// Hands every row of a run to `f`, in order, one at a time.
+    /// Hands every row of a run to `f`, in order, one at a time; with a verdict those of that verdict. Every row is held to its seal.
     pub fn each_row(
         &self,
         run: &str,
@@ -274,21 +305,38 @@ impl Store {
         mut f: impl FnMut(SlotRow) -> Result<(), FleetError>,
     ) -> Result<(), FleetError> {
         let fail = self.fail("read slots");
-        let query = "SELECT row FROM slots WHERE run = ?1 AND (?2 IS NULL OR verdict = ?2) ORDER BY place";
-        let mut query = self.connection.prepare(query).map_err(&fail)?;
-        let mut rows = query.query(params![run, verdict.map(Verdict::word)]).map_err(&fail)?;
+        let query = format!("{} WHERE t.run = ?1 ORDER BY t.place", SLOTS.select());
+        let mut query = self.connection.prepare(&query).map_err(&fail)?;
+        let mut rows = query.query([run]).map_err(&fail)?;
         while let Some(row) = rows.next().map_err(&fail)? {
-            let text: String = row.get(0).map_err(&fail)?;
-            f(of_json(&text)?)?;
+            // Chosen here and not by the database: a verdict that has changed must not pass for another one.
+            let row = slot_row(row).map_err(&fail)?;
+            if verdict.is_none_or(|v| v == row.verdict) {
+                f(row)?;
+            }
         }
         Ok(())
     }
 
     /// The row of a slot in a run.
     pub fn row(&self, run: &str, slot: &str) -> Result<Option<SlotRow>, FleetError> {
-        let query = "SELECT row FROM slots WHERE slot = ?1 AND run = ?2";
-        let text: Option<String> =
-            self.connection.query_row(query, [slot, run], |r| r.get(0)).optional().map_err(self.fail("find a slot"))?;
-        text.map(|t| of_json(&t)).transpose()
+        let query = format!("{} WHERE t.slot = ?1 AND t.run = ?2", SLOTS.select());
+        self.connection.query_row(&query, [slot, run], slot_row).optional().map_err(self.fail("find a slot"))
     }
+}
+
+/// A row read by the `SELECT` of [`SLOTS`].
+pub(super) fn slot_row(row: &rusqlite::Row<'_>) -> Result<SlotRow, rusqlite::Error> {
+    SLOTS.hold(row)?;
+    of_json(&row.get::<_, String>(5)?).map_err(stop)
+}
+
+fn row_values(run: &str, row: &SlotRow) -> Result<Vec<Value>, FleetError> {
+    let place = Value::Integer(row.index as i64);
+    let words = [row.id(), row.digest.clone(), row.verdict.word().to_owned(), json(row)?].map(Value::Text);
+    Ok([text(run), place].into_iter().chain(words).collect())
+}
+
+fn place_values(run: &str, place: usize, found: &impl Serialize) -> Result<Vec<Value>, FleetError> {
+    Ok(vec![text(run), Value::Integer(place as i64), text(json(found)?)])
 }

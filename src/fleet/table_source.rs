@@ -4,8 +4,8 @@
 //! Paths are relative to the table's folder; an empty field is absent. A Parquet table has the same columns.
 
 use super::FleetError;
-use super::source::{FileSource, SlotFiles, SlotName};
-use crate::document::read_text;
+use super::source::{CELSIUS, EXPECTED_CELSIUS, FileSource, SlotFiles, SlotName};
+use crate::document::{printable, read_text};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -44,6 +44,15 @@ fn csv_rows(file: &Path) -> Result<Rows, FleetError> {
     Ok((header, rows))
 }
 
+/// A temperature of the table; nothing where the field is empty.
+fn temperature_c(field: &str) -> Result<Option<f64>, String> {
+    match field.parse::<f64>() {
+        _ if field.is_empty() => Ok(None),
+        Ok(c) if CELSIUS.contains(&c) => Ok(Some(c)),
+        _ => Err(format!("temperature_c: found `{}`; expected {EXPECTED_CELSIUS}, or nothing", printable(field))),
+    }
+}
+
 fn of_rows(file: &Path, header: &[String], rows: Vec<Vec<String>>) -> Result<FileSource, FleetError> {
     let place = |name: &str| header.iter().position(|h| h == name);
     for column in NEEDED {
@@ -60,6 +69,18 @@ fn of_rows(file: &Path, header: &[String], rows: Vec<Vec<String>>) -> Result<Fil
         let name = SlotName { tester: field("tester").to_owned(), slot: field("slot").to_owned() };
         // The header is line 1.
         let line = i as u64 + 2;
+        let temperature = temperature_c(field("temperature_c"));
+        let named = name.check().map_err(|e| e.to_string());
+        if let Err(why) = named.as_ref().and(temperature.as_ref().map(|_| &())) {
+            let (_, files) = SlotFiles::refused(i, format!("{}:{line}: {why}", file.display()));
+            // A good name stands in its row; one that is none does not.
+            let name = if named.is_ok() { name } else { SlotFiles::refused(i, String::new()).0 };
+            if let Some(first) = seen.insert(name.id(), line) {
+                return Err(FleetError::TwiceSlot { file: file.into(), line, first, slot: name.id() });
+            }
+            slots.push((name, files));
+            continue;
+        }
         if let Some(first) = seen.insert(name.id(), line) {
             return Err(FleetError::TwiceSlot { file: file.into(), line, first, slot: name.id() });
         }
@@ -69,7 +90,8 @@ fn of_rows(file: &Path, header: &[String], rows: Vec<Vec<String>>) -> Result<Fil
             log: path("log"),
             controller: path("controller"),
             controller_named: !field("controller").is_empty(),
-            temperature_c: field("temperature_c").parse().ok().filter(|c: &f64| c.is_finite()),
+            temperature_c: temperature.unwrap_or_default(),
+            refused: None,
         };
         slots.push((name, files));
     }

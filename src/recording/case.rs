@@ -1,7 +1,7 @@
 //! A case: a plant model, a controller, and records with their roles; `case.toml` of the contract.
 
 use super::{Record, RecordSettings, RecordingError};
-use crate::document::read_toml;
+use crate::document::{A_NAME, check_name, printable, read_toml};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -76,8 +76,8 @@ impl Case {
             found,
             expected,
         };
-        if read.id.is_empty() {
-            return Err(refuse("id", "an empty text".into(), "a name"));
+        if check_name(&read.id).is_err() {
+            return Err(refuse("id", format!("`{}`", printable(&read.id)), A_NAME));
         }
         if let Some(hz) = read.spindle_hz
             && !(hz.is_finite() && hz > 0.0)

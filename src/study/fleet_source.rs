@@ -40,6 +40,7 @@ impl SlotSource for TwinSource {
                 let words = format!("twin {} {} {index} {:?}", s.seed, s.run, machine.response);
                 Loaded {
                     controller: Some(slot.machine.truth.controller),
+                    controller_text: None,
                     temperature_c: Some(slot.temperature_c),
                     problems: Vec::new(),
                     digest: sha256_hex(words.as_bytes()),

@@ -2,7 +2,7 @@
 //!
 //! In: nothing. Out: [`FeatureError`] where no table can be made, [`Problem`] where a machine's features stay empty.
 
-use crate::document::DocumentError;
+use crate::document::{DocumentError, NameError};
 use crate::frf::FrfError;
 use crate::recording::RecordingError;
 use std::path::PathBuf;
@@ -37,6 +37,9 @@ pub struct Problem {
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "each field is named in the message")]
 pub enum Reason {
+    /// The folder's name is no id.
+    #[error("{}: {source}; rename the folder", folder.display())]
+    Name { folder: PathBuf, source: NameError },
     /// The file is not there.
     #[error("{}: not there; its features stay empty", file.display())]
     Absent { file: PathBuf },

@@ -6,11 +6,14 @@ use super::error::{FeatureError, Problem, Reason};
 use super::log::read_log;
 use super::machine::{PesRecord, RawMachine};
 use super::pes::WINDOW;
+use crate::document::{check_name, sha256_hex};
 use crate::frf::{Frf, ReadSettings, read_file};
 use crate::recording::read_columns;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
+/// Digits of the digest that stand for a name that is none.
+const SHOWN_DIGITS: usize = 12;
 const RESPONSE: &str = "response.bod";
 const PES: &str = "pes.csv";
 const LOG: &str = "log.toml";
@@ -51,9 +54,15 @@ pub fn read_machines(folders: &[PathBuf]) -> Vec<(RawMachine, Vec<Problem>)> {
     folders.par_iter().map(|folder| read_machine(folder)).collect()
 }
 
-/// Reads one machine folder. What is missing or broken is `None` and reported; the log is optional.
+/// Reads one machine folder. What is missing or broken is `None` and reported; the log is optional. Of a folder whose name is no name nothing is
+/// read: its row stands under `?` and the beginning of its digest, which is no other machine's id and no path.
 pub fn read_machine(folder: &Path) -> (RawMachine, Vec<Problem>) {
     let id = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    if let Err(source) = check_name(&id) {
+        let id = format!("?{}", &sha256_hex(id.as_bytes())[..SHOWN_DIGITS]);
+        let reason = Reason::Name { folder: folder.into(), source };
+        return (RawMachine { id: id.clone(), ..RawMachine::default() }, vec![Problem { id, reason }]);
+    }
     read_files(id, &folder.join(RESPONSE), &folder.join(PES), &folder.join(LOG))
 }
 

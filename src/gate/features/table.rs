@@ -138,6 +138,10 @@ fn short(value: f64) -> f64 {
 
 /// A field of CSV, in quotes where it must be.
 pub fn csv_field(text: &str) -> String {
+    // What a spreadsheet would take for a formula is shown as the text that it is.
+    let formula = text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err();
+    let shown = if formula { format!("'{text}") } else { text.to_owned() };
+    let text = shown.as_str();
     if text.contains([',', '"', '\n', '\r']) || text.trim() != text {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {
