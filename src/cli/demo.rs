@@ -6,7 +6,7 @@ use super::proof::{self, On, Proof};
 use super::slot::{self, Slot};
 use super::tune::{provenance, text};
 use super::{Ending, Failure, Screen, demo_diagnosis, demo_fleet, demo_gate, gated};
-use crate::document::{read_text, sha256_hex, write_text, write_whole};
+use crate::document::{FileSet, read_text, sha256_hex, write_text, write_whole};
 use crate::frf::{PhaseDisplay, ReadSettings, read_file, write_bod_as};
 use crate::identify::{IdentifySettings, identify};
 use crate::lti::PlantFile;
@@ -83,9 +83,12 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
         vec![digest("frf", sweep.source_digest.clone()), digest("controller", sha256_hex(controller_text.as_bytes()))];
     let table = GainTable::of(&outcome, spec.search.seed, sha256_hex(spec_text.as_bytes()), inputs)?;
     let gain_table = file("gains.toml");
-    table.write(&gain_table)?;
+    let mut files = FileSet::default();
+    let gains = table.text()?;
+    files.write(&gain_table, gains.as_str());
     let on = On::Sweep { sweep: &sweep, hold_included: false };
-    let certificate = proof::beside(&gain_table, &on, &file("spec.toml"), Uncertainty::default(), screen)?;
+    let certificate = proof::beside(&gain_table, &gains, &on, &file("spec.toml"), Uncertainty::default(), &mut files)?;
+    proof::commit(files, screen)?;
 
     screen.say("4/7 report");
     let page = slot::page(&Slot {

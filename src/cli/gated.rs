@@ -6,7 +6,7 @@
 use super::proof::{self, On, Proof};
 use super::{Failure, Screen};
 use crate::controller::Controller;
-use crate::document::sha256_hex;
+use crate::document::{FileSet, sha256_hex};
 use crate::frf::{ReadSettings, read_file};
 use crate::gate::features::{features, machine_folders, read_machines};
 use crate::gate::{Action, Gate, Table, Verdict};
@@ -195,14 +195,18 @@ fn tuned(job: &Job<'_>, row: &mut Row, screen: &mut Screen) -> Result<(), Failur
     row.fate = if met { Fate::Tuned } else { Fate::LimitsNotMet };
     if met || job.keep_infeasible {
         let gains = job.out.join(&row.id).join(GAINS);
-        table.write(&gains)?;
-        screen.say(&format!("wrote {}", gains.display()));
+        let text = table.text()?;
+        let mut files = FileSet::default();
+        files.write(&gains, text.as_str());
+        let mut says = None;
         if let Some(spec) = job.certify {
             let on = On::Sweep { sweep: &sweep, hold_included: job.hold == Hold::Included };
-            let proof = proof::beside(&gains, &on, spec, Uncertainty::default(), screen)?;
-            screen.say(&format!("machine {}: {}", row.id, proof.says));
+            let proof = proof::beside(&gains, &text, &on, spec, Uncertainty::default(), &mut files)?;
+            says = Some(format!("machine {}: {}", row.id, proof.says));
             row.certificate = Some(proof);
         }
+        proof::commit(files, screen)?;
+        says.iter().for_each(|words| screen.say(words));
         row.gains = Some(gains);
     } else {
         let (_, words) = super::slot::verdict(&outcome);

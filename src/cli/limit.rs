@@ -3,7 +3,7 @@
 use super::limit_arguments::LimitArguments;
 use super::{Ending, Failure, Screen, load};
 use crate::controller::Controller;
-use crate::document::{check_target, write_text};
+use crate::document::{FileSet, check_target, write_text};
 use crate::lti::Plant;
 use crate::report::limit::{limit_sentences, limit_table};
 use crate::tune::{
@@ -41,11 +41,8 @@ impl<'a> Document<'a> {
         Document { schema: "servotune.limit/1", limit, gains, best_in_structure, whole_structure, pid_gains_alone }
     }
 
-    fn write(&self, file: &Path, screen: &mut Screen) -> Result<(), Failure> {
-        let text = serde_json::to_string_pretty(self).map_err(|source| Failure::Json { source })?;
-        write_text(file, &(text + "\n"))?;
-        screen.say(&format!("wrote {}", file.display()));
-        Ok(())
+    fn text(&self) -> Result<String, Failure> {
+        Ok(serde_json::to_string_pretty(self).map_err(|source| Failure::Json { source })? + "\n")
     }
 }
 
@@ -91,13 +88,14 @@ pub(super) struct Gap {
 /// Starts of the search that a table is compared with.
 const STARTS: usize = 24;
 
-/// Bounds what any loop of the class could do for this plant, searches the spec's structure from many starts, and writes both beside the
-/// table (`gains.limit.json`).
+/// Bounds what any loop of the class could do for this plant, searches the spec's structure from many starts, and adds both to the files written beside
+/// the table (`gains.limit.json`).
 pub(super) fn beside(
     gains: &Path,
     controller: &Controller,
     plant: &Plant,
     spec: &Spec,
+    files: &mut FileSet,
     screen: &mut Screen,
 ) -> Result<Gap, Failure> {
     let t = controller.sample_time_s;
@@ -109,7 +107,7 @@ pub(super) fn beside(
     let best = searched(plant, &seen, spec, Some(controller), t, STARTS)?;
     let within = Within::of(plant, controller, spec)?;
     let file = gains.with_extension("limit.json");
-    Document::of(&bound, Some(&own), Some(&best), Some(&within)).write(&file, screen)?;
+    files.write(&file, Document::of(&bound, Some(&own), Some(&best), Some(&within)).text()?);
     let (structure, alone) = (Some(&within.structure), Some(&within.alone));
     Ok(Gap { file, says: limit_sentences(&bound, Some(&own), Some((&best, STARTS)), structure, alone) })
 }
@@ -135,7 +133,8 @@ pub(super) fn run(a: &LimitArguments, screen: &mut Screen) -> Result<Ending, Fai
     let within = gains.as_ref().map(|g| Within::of(&plant, g, &spec)).transpose()?;
     let document = Document::of(&found, figures.as_ref(), searched.as_ref(), within.as_ref());
     if let Some(file) = &a.out {
-        document.write(file, screen)?;
+        write_text(file, &document.text()?)?;
+        screen.say(&format!("wrote {}", file.display()));
     }
     let mut text = limit_table(&found, figures.as_ref(), &plant.position_unit)?.text();
     let (structure, alone) = (within.as_ref().map(|w| &w.structure), within.as_ref().map(|w| &w.alone));

@@ -4,7 +4,7 @@
 //! Spec: `specs/certificate.md`.
 
 use super::{Failure, Screen, verify};
-use crate::document::write_text;
+use crate::document::FileSet;
 use crate::frf::Sweep;
 use crate::report::certificate::certificate_sentence;
 use crate::tune::Spec;
@@ -31,34 +31,41 @@ pub(super) enum On<'a> {
     Sweep { sweep: &'a Sweep, hold_included: bool },
 }
 
-/// Proves the table at `gains` over the box `u` and writes the certificate beside it. That a plant is beyond the proof, or a sweep ends too early, stops no
-/// tuning: it is said.
+/// Proves `table`, which is to stand at `gains`, over the box `u` and adds the certificate to the files to be written. That a plant is beyond the proof, or a sweep
+/// ends too early, stops no tuning: it is said.
 pub(super) fn beside(
     gains: &Path,
+    table: &str,
     on: &On<'_>,
     spec: &Path,
     u: Uncertainty,
-    screen: &mut Screen,
+    files: &mut FileSet,
 ) -> Result<Proof, Failure> {
     let file = verify::beside(gains);
-    Ok(match prove(gains, on, spec, u) {
+    let gains = Source { file: gains.into(), text: table.into() };
+    Ok(match prove(&gains, on, spec, u) {
         Ok(c) => {
-            write_text(&file, &c.text()?)?;
-            screen.say(&format!("wrote {}", file.display()));
+            files.write(&file, c.text()?);
             Proof { file: Some(file), proved: c.proved, says: certificate_sentence(&c) }
         }
         Err(e) => {
             // One of an earlier table would speak of this one.
-            if file.exists() {
-                std::fs::remove_file(&file).map_err(|source| Failure::Remove { file, source })?;
-            }
+            files.remove(&file);
             Proof { file: None, proved: false, says: format!("No certificate: {e}.") }
         }
     })
 }
 
+/// Writes all files of one result, or none, and says which.
+pub(super) fn commit(files: FileSet, screen: &mut Screen) -> Result<(), Failure> {
+    let names: Vec<String> = files.files().map(|f| f.display().to_string()).collect();
+    files.commit()?;
+    names.iter().for_each(|name| screen.say(&format!("wrote {name}")));
+    Ok(())
+}
+
 fn prove(
-    gains: &Path,
+    gains: &Source,
     on: &On<'_>,
     spec: &Path,
     uncertainty: Uncertainty,
@@ -72,7 +79,7 @@ fn prove(
         }
     }
     let inputs = Inputs {
-        gains: &Source::read(gains)?,
+        gains,
         plants: &plants,
         sweeps: &sweeps,
         assumption: SweepAssumption { least_damping: LEAST_DAMPING, hold_included: hold },

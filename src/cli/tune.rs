@@ -4,8 +4,8 @@ use super::arguments::{ModelArguments, TuneArguments};
 use super::proof::{self, On, Proof};
 use super::slot::{self, Slot};
 use super::{Ending, Failure, Screen, limit, load, physics, tune_machines};
-use crate::document::{check_target, read_text, sha256_hex, write_text};
-use crate::feedback::Amplitudes;
+use crate::document::{FileSet, check_target, read_text, sha256_hex};
+use crate::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
 use crate::frf::Sweep;
 use crate::identify::{self, Identified, IdentifySettings, identify};
 use crate::lti::Plant;
@@ -79,6 +79,14 @@ impl Given {
         }
     }
 
+    /// Whether `margins` would accept the loop: of a sweep it asks that the points tell stability.
+    fn knows(&self, controller: &crate::controller::Controller) -> Result<bool, Failure> {
+        let Given::Response { sweep, hold, .. } = self else { return Ok(true) };
+        let sections = controller.sections().map_err(crate::tune::TuneError::from)?;
+        let l = MeasuredLoop::new(&sweep.frf, &sections, *hold == Hold::Included)?;
+        Ok(measured_margins(&l)?.verdict != LoopVerdict::NotKnown)
+    }
+
     fn machine(&self) -> Machine<'_> {
         match self {
             Given::Model(plant, _) => Machine::Model(plant),
@@ -150,24 +158,32 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         None => {
             let outcome = tune(&given.machine(), &spec, start.as_ref(), &settings)?;
             let table = GainTable::of(&outcome, spec.search.seed, spec_sha256, inputs)?;
-            let tuned = matches!(outcome, Outcome::Tuned(_));
+            let known = given.knows(outcome.controller())?;
+            if !known {
+                screen.say(
+                    "stability is NOT KNOWN: within what these points leave open the loop of these gains may pass -1 on either side (`servotune margins --frf`); sweep more points around the crossings, or average longer",
+                );
+            }
+            let tuned = known && matches!(outcome, Outcome::Tuned(_));
             (outcome, table, tuned)
         }
     };
+    // All that belongs to one table appears together or not at all.
+    let mut files = FileSet::default();
     let (mut written, mut proof, mut gap) = (None, None, None);
     if tuned || a.keep_infeasible {
-        table.write(&a.out)?;
-        screen.say(&format!("wrote {}", a.out.display()));
+        let table = table.text()?;
+        files.write(&a.out, table.as_str());
         written = Some(a.out.as_path());
         if !a.no_certificate {
             let on = match (&given, &a.plant) {
                 (Given::Response { sweep, .. }, _) => On::Sweep { sweep, hold_included: a.hold_included },
                 (Given::Model(..), file) => On::Plant(file.as_deref().ok_or(Failure::NoMachine)?),
             };
-            proof = Some(proof::beside(&a.out, &on, &a.spec, a.uncertainty.unwrap_or_default(), screen)?);
+            proof = Some(proof::beside(&a.out, &table, &on, &a.spec, a.uncertainty.unwrap_or_default(), &mut files)?);
         }
         if a.gap {
-            gap = Some(limit::beside(&a.out, outcome.controller(), given.plant(), &spec, screen)?);
+            gap = Some(limit::beside(&a.out, outcome.controller(), given.plant(), &spec, &mut files, screen)?);
         }
     } else {
         screen.say("no gain table was written: the limits are not met (--keep-infeasible writes the compromise)");
@@ -176,9 +192,9 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         let physics = with.as_ref().map(|(p, t)| (p.as_ref(), t));
         let reached = Reached { outcome: &outcome, table: &table, physics };
         let page = report(a, &given, &spec, start.as_ref(), &settings, &reached)?;
-        write_text(file, &page)?;
-        screen.say(&format!("wrote {}", file.display()));
+        files.write(file, page);
     }
+    proof::commit(files, screen)?;
     let physics = with.as_ref().map(|(physics, t)| Physics {
         effects: physics.names(),
         amplitudes: &t.amplitudes,

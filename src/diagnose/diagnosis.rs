@@ -48,6 +48,11 @@ pub enum DiagnoseError {
         "the plant holds [[plant.physics]] effect \"{effect}\": a diagnosis starts from a linear plant; remove the table, and the effect is found again if it is there"
     )]
     Physics { effect: String },
+    /// The plant's simulation has nothing to do with the record.
+    #[error(
+        "record `{record}`: the plant as given simulates an error of {ratio:.1e} times the recorded motion; expected a model of this machine: check the units, the gains, the sample rate and the modes of the plant, or fit it anew (`servotune response`, `servotune identify`)"
+    )]
+    Unlike { record: String, ratio: f64 },
     /// Nothing moves.
     #[error("record `{record}`: the command never changes; expected a record in which the machine is driven")]
     Still { record: String },
@@ -117,6 +122,7 @@ pub fn diagnose(
     let law = controller.map(Law::new).transpose()?;
     let hygiene = check(case, &mut all, given, law.as_ref(), sample_time_s)?;
     let mut bench = Bench::new(given, all, sample_time_s, case.spindle_hz)?;
+    alike(&bench)?;
     let mut remarks = Vec::new();
     if controller.is_none() {
         progress("is the command held between samples, or measured");
@@ -175,6 +181,24 @@ pub fn diagnose(
     judge(&mut diagnosis, &bench, &selection, hygiene.finding, bumps);
     super::experiment::propose(&mut diagnosis, &bench, &selection);
     Ok(Diagnosed { diagnosis, bench, selection, corrected: fixed, refitted: refitted.plant, errors })
+}
+
+/// Most times that a simulation may exceed the recorded motion: beyond it the numbers of a fit lose all their digits.
+const UNLIKE: f64 = 1e6;
+
+/// Refuses a plant that simulates something else than these records.
+fn alike(bench: &Bench) -> Result<(), DiagnoseError> {
+    let none = vec![0.0; bench.form.knobs.len()];
+    for (record, error) in bench.means.iter().zip(bench.clone().fit(vec![]).errors(&none)) {
+        let mean = record.position.iter().sum::<f64>() / record.len() as f64;
+        let moved: Vec<f64> = record.position.iter().map(|x| x - mean).collect();
+        let size = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt();
+        let ratio = size(&error) / size(&moved);
+        if size(&moved) > 0.0 && (!ratio.is_finite() || ratio > UNLIKE) {
+            return Err(DiagnoseError::Unlike { record: record.name.clone(), ratio });
+        }
+    }
+    Ok(())
 }
 
 fn search(selection: &Selection) -> Vec<Tried> {

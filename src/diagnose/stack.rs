@@ -235,6 +235,10 @@ impl Normal {
             let gain = 2.0 * self.right.iter().sum::<f64>() - after;
             return Explained { gain, strengths: vec![1.0; m], concealed };
         }
+        // What overflowed on the way explains nothing, and no decomposition of it would end.
+        if !self.gram.iter().chain(&self.right).all(|x| x.is_finite()) {
+            return Explained { gain: 0.0, strengths: vec![0.0; m], concealed: 1.0 };
+        }
         // Scaled normal equations; directions that the others or the basis hold already are dropped.
         let unit = |i: usize| {
             let s = self.gram[(i, i)];

@@ -4,10 +4,13 @@
 //! No control meaning lives here; the rooms define what stands in their files. Files: `../shared/contract.md` is
 //! restated in `specs/files.md`.
 
+mod bounded;
 mod digest;
 mod read;
+pub mod size_limits;
 mod write;
 
+pub use bounded::{Bounded, OverLimit};
 pub use digest::sha256_hex;
-pub use read::{DocumentError, parse_toml, read_text, read_toml, way_on};
-pub use write::{check_target, temporary_beside, write_text, write_whole};
+pub use read::{DocumentError, parse_toml, read_table, read_text, read_toml, way_on};
+pub use write::{FileSet, check_target, temporary_beside, write_text, write_whole};

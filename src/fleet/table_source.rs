@@ -5,7 +5,7 @@
 
 use super::FleetError;
 use super::source::{FileSource, SlotFiles, SlotName};
-use crate::document::read_text;
+use crate::document::read_table;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -32,7 +32,7 @@ fn parquet_rows(file: &Path) -> Result<Rows, FleetError> {
 }
 
 fn csv_rows(file: &Path) -> Result<Rows, FleetError> {
-    let text = read_text(file)?;
+    let text = read_table(file)?;
     let fail = |source| FleetError::Csv { file: file.into(), source };
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());

@@ -8,14 +8,17 @@ mod bytes;
 mod causality;
 mod columns;
 mod decide;
+mod dead;
 mod error;
 mod estimate;
+mod gather;
 mod header;
 mod interpolate;
 mod minimum_phase;
 mod note;
 mod number;
 mod order;
+mod outlier;
 mod phase;
 mod read;
 mod response;
@@ -27,8 +30,10 @@ mod write;
 
 pub use algebra::{feedback, product, ratio};
 pub use causality::{Evidence, Misfit, Reading};
+pub use dead::{Channel, Dead};
 pub use error::{Doubt, FrfError, NotText, Question};
 pub use estimate::{Estimate, PeriodicSettings, SegmentSettings, periodic, segments};
+pub use gather::{GATHERED_ABOVE, Gathered, gathered};
 pub use interpolate::{Interpolation, resample};
 pub use note::{Ground, Note};
 pub use phase::{check_order, phase_rad};
@@ -36,6 +41,6 @@ pub use read::{Sweep, read_bytes, read_file};
 pub use response::{Frf, FrfShapeError};
 pub use settings::{
     AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale,
-    PhaseConvention, ReadSettings, UnknownWord, Unsorted,
+    Outliers, PhaseConvention, ReadSettings, UnknownWord, Unsorted,
 };
 pub use write::{PhaseDisplay, write_bod, write_bod_as};

@@ -68,7 +68,7 @@ impl Table {
 
     /// Reads a CSV file. `label` names the column of classes; where the file lacks it, the table has no labels.
     pub fn read(file: &Path, label: Option<&str>) -> Result<Table, GateError> {
-        let text = crate::document::read_text(file)?;
+        let text = crate::document::read_table(file)?;
         Table::parse(file, &text, label)
     }
 

@@ -24,7 +24,6 @@ struct PlantTable {
     damping_ratio: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     viscous_rate_per_s: Option<f64>,
-    #[serde(default)]
     delay_s: f64,
     #[serde(default = "one")]
     resonance_gain: f64,

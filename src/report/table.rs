@@ -3,6 +3,7 @@
 //! In: columns with units, rows of cells. Out: HTML or plain text. Convention: every header has its unit, a missing
 //! value is a dash, a flag stands in words beside its number. Spec: `specs/report.md`.
 
+use crate::document::size_limits::{CELL, cut};
 use super::error::ReportError;
 use super::number::{MISSING, NumberFormat};
 use super::svg::harmful;
@@ -293,7 +294,7 @@ impl Cell {
 
 /// Control characters would break the columns, or talk to the terminal.
 fn one_line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() || harmful(c) { ' ' } else { c }).collect()
+    cut(text, CELL).chars().map(|c| if c.is_control() || harmful(c) { ' ' } else { c }).collect()
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::machine::{curve, measured_loop};
 use super::requirements::{Found, Judged, Requirement};
 use super::{Machine, Spec, TuneError};
 use crate::controller::Controller;
-use crate::feedback::{Margins, ModelLoop, margins};
+use crate::feedback::{Margins, ModelLoop, OpenLoop, confirmed_margins, margins};
 use crate::lti::DiscretePlant;
 use crate::pes::{HIGH_BAND_HZ, LOW_BAND_HZ, SpectralPes, SpectralWork, figures, simulate};
 use serde::Serialize;
@@ -23,16 +23,18 @@ pub fn judge(machine: &Machine<'_>, controller: &Controller, spec: &Spec) -> Res
     let wanted = Requirement::list(&spec.margins, &spec.limits);
     let sections = controller.sections()?;
     let mut found = Found::default();
+    let mut end_gain = None;
     let margins = match machine {
         Machine::Model(plant) => {
             let sampled = DiscretePlant::of(plant, controller.sample_time_s)?;
             let write = simulate(plant, controller, &spec.profile)?;
             let f = figures(&write.pes, &spec.profile);
-            (found.dft_low, found.dft_high) = (f.dft_low, f.dft_high);
+            // A limit on a band without a bin is refused with the spec; without a limit the norm of nothing weighs nothing.
+            (found.dft_low, found.dft_high) = (f.dft_low.unwrap_or(0.0), f.dft_high.unwrap_or(0.0));
             let of = |k: usize| f.harmonics.iter().find(|h| h.k == k).map_or(0.0, |h| h.amplitude);
             found.harmonics = spec.limits.harmonics.iter().map(|h| of(h.k)).collect();
             found.command_peak = write.command.iter().fold(0.0, |a, u| u.abs().max(a));
-            margins(&ModelLoop::new(&sampled, &sections)?)
+            confirmed_margins(&ModelLoop::new(&sampled, &sections)?)?
         }
         Machine::Response { frf, hold, continuation } => {
             let loop_ = measured_loop(frf, *hold, &sections)?;
@@ -46,12 +48,15 @@ pub fn judge(machine: &Machine<'_>, controller: &Controller, spec: &Spec) -> Res
             found.dft_high = s.dft().band(&amplitude, HIGH_BAND_HZ);
             let of = |k: usize| s.dft().bins().iter().position(|b| *b == k).map_or(0.0, |i| amplitude[i]);
             found.harmonics = spec.limits.harmonics.iter().map(|h| of(h.k)).collect();
+            end_gain = Some(loop_.at(loop_.end_rad_s()).norm());
             margins(&loop_)
         }
     };
     found.unstable_poles = margins.unstable_poles;
     found.phase_margin_deg = margins.phase_margin_deg;
-    found.gain_margin_db = margins.gain_margin_db;
+    // A sweep that ends before L turns negative has its last point to speak of; beyond it |L| is taken to stay below that.
+    found.within_sweep = end_gain.is_some();
+    found.gain_margin_db = margins.gain_margin_db.or(end_gain.map(|size| -20.0 * size.log10()));
     found.max_sensitivity = margins.max_sensitivity;
     found.gain_crossover_hz = margins.gain_crossover_hz;
     Ok(Proof { margins, judged: Judged::of(&wanted, found) })

@@ -3,7 +3,7 @@
 use super::TuneError;
 use crate::controller::Controller;
 use crate::feedback::{LoopOnGrid, MeasuredLoop, Pulls, ResponseCurve, SampledPlant, hold};
-use crate::frf::Frf;
+use crate::frf::{Frf, gathered};
 use crate::lti::{DiscretePlant, Plant, Section, Sections};
 use crate::pes::{
     ExpectedNoise, HIGH_BAND_HZ, LOW_BAND_HZ, NoiseWork, Profile, QuickScene, QuickWork, Scene, SpectralPes,
@@ -68,7 +68,9 @@ pub(super) fn curve(frf: &Frf, taken: Hold, continuation: Option<&Plant>, t: f64
         Hold::Included => Complex::new(1.0, 0.0),
         Hold::NotIncluded => hold(w * t),
     };
-    let mut curve = ResponseCurve::of(frf, t, held)?;
+    // A search reads the curve some hundred thousand times: of a long sweep the means of neighbours that lie on one line. Margins are judged over every point.
+    let long = gathered(frf);
+    let mut curve = ResponseCurve::of(long.as_ref().map_or(frf, |g| &g.frf), t, held)?;
     if let Some(plant) = continuation {
         curve = curve.continued(DiscretePlant::of(plant, t)?);
     }

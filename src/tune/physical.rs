@@ -87,8 +87,9 @@ pub fn judge_physical(
         gain_margin_db: described.worst.gain_margin_db,
         max_sensitivity: described.worst.max_sensitivity,
         gain_crossover_hz: farthest_crossover(&described, spec.margins.gain_crossover_hz),
-        dft_low: f.dft_low,
-        dft_high: f.dft_high,
+        dft_low: f.dft_low.unwrap_or(0.0),
+        dft_high: f.dft_high.unwrap_or(0.0),
+        within_sweep: false,
         harmonics: spec.limits.harmonics.iter().map(|h| of(h.k)).collect(),
         command_peak: write.command.iter().fold(0.0, |a, u| u.abs().max(a)),
     };

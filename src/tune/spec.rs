@@ -1,7 +1,7 @@
 //! spec.toml: what tuning must reach, and where it may search.
 
 use crate::document::{DocumentError, parse_toml, read_toml};
-use crate::pes::{Profile, ProfileError};
+use crate::pes::{HIGH_BAND_HZ, LOW_BAND_HZ, Profile, ProfileError};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -128,6 +128,11 @@ pub enum SpecError {
     /// A harmonic is not one of the window.
     #[error("limits.harmonics: k = {k}, but the window of {samples} samples has harmonics 1 to {last}")]
     Harmonic { k: usize, samples: usize, last: usize },
+    /// A band of the DFT in which the window has no bin.
+    #[error(
+        "{key}: the window of {samples} samples at {rate_hz} Hz has no DFT bin between {} and {} Hz (bins every {} Hz): nothing can be limited there; lengthen pes.window or leave the limit out", band_hz[0], band_hz[1], rate_hz / *samples as f64
+    )]
+    NoBin { key: &'static str, samples: usize, rate_hz: f64, band_hz: [f64; 2] },
     /// A harmonic is limited twice.
     #[error("limits.harmonics: k = {k} stands twice; expected each harmonic once")]
     Twice { k: usize },
@@ -196,6 +201,7 @@ impl Spec {
         at_least_zero("limits.dft_low", l.dft_low, f64::INFINITY, above)?;
         at_least_zero("limits.dft_high", l.dft_high, f64::INFINITY, above)?;
         at_least_zero("limits.command_peak", l.command_peak, f64::INFINITY, above)?;
+        self.limited_bands_have_bins()?;
         let [first, last] = self.profile.pes.window;
         let samples = last - first;
         for (i, h) in l.harmonics.iter().enumerate() {
@@ -219,6 +225,30 @@ impl Spec {
         interval("search.bounds.kd_s", b.kd_s, true)?;
         interval("search.bounds.lowpass_hz", b.lowpass_hz, false)?;
         interval("search.bounds.notch_hz", b.notch_hz, false)
+    }
+}
+
+impl Spec {
+    /// Refuses a limit on a band in which the window has no bin: its norm would be that of nothing, 0, and every limit met.
+    fn limited_bands_have_bins(&self) -> Result<(), SpecError> {
+        let l = &self.limits;
+        for (key, limit, band_hz) in
+            [("limits.dft_low", l.dft_low, LOW_BAND_HZ), ("limits.dft_high", l.dft_high, HIGH_BAND_HZ)]
+        {
+            if limit.is_some() && self.profile.bins_in(band_hz) == 0 {
+                let [first, last] = self.profile.pes.window;
+                let (samples, rate_hz) = (last - first, self.profile.pes.sample_rate_hz);
+                return Err(SpecError::NoBin { key, samples, rate_hz, band_hz });
+            }
+        }
+        // Without a limit the search lowers the sum of both: of no bin at all it would lower nothing and call that tuned.
+        if self.profile.bins_in(LOW_BAND_HZ) + self.profile.bins_in(HIGH_BAND_HZ) == 0 {
+            let [first, last] = self.profile.pes.window;
+            let (samples, rate_hz) = (last - first, self.profile.pes.sample_rate_hz);
+            let band_hz = [LOW_BAND_HZ[0], HIGH_BAND_HZ[1]];
+            return Err(SpecError::NoBin { key: "pes.window", samples, rate_hz, band_hz });
+        }
+        Ok(())
     }
 }
 

@@ -59,6 +59,7 @@ pub fn prove_loop(
     settings: &VerifySettings,
 ) -> Result<Bounds, VerifyError> {
     plant.check()?;
+    plant::fits(plant, sample_time_s, uncertainty)?;
     prove::prove(&Sampled::new(plant, sections, sample_time_s, uncertainty)?, settings)
 }
 
