@@ -338,6 +338,9 @@ pub(super) struct StudyArguments {
     /// Sizes of the floor (study `fleet-scale`)
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [1_000, 10_000, 100_000])]
     pub sizes: Vec<usize>,
+    /// Changed files (study `reliability-readers`)
+    #[arg(long, value_name = "N", default_value_t = 12_000)]
+    pub runs: usize,
     /// Kills (study `fleet-kills`)
     #[arg(long, value_name = "N", default_value_t = 500)]
     pub kills: usize,
@@ -383,6 +386,8 @@ pub(super) enum StudyName {
     FleetShared,
     /// The search for physics on records without any, for the cases in the folder --data
     FalseAlarms,
+    /// Changed files through every reader; memory and time of the largest inputs
+    ReliabilityReaders,
     /// Diagnoses of the cases in the folder --data, beside their answers
     Mismatch,
     /// Real recordings: EMPS, Silverbox, motor bench, mirror, diagnosed from a linear model

@@ -3,7 +3,7 @@
 use super::diagnose_arguments::DiagnoseArguments;
 use super::{Ending, Failure, Screen, load};
 use crate::diagnose::{DiagnoseSettings, Diagnosis, Verdict, diagnose};
-use crate::document::{check_target, FileSet};
+use crate::document::{FileSet, check_target};
 use crate::lti::PlantFile;
 use crate::recording::{Case, Record, RecordEntry, Role};
 use crate::report::diagnosis::diagnosis_page;

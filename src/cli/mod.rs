@@ -36,6 +36,7 @@ mod pareto;
 mod physics;
 mod polish_arguments;
 mod proof;
+mod reliability_readers;
 mod response;
 mod screen;
 mod simulate;

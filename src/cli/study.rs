@@ -1,7 +1,7 @@
 //! `servotune study`: the tables and pictures of `results/`, made again.
 
 use super::arguments::{StudyArguments, StudyName};
-use super::{Ending, Failure, Screen, fleet_kills, fleet_study};
+use super::{Ending, Failure, Screen, fleet_kills, fleet_study, reliability_readers};
 use crate::document::write_text;
 use crate::study;
 use serde::Serialize;
@@ -16,6 +16,7 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
     let own = match a.study {
         StudyName::Fleet => Some(fleet_study::floor(&a.out, screen)?),
         StudyName::FleetKills => Some(fleet_kills::kills(&a.out, a.kills, screen)?),
+        StudyName::ReliabilityReaders => Some(reliability_readers::readers(&a.out, a.runs, screen)?),
         StudyName::FleetScale => Some(fleet_study::scale(&a.out, &a.sizes, screen)?),
         StudyName::FleetShared => Some(fleet_study::shared(&a.out, screen)?),
         _ => None,
@@ -43,9 +44,11 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::Recordings => study::recordings(&a.data)?,
         StudyName::Motor => study::motor(&a.data)?,
         StudyName::Hdd => study::hdd(&a.data)?,
-        StudyName::Fleet | StudyName::FleetKills | StudyName::FleetScale | StudyName::FleetShared => {
-            study::Study::default()
-        }
+        StudyName::Fleet
+        | StudyName::FleetKills
+        | StudyName::FleetScale
+        | StudyName::FleetShared
+        | StudyName::ReliabilityReaders => study::Study::default(),
     };
     let mut written = Written { files: Vec::new() };
     for (name, content) in &made.files {

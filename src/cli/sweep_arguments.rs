@@ -1,8 +1,8 @@
 //! What a person can say about a sweep file and about the model wanted from it.
 
 use crate::frf::{
-    AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale,
-    Outliers, PhaseConvention, ReadSettings, Unsorted,
+    AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale, Outliers,
+    PhaseConvention, ReadSettings, Unsorted,
 };
 use crate::identify::{BodyChoice, Hold, IdentifySettings, OrderChoice, ZeroSide};
 use clap::{Args, ValueEnum};

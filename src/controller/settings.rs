@@ -1,7 +1,7 @@
 //! The whole controller: what stands in controller.toml.
 
-use crate::document::size_limits::{DAMPING, FILTER_DAMPING, VALUE};
 use super::{Feedforward, Lowpass, Notch, Pid};
+use crate::document::size_limits::{DAMPING, FILTER_DAMPING, VALUE};
 use crate::lti::{Section, SectionError, Sections};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -36,7 +36,9 @@ pub enum ControllerError {
     #[error("{key} = {found}: expected {expected}")]
     Range { key: &'static str, found: f64, expected: &'static str },
     /// A filter that hardly decays: nothing can be judged of a controller that rings for ever.
-    #[error("{filter} at {frequency_hz} Hz: its poles lie {away:e} from the unit circle; expected at least {least:e}: give it more damping or another corner")]
+    #[error(
+        "{filter} at {frequency_hz} Hz: its poles lie {away:e} from the unit circle; expected at least {least:e}: give it more damping or another corner"
+    )]
     Rings { filter: &'static str, frequency_hz: f64, away: f64, least: f64 },
     /// A filter cannot be put into a section at this sample time.
     #[error(transparent)]

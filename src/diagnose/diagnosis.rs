@@ -53,6 +53,11 @@ pub enum DiagnoseError {
         "record `{record}`: the plant as given simulates an error of {ratio:.1e} times the recorded motion; expected a model of this machine: check the units, the gains, the sample rate and the modes of the plant, or fit it anew (`servotune response`, `servotune identify`)"
     )]
     Unlike { record: String, ratio: f64 },
+    /// Nothing can be computed of these records under this plant.
+    #[error(
+        "{what} comes out as {found}: these records cannot be diagnosed under this plant; check the sample rate, the units, and the modes of the plant against half the sample rate"
+    )]
+    NotFinite { what: &'static str, found: f64 },
     /// Nothing moves.
     #[error("record `{record}`: the command never changes; expected a record in which the machine is driven")]
     Still { record: String },
@@ -123,6 +128,7 @@ pub fn diagnose(
     let hygiene = check(case, &mut all, given, law.as_ref(), sample_time_s)?;
     let mut bench = Bench::new(given, all, sample_time_s, case.spindle_hz)?;
     alike(&bench)?;
+    finite(&bench)?;
     let mut remarks = Vec::new();
     if controller.is_none() {
         progress("is the command held between samples, or measured");
@@ -183,8 +189,28 @@ pub fn diagnose(
     Ok(Diagnosed { diagnosis, bench, selection, corrected: fixed, refitted: refitted.plant, errors })
 }
 
+/// Refuses a ground on which nothing can be computed: what is no number here would be none everywhere after.
+fn finite(bench: &Bench) -> Result<(), DiagnoseError> {
+    let (l, s) = (&bench.levels, &bench.scene);
+    let numbers = [
+        ("the level of the sensor's noise", l.sensor_rms),
+        ("the level of the torque's noise", l.torque_rms),
+        ("the corner of the torque's noise", l.torque_corner_hz),
+        ("the noise of the records", s.noise),
+        ("the travel of the records", s.travel),
+        ("the speed of the records", s.speed),
+        ("the motion of the arm per recorded position", s.arm_over_record()),
+    ];
+    let moving = bench.trajectories.iter().flat_map(|t| &t.samples);
+    let lost = moving.map(|m| m.x + m.v + m.u + m.i).find(|sum| !sum.is_finite()).map(|x| ("the motion of the arm", x));
+    match numbers.into_iter().find(|(_, x)| !x.is_finite()).or(lost) {
+        Some((what, found)) => Err(DiagnoseError::NotFinite { what, found }),
+        None => Ok(()),
+    }
+}
+
 /// Most times that a simulation may exceed the recorded motion: beyond it the numbers of a fit lose all their digits.
-const UNLIKE: f64 = 1e6;
+const UNLIKE: f64 = 1e8;
 
 /// Refuses a plant that simulates something else than these records.
 fn alike(bench: &Bench) -> Result<(), DiagnoseError> {

@@ -271,3 +271,17 @@ impl Normal {
         Normal { right, gram, squares: a.squares.iter().zip(&b.squares).map(|(x, y)| mix(*x, *y)).collect() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equations_that_overflowed_explain_nothing() {
+        for bad in [f64::NAN, f64::INFINITY] {
+            let gram = DMatrix::from_row_slice(2, 2, &[1.0, bad, bad, 1.0]);
+            let e = Normal { right: vec![1.0, 1.0], gram, squares: vec![1.0, 1.0] }.explained(false);
+            assert_eq!((e.gain, e.strengths), (0.0, vec![0.0, 0.0]));
+        }
+    }
+}

@@ -35,8 +35,8 @@ fn target(file: &Path) -> Result<PathBuf, DocumentError> {
         true => std::fs::canonicalize(file).map_err(|_| no_file("a link that leads to no file"))?,
         false => file.into(),
     };
-    let kind = std::fs::metadata(&end)
-        .map_err(|source| DocumentError::Io { file: file.into(), action: "write", source })?;
+    let kind =
+        std::fs::metadata(&end).map_err(|source| DocumentError::Io { file: file.into(), action: "write", source })?;
     match (kind.is_dir(), kind.is_file()) {
         (true, _) => Err(refused(ErrorKind::IsADirectory)),
         (_, true) => Ok(end),

@@ -117,8 +117,11 @@ mod tests {
 
     fn truth(w: f64) -> Complex<f64> {
         let s = Complex::new(0.0, w);
-        let pair = |wz: f64, wp: f64, d: f64| (s * s + 2.0 * d * wz * s + wz * wz) / (s * s + 2.0 * d * wp * s + wp * wp);
-        1e7 / (s * s + 160.0 * s + 369.0 * 369.0) * pair(7400.0, 7600.0, 0.005) * pair(20_100.0, 20_000.0, 0.003)
+        let pair =
+            |wz: f64, wp: f64, d: f64| (s * s + 2.0 * d * wz * s + wz * wz) / (s * s + 2.0 * d * wp * s + wp * wp);
+        1e7 / (s * s + 160.0 * s + 369.0 * 369.0)
+            * pair(7400.0, 7600.0, 0.005)
+            * pair(20_100.0, 20_000.0, 0.003)
             * Complex::from_polar(1.0, -w * 65e-6)
     }
 

@@ -7,8 +7,8 @@ mod algebra;
 mod bytes;
 mod causality;
 mod columns;
-mod decide;
 mod dead;
+mod decide;
 mod error;
 mod estimate;
 mod gather;
@@ -40,7 +40,7 @@ pub use phase::{check_order, phase_rad};
 pub use read::{Sweep, read_bytes, read_file};
 pub use response::{Frf, FrfShapeError};
 pub use settings::{
-    AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale,
-    Outliers, PhaseConvention, ReadSettings, UnknownWord, Unsorted,
+    AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale, Outliers,
+    PhaseConvention, ReadSettings, UnknownWord, Unsorted,
 };
 pub use write::{PhaseDisplay, write_bod, write_bod_as};

@@ -148,10 +148,10 @@ impl fmt::Display for Note {
                 let more = names.len().saturating_sub(LISTED);
                 let more = if more > 0 { format!(" and {more} more") } else { String::new() };
                 write!(f, "Columns not used: {}{more}.", shown.join(", "))
-            },
+            }
             Note::Dataset { number, of, title } => {
                 write!(f, "Read dataset {number} of {of}: {}.", quoted(title))
-            },
+            }
             Note::DatasetBytes { declared, found } => {
                 write!(
                     f,

@@ -99,7 +99,9 @@ mod tests {
 
     #[test]
     fn a_spike_is_found_wherever_it_stands() {
-        for spike in [Complex::new(10.0, 0.0), Complex::new(-1.0, 0.0), Complex::new(0.05, 0.02), Complex::new(1e20, 0.0)] {
+        for spike in
+            [Complex::new(10.0, 0.0), Complex::new(-1.0, 0.0), Complex::new(0.05, 0.02), Complex::new(1e20, 0.0)]
+        {
             for place in [0, 1, 2, 40, 399, 398, 397] {
                 let (w, mut value) = sweep(0.02, 200.0, 200, 0.005, 7);
                 value[place] *= spike;

@@ -4,10 +4,9 @@
 //!   x[k+1] = e^{pT} x[k] + φ(T-δ) u[k-D] + e^{p(T-δ)} φ(δ) u[k-D-1],   φ(h) = (e^{ph} - 1)/p,
 //! which is the modified z-transform (Åström & Wittenmark, Computer-Controlled Systems, ch. 2), eq. (31)'s counterpart.
 
-use crate::document::size_limits::DELAY_SAMPLES;
 use super::{FrequencyResponse, LtiError, ModalForm, Plant};
+use crate::document::size_limits::DELAY_SAMPLES;
 use nalgebra::{Complex, DMatrix};
-
 
 /// The exactly sampled plant. Arrays hold one entry per term; a complex pole stands for itself and its conjugate.
 ///

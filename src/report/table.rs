@@ -3,10 +3,10 @@
 //! In: columns with units, rows of cells. Out: HTML or plain text. Convention: every header has its unit, a missing
 //! value is a dash, a flag stands in words beside its number. Spec: `specs/report.md`.
 
-use crate::document::size_limits::{CELL, cut};
 use super::error::ReportError;
 use super::number::{MISSING, NumberFormat};
 use super::svg::harmful;
+use crate::document::size_limits::{CELL, cut};
 use maud::{Markup, html};
 
 /// A table whose rows all have one cell for each column.

@@ -22,9 +22,12 @@ mod measured;
 mod mirror;
 mod mismatch;
 mod motor;
+pub mod mutation;
 mod plants;
 mod polish;
 mod prediction;
+mod reader_mutations;
+mod readers;
 mod recordings;
 
 pub use certificate::certificate;
@@ -45,6 +48,7 @@ pub use motor::motor;
 pub use plants::plants;
 pub use polish::polishes;
 pub use prediction::prediction;
+pub use reader_mutations::{Reached, Tally, reader_mutations};
 pub use recordings::recordings;
 
 /// What a study hands over: files by name, relative to the results' folder.

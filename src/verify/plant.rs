@@ -126,11 +126,16 @@ pub(super) fn fits(plant: &Plant, t: f64, u: &Uncertainty) -> Result<(), LtiErro
         return Err(LtiError::Delay { delay_s: plant.delay_s, sample_time_s: t, samples, limit: DELAY_SAMPLES });
     }
     for (i, m) in plant.modes.iter().enumerate() {
-        for (key, w, d) in [("zero", m.zero_rad_s, m.zero_damping_ratio), ("pole", m.pole_rad_s, m.pole_damping_ratio)] {
+        for (key, w, d) in [("zero", m.zero_rad_s, m.zero_damping_ratio), ("pole", m.pole_rad_s, m.pole_damping_ratio)]
+        {
             let found = w * d.abs().max(1.0) * (1.0 + u.frequency) * (1.0 + u.damping);
             if aliases(found, t) > ALIASES as f64 {
                 let key = format!("plant.modes[{i}]: the fastest root of its {key}s (rad/s)");
-                return Err(LtiError::Range { key, found, expected: "at most 85 times the sample rate: leave this mode out" });
+                return Err(LtiError::Range {
+                    key,
+                    found,
+                    expected: "at most 85 times the sample rate: leave this mode out",
+                });
             }
         }
     }
