@@ -3,9 +3,9 @@
 //! In: the two columns of a response, ascending in frequency. Out: a refusal that names channel, lines and frequencies. Spec: `specs/frf.md`, "Dead channels and
 //! single points".
 
-use super::causality::Reading;
-use super::columns::Pair;
+use super::columns::{Columns, Pair};
 use super::error::FrfError;
+use super::header::Unit;
 use crate::numeric::unwrap::wrap;
 use std::f64::consts::TAU;
 use std::fmt;
@@ -100,11 +100,10 @@ pub(crate) fn constant(file: &str, pair: Pair, first: &[f64], second: &[f64]) ->
     Ok(())
 }
 
-/// Refuses a channel that is stuck over a stretch or shown in a few steps.
+/// Refuses a channel that is stuck over a stretch or shown in a few steps; before the units are decided, which a dead channel would mislead.
 pub(crate) fn stuck(
     file: &str,
-    pair: Pair,
-    reading: Reading,
+    columns: &Columns,
     (hz, line): (&[f64], &[u64]),
     (first, second): (&[f64], &[f64]),
 ) -> Result<(), FrfError> {
@@ -112,12 +111,15 @@ pub(crate) fn stuck(
         return Ok(());
     }
     let x: Vec<f64> = hz.iter().map(|f| f.ln()).collect();
-    for (column, channel) in [first, second].into_iter().zip(channels(pair)) {
+    // Only the size of a turn and of a step matter here: what fills more than a turn in radians is in degrees.
+    let degrees = second.iter().any(|p| p.abs() > TAU + 0.1);
+    let decibels = columns.unit(1).is_none_or(|(unit, _)| unit != Unit::Linear);
+    for (column, channel) in [first, second].into_iter().zip(channels(columns.pair)) {
         let values = distinct(column);
-        if values.len() <= VALUES && column.len() >= STEPPED_ROWS && coarse(&values, channel, reading) {
+        if values.len() <= VALUES && column.len() >= STEPPED_ROWS && coarse(&values, channel, degrees, decibels) {
             return Err(refuse(file, channel, Dead::Steps { values: values.len(), rows: column.len() }));
         }
-        let turn = if reading.degrees { 360.0 } else { TAU };
+        let turn = if degrees { 360.0 } else { TAU };
         let step = |a: f64, b: f64| match channel {
             Channel::Phase => wrap((b - a) / turn * TAU) / TAU * turn,
             _ => b - a,
@@ -152,12 +154,12 @@ fn distinct(column: &[f64]) -> Vec<f64> {
 }
 
 /// Whether the mean step between different values is too large to be a display's resolution.
-fn coarse(values: &[f64], channel: Channel, reading: Reading) -> bool {
+fn coarse(values: &[f64], channel: Channel, degrees: bool, decibels: bool) -> bool {
     let (Some(&low), Some(&high)) = (values.first(), values.last()) else { return false };
     let steps = values.len().saturating_sub(1).max(1) as f64;
     match channel {
-        Channel::Phase => (high - low) / steps > if reading.degrees { STEP_DEG } else { STEP_DEG.to_radians() },
-        Channel::Magnitude if reading.decibels => (high - low) / steps > STEP_DB,
+        Channel::Phase => (high - low) / steps > if degrees { STEP_DEG } else { STEP_DEG.to_radians() },
+        Channel::Magnitude if decibels => (high - low) / steps > STEP_DB,
         Channel::Magnitude => 20.0 * (high / low).log10() / steps > STEP_DB,
         Channel::Real | Channel::Imaginary => true,
     }

@@ -12,9 +12,9 @@ pub const GATHERED_ABOVE: usize = 4000;
 /// Widest cell (ln w): a half of the step of a sweep of 100 points a decade.
 const WIDEST: f64 = 0.01;
 /// Bend (ln of the ratio) below which a cell is a line.
-const BENT: f64 = 2e-3;
-/// The same in standard deviations of the bend.
-const NOISY: f64 = 3.5;
+const BENT: f64 = 3e-4;
+/// The same in standard deviations of the bend: a cell that is halved in vain costs a point more, one that is bent blunts a resonance.
+const NOISY: f64 = 1.5;
 /// Share of the bend of three thirds by which the mean is off the middle: y'' h²/24 of y'' (h/3)².
 const SHARE: f64 = 0.375;
 /// Fewest points of a cell; fewer stand for themselves.

@@ -87,9 +87,9 @@ fn assemble(
     if let Some(i) = columns.second.iter().position(|p| columns.pair == Pair::Polar && p.abs() > PHASE_DEG) {
         return Err(FrfError::PhaseSize { file: file.to_owned(), line: columns.line[i], found: columns.second[i] });
     }
-    let reading = reading(file, columns, (&w, &first, &second), settings, notes)?;
     let line: Vec<u64> = groups.iter().map(|g| columns.line[g[0]]).collect();
-    super::dead::stuck(file, columns.pair, reading, (&hz, &line), (&first, &second))?;
+    super::dead::stuck(file, columns, (&hz, &line), (&first, &second))?;
+    let reading = reading(file, columns, (&w, &first, &second), settings, notes)?;
     let rows = rows(file, columns, reading)?;
     let mean = |f: &dyn Fn(usize) -> f64, g: &[usize]| g.iter().map(|&i| f(i)).sum::<f64>() / g.len() as f64;
     let value: Vec<Complex<f64>> =
