@@ -7,6 +7,7 @@ use super::corrected::{Corrected, corrected};
 use super::finding::*;
 use super::fit_report::fit_report;
 use super::fitted::refit;
+use super::ground;
 use super::held_out::{astray, contradicts, held_out, mean, unseen};
 use super::judge::{Judged, rms};
 use super::line_finding::{line_findings, same_line};
@@ -127,8 +128,7 @@ pub fn diagnose(
     let law = controller.map(Law::new).transpose()?;
     let hygiene = check(case, &mut all, given, law.as_ref(), sample_time_s)?;
     let mut bench = Bench::new(given, all, sample_time_s, case.spindle_hz)?;
-    alike(&bench)?;
-    finite(&bench)?;
+    ground::check(&bench)?;
     let mut remarks = Vec::new();
     if controller.is_none() {
         progress("is the command held between samples, or measured");
@@ -187,44 +187,6 @@ pub fn diagnose(
     judge(&mut diagnosis, &bench, &selection, hygiene.finding, bumps);
     super::experiment::propose(&mut diagnosis, &bench, &selection);
     Ok(Diagnosed { diagnosis, bench, selection, corrected: fixed, refitted: refitted.plant, errors })
-}
-
-/// Refuses a ground on which nothing can be computed: what is no number here would be none everywhere after.
-fn finite(bench: &Bench) -> Result<(), DiagnoseError> {
-    let (l, s) = (&bench.levels, &bench.scene);
-    let numbers = [
-        ("the level of the sensor's noise", l.sensor_rms),
-        ("the level of the torque's noise", l.torque_rms),
-        ("the corner of the torque's noise", l.torque_corner_hz),
-        ("the noise of the records", s.noise),
-        ("the travel of the records", s.travel),
-        ("the speed of the records", s.speed),
-        ("the motion of the arm per recorded position", s.arm_over_record()),
-    ];
-    let moving = bench.trajectories.iter().flat_map(|t| &t.samples);
-    let lost = moving.map(|m| m.x + m.v + m.u + m.i).find(|sum| !sum.is_finite()).map(|x| ("the motion of the arm", x));
-    match numbers.into_iter().find(|(_, x)| !x.is_finite()).or(lost) {
-        Some((what, found)) => Err(DiagnoseError::NotFinite { what, found }),
-        None => Ok(()),
-    }
-}
-
-/// Most times that a simulation may exceed the recorded motion: beyond it the numbers of a fit lose all their digits.
-const UNLIKE: f64 = 1e8;
-
-/// Refuses a plant that simulates something else than these records.
-fn alike(bench: &Bench) -> Result<(), DiagnoseError> {
-    let none = vec![0.0; bench.form.knobs.len()];
-    for (record, error) in bench.means.iter().zip(bench.clone().fit(vec![]).errors(&none)) {
-        let mean = record.position.iter().sum::<f64>() / record.len() as f64;
-        let moved: Vec<f64> = record.position.iter().map(|x| x - mean).collect();
-        let size = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt();
-        let ratio = size(&error) / size(&moved);
-        if size(&moved) > 0.0 && (!ratio.is_finite() || ratio > UNLIKE) {
-            return Err(DiagnoseError::Unlike { record: record.name.clone(), ratio });
-        }
-    }
-    Ok(())
 }
 
 fn search(selection: &Selection) -> Vec<Tried> {

@@ -24,12 +24,10 @@ pub(crate) fn alone(w: &[f64], value: &[Complex<f64>]) -> Vec<(usize, f64)> {
     let mut sorted = off.clone();
     sorted.sort_by(f64::total_cmp);
     let usual = sorted[n / 2];
-    (0..n)
+    // The ends are predicted from one side only, where a resonance beside them looks the same.
+    (1..n - 1)
         .filter(|&i| off[i] > LEAST.max(ALONE * usual))
-        .filter(|&i| {
-            let beside = [i.checked_sub(1), Some(i + 1).filter(|k| *k < n)];
-            beside.into_iter().flatten().all(|k| ALONE * distance(&x, value, k, Some(i)) < off[i])
-        })
+        .filter(|&i| [i - 1, i + 1].into_iter().all(|k| ALONE * distance(&x, value, k, Some(i)) < off[i]))
         .map(|i| (i, off[i]))
         .collect()
 }
@@ -102,7 +100,7 @@ mod tests {
         for spike in
             [Complex::new(10.0, 0.0), Complex::new(-1.0, 0.0), Complex::new(0.05, 0.02), Complex::new(1e20, 0.0)]
         {
-            for place in [0, 1, 2, 40, 399, 398, 397] {
+            for place in [1, 2, 40, 398, 397] {
                 let (w, mut value) = sweep(0.02, 200.0, 200, 0.005, 7);
                 value[place] *= spike;
                 let found = alone(&w, &value);

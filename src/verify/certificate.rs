@@ -1,7 +1,7 @@
 //! The certificate: every requirement of a spec with its proven bounds, on every machine given, and what does not fit.
 
 use super::bounds::{Bounded, Bounds, Stability};
-use super::plant::fits;
+use super::size::fits;
 use super::table::{self, Finding};
 use super::write::{WriteFigures, write};
 use super::write_box::{BoxFigure, BoxSettings, BoxedLoop, WriteBox, bound_write};

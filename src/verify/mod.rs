@@ -23,6 +23,7 @@ mod prove;
 mod range;
 mod rounding;
 mod settings;
+mod size;
 mod spectrum_box;
 mod swept;
 mod table;
@@ -59,7 +60,7 @@ pub fn prove_loop(
     settings: &VerifySettings,
 ) -> Result<Bounds, VerifyError> {
     plant.check()?;
-    plant::fits(plant, sample_time_s, uncertainty)?;
+    size::fits(plant, sample_time_s, uncertainty)?;
     prove::prove(&Sampled::new(plant, sections, sample_time_s, uncertainty)?, settings)
 }
 

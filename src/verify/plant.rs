@@ -3,10 +3,8 @@
 //! With the hold, P(e^{j a}) = Σ_k (1 - e^{-j a})/(j (a + 2 pi k)) P(j (a + 2 pi k)/T), a = w T. Every alias is a product of
 //! factors whose roots are known; the aliases beyond the last one summed are bounded by an integral (`specs/certificate.md`).
 
-use super::Uncertainty;
 use super::expansion::{Expansion, Jet};
-use crate::document::size_limits::{ALIASES, DELAY_SAMPLES};
-use crate::lti::{Body, LtiError, Plant};
+use crate::lti::{Body, Plant};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
@@ -115,31 +113,8 @@ const LEFT_OUT: f64 = 1e-8;
 const FAR: usize = 64;
 
 /// Multiples of the sample rate from which three times above every mode of a plant all aliases are far.
-fn aliases(top_rad_s: f64, t: f64) -> f64 {
+pub(super) fn aliases(top_rad_s: f64, t: f64) -> f64 {
     (3.0 * top_rad_s * t / TAU + 0.5).ceil().max(2.0)
-}
-
-/// Refuses a plant whose dead time or fastest mode is beyond what is proved of at this sample time: the work and the memory grow with both.
-pub(super) fn fits(plant: &Plant, t: f64, u: &Uncertainty) -> Result<(), LtiError> {
-    let samples = plant.delay_s / t;
-    if !(t > 0.0 && samples <= DELAY_SAMPLES as f64) {
-        return Err(LtiError::Delay { delay_s: plant.delay_s, sample_time_s: t, samples, limit: DELAY_SAMPLES });
-    }
-    for (i, m) in plant.modes.iter().enumerate() {
-        for (key, w, d) in [("zero", m.zero_rad_s, m.zero_damping_ratio), ("pole", m.pole_rad_s, m.pole_damping_ratio)]
-        {
-            let found = w * d.abs().max(1.0) * (1.0 + u.frequency) * (1.0 + u.damping);
-            if aliases(found, t) > ALIASES as f64 {
-                let key = format!("plant.modes[{i}]: the fastest root of its {key}s (rad/s)");
-                return Err(LtiError::Range {
-                    key,
-                    found,
-                    expected: "at most 85 times the sample rate: leave this mode out",
-                });
-            }
-        }
-    }
-    Ok(())
 }
 
 impl Product {
