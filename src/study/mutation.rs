@@ -163,7 +163,7 @@ fn rows(text: &str) -> Option<(usize, char, Vec<Vec<String>>)> {
     let separator = ['\t', ';', ','].into_iter().find(|s| lines.last().is_some_and(|l| l.contains(*s)))?;
     let is_row =
         |l: &&str| l.split(separator).count() > 1 && l.split(separator).all(|f| f.trim().parse::<f64>().is_ok());
-    let first = lines.iter().position(|l| is_row(&l))?;
+    let first = lines.iter().position(is_row)?;
     let all = lines[first..].iter().map(|l| l.split(separator).map(|f| f.trim().to_owned()).collect()).collect();
     Some((first, separator, all))
 }

@@ -94,7 +94,7 @@ pub(super) fn readers() -> Result<Vec<Reader>, StudyError> {
         ("pes.csv", format!("time_s,pes\n{pes}").into_bytes()),
         text("log.toml", "FF_Factor = 0.9\ntemperature_c = 24.5\nlabel = 3\n"),
     ];
-    let (record, packed) = record()?;
+    let [record, packed] = record()?;
     let case = |record: (&'static str, Vec<u8>)| {
         let case = format!(
             "id = \"P\"\nplant = \"plant.toml\"\ncontroller = \"controller.toml\"\nspindle_hz = 120.0\n[[records]]\nfile = \"{}\"\nrole = \"fit\"\n",
@@ -307,7 +307,7 @@ fn take_folder(files: &Files, _: bool, folder: &Path) -> Reached {
 }
 
 /// A record of some hundred samples, and the same packed.
-fn record() -> Result<((&'static str, Vec<u8>), (&'static str, Vec<u8>)), StudyError> {
+fn record() -> Result<[(&'static str, Vec<u8>); 2], StudyError> {
     let mut random = Random::new(8);
     let mut text = "time_s,reference,excitation,command,position,pes\n".to_owned();
     for k in 0..300 {
@@ -315,7 +315,7 @@ fn record() -> Result<((&'static str, Vec<u8>), (&'static str, Vec<u8>)), StudyE
         text += &format!("{},{x},0,{},{},\n", k as f64 * 4e-5, 0.3 * x, x + 0.01 * random.normal());
     }
     let packed = gzip(text.as_bytes()).map_err(|source| StudyError::Thread { source })?;
-    Ok((("record.csv", text.into_bytes()), ("record.csv.gz", packed)))
+    Ok([("record.csv", text.into_bytes()), ("record.csv.gz", packed)])
 }
 
 fn take_case(files: &Files, _: bool, folder: &Path) -> Reached {
