@@ -140,6 +140,20 @@ fn a_dead_channel_is_refused_by_name() {
     assert!(channel == Channel::Phase && matches!(dead, Dead::Steps { values: 2..=12, rows: 400 }), "{dead:?}");
 }
 
+/// Found by the changed files: an imaginary part that is held where it is small and flat.
+#[test]
+fn a_part_held_where_it_hardly_moves_is_dead_beside_noise() {
+    let frf = measure(&healthy(), &log_grid(40.0, 5000.0, 140), 0.003, &mut Random::new(5)).unwrap();
+    for from in 35..70 {
+        let mut text = "frequency_hz,real,imag\n".to_owned();
+        for (i, (w, v)) in frf.w_rad_s().iter().zip(frf.value()).enumerate() {
+            text += &format!("{},{},{}\n", w / TAU, v.re, if i < from { v.im } else { frf.value()[from].im });
+        }
+        let e = read(&text, &ReadSettings::default()).unwrap_err();
+        assert!(matches!(e, FrfError::DeadChannel { channel: Channel::Imaginary, .. }), "{from}: {e}");
+    }
+}
+
 #[test]
 fn a_coarse_display_is_no_dead_channel() {
     // Tenths of a decibel and whole degrees, as old analysers print them, with and without noise: the truth moves, and slowly in places.

@@ -6,6 +6,7 @@
 use super::FleetError;
 use super::source::{FileSource, SlotFiles, SlotName};
 use crate::document::read_table;
+use crate::document::size_limits::cut;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -48,7 +49,7 @@ fn of_rows(file: &Path, header: &[String], rows: Vec<Vec<String>>) -> Result<Fil
     let place = |name: &str| header.iter().position(|h| h == name);
     for column in NEEDED {
         if place(column).is_none() {
-            return Err(FleetError::Column { file: file.into(), column, found: header.join(", ") });
+            return Err(FleetError::Column { file: file.into(), column, found: cut(&header.join(", "), 400) });
         }
     }
     let base = file.parent().unwrap_or(Path::new("."));

@@ -72,6 +72,8 @@ const BESIDE: usize = 8;
 /// The change expected over a stuck stretch in units of the display's step and of the scatter beside it.
 const STEPS_MOVED: f64 = 12.0;
 const SCATTERS_MOVED: f64 = 6.0;
+/// The scatter beside it, in steps of the display, from which equal values in a row do not happen.
+const RESOLVED: f64 = 10.0;
 /// Most different values, and fewest rows, of a channel that is shown in steps; least mean step (deg, dB).
 const VALUES: usize = 12;
 const STEPPED_ROWS: usize = 48;
@@ -133,7 +135,11 @@ pub(crate) fn stuck(
                 let [a, b] = beside.map(|r| trend(&x[r.clone()], &column[r], &step));
                 let span = x[end - 1] - x[from];
                 let expected_change = a.0.max(b.0) * span;
-                if expected_change > STEPS_MOVED * quantum && expected_change > SCATTERS_MOVED * a.1.max(b.1) {
+                let moved = expected_change > STEPS_MOVED * quantum && expected_change > SCATTERS_MOVED * a.1.max(b.1);
+                // Where the display resolves the noise on both sides, no two rows are equal, however flat the response.
+                let sides = [(from >= BESIDE, a.1), (column.len() - end >= BESIDE, b.1)];
+                let noise = sides.into_iter().filter(|s| s.0).map(|s| s.1).fold(f64::INFINITY, f64::min);
+                if moved || (noise.is_finite() && noise > RESOLVED * quantum) {
                     let (lines, hz) = ([line[from], line[end - 1]], [hz[from], hz[end - 1]]);
                     let (found, rows) = (column[from], end - from);
                     return Err(refuse(file, channel, Dead::Stuck { found, rows, lines, hz, expected_change }));
