@@ -8,7 +8,6 @@ use divan::{Bencher, black_box};
 use servotune::controller::Controller;
 use servotune::feedback::{LoopOnGrid, SampledPlant};
 use servotune::lti::DiscretePlant;
-use servotune::pes::{Scene, WindowDft};
 use servotune::tune::{Machine, Spec, TuneSettings, TuningProblem, tune};
 use tune_common::{paper_plant, paper_response, paper_spec, start_controller};
 
@@ -32,21 +31,6 @@ fn margins(b: Bencher) {
     let chain = controller().sections().unwrap().chain;
     let mut on = LoopOnGrid::default();
     b.bench_local(|| plant.judge(black_box(&chain), &mut on));
-}
-
-#[divan::bench]
-fn dft(b: Bencher) {
-    let plant = DiscretePlant::of(&paper_plant(), 39.6e-6).unwrap();
-    let spec = without_peak();
-    let scene = Scene::of_window(&spec.profile, &plant).unwrap();
-    let dft = WindowDft::new(200, 27_480.0, (5..=21).collect());
-    let chain = controller().sections().unwrap().chain;
-    let mut work = scene.workspace(&plant, chain.len());
-    let mut amplitude = Vec::new();
-    b.bench_local(|| {
-        scene.run(&plant, black_box(&chain), None, Some(10.0), &mut work);
-        dft.amplitudes(scene.window(&work), &mut amplitude);
-    });
 }
 
 fn candidate_of(b: Bencher, spec: &Spec, machine: Machine<'_>) {

@@ -16,7 +16,7 @@ fn exact(plant: &Plant, c: &Controller, profile: &Profile, bins: &[usize]) -> Ve
     let f = figures(&run.pes, profile);
     let peak = run.command.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let bins = bins.iter().map(|k| f.harmonics[k - 1].amplitude);
-    [f.dft_low, f.dft_high].into_iter().chain(bins).chain([peak]).collect()
+    [f.dft_low.unwrap(), f.dft_high.unwrap()].into_iter().chain(bins).chain([peak]).collect()
 }
 
 fn bounded(plant: &Plant, c: &Controller, profile: &Profile, u: &Uncertainty, boxes: usize) -> WriteBox {

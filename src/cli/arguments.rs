@@ -353,6 +353,9 @@ pub(super) struct StudyArguments {
     /// Changed bytes (study `reliability-fleet`)
     #[arg(long, value_name = "N", default_value_t = 1000)]
     pub changes: usize,
+    /// Changed files (study `reliability-readers`)
+    #[arg(long, value_name = "N", default_value_t = 12_000)]
+    pub runs: usize,
     /// Folder with the measured records (studies `mirror`, `motor`, `hdd`)
     #[arg(long, value_name = "DIR", default_value = "../shared/data")]
     pub data: PathBuf,
@@ -393,6 +396,8 @@ pub(super) enum StudyName {
     FleetShared,
     /// The search for physics on records without any, for the cases in the folder --data
     FalseAlarms,
+    /// Changed files through every reader; memory and time of the largest inputs
+    ReliabilityReaders,
     /// Diagnoses of the cases in the folder --data, beside their answers
     Mismatch,
     /// Real recordings: EMPS, Silverbox, motor bench, mirror, diagnosed from a linear model

@@ -1,8 +1,8 @@
 //! `servotune budget`: the sources of a PES, and predicted figures of gains never run.
 
 use super::performance_arguments::BudgetArguments;
-use super::{Ending, Failure, Screen, load, margins};
-use crate::feedback::ModelLoop;
+use super::{Ending, Failure, Screen, load};
+use crate::feedback::{ModelLoop, confirmed_margins};
 use crate::lti::DiscretePlant;
 use crate::pes::{Budget, PredictSettings, Prediction, budget, predict};
 use crate::report::budget::{budget_table, prediction_table};
@@ -36,7 +36,7 @@ pub(super) fn run(a: &BudgetArguments, screen: &mut Screen) -> Result<Ending, Fa
     let stable = |c: &crate::controller::Controller, file: &Path| -> Result<bool, Failure> {
         let sections = c.sections().map_err(|source| Failure::Controller { file: file.into(), source })?;
         let sampled = DiscretePlant::of(&plant, c.sample_time_s)?;
-        Ok(margins::judge(&ModelLoop::new(&sampled, &sections)?)?.stable)
+        Ok(confirmed_margins(&ModelLoop::new(&sampled, &sections)?)?.stable)
     };
     let mut text = String::new();
     let found = if stable(&controller, &a.controller)? { Some(budget(&plant, &controller, &profile)?) } else { None };

@@ -6,7 +6,7 @@ use super::proof::{self, OnSweep, Proof};
 use super::slot::{self, Slot};
 use super::tune::{provenance, text};
 use super::{Ending, Failure, Screen, demo_diagnosis, demo_fleet, demo_gate, gated};
-use crate::document::{read_text, sha256_hex, write_text, write_whole};
+use crate::document::{FileSet, read_text, sha256_hex, write_text, write_whole};
 use crate::frf::{PhaseDisplay, ReadSettings, read_file, write_bod_as};
 use crate::identify::{IdentifySettings, identify};
 use crate::lti::PlantFile;
@@ -87,7 +87,9 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
         gains: &gain_table,
     };
     let Assured { outcome, table, certificate, .. } = job.tune(&settings, screen)?;
-    let certificate = proof::write(&gain_table, &table, certificate.as_ref(), screen)?;
+    let mut files = FileSet::default();
+    let certificate = proof::add(&gain_table, &table, certificate.as_ref(), &mut files)?;
+    proof::commit(files, screen)?;
     let says = certificate.as_ref().map(|c| c.says.clone()).unwrap_or_default();
 
     screen.say("4/7 report");

@@ -3,7 +3,7 @@
 use super::diagnose_arguments::DiagnoseArguments;
 use super::{Ending, Failure, Screen, load};
 use crate::diagnose::{DiagnoseSettings, Diagnosis, Verdict, diagnose};
-use crate::document::{check_target, write_text};
+use crate::document::{FileSet, check_target};
 use crate::lti::PlantFile;
 use crate::recording::{Case, Record, RecordEntry, Role};
 use crate::report::diagnosis::diagnosis_page;
@@ -79,20 +79,23 @@ pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagno
     settings.select.bootstrap = a.bootstrap as usize;
     let mut made =
         diagnose(&case, &plant, controller.as_ref(), &settings, |m| screen.say(&format!("{}: {m}", case.id)))?;
+    // Model, page and findings belong together: all of them appear or none.
+    let mut files = FileSet::default();
     if made.diagnosis.corrects() {
         let text =
             toml::to_string(&PlantFile::from(&made.corrected.plant)).map_err(|source| Failure::Toml { source })?;
-        write_text(&a.out.join(CORRECTED), &text)?;
+        files.write(&a.out.join(CORRECTED), text);
         made.diagnosis.corrected_model = Some(CORRECTED.into());
     } else if made.diagnosis.verdict == Verdict::LocatedUnexplained {
         made.diagnosis.remarks.push("no corrected plant is written: it would simulate worse than the given one".into());
     }
     screen.say(&format!("{}: drawing the report", case.id));
     let page = diagnosis_page(&made, provenance(&case))?;
-    write_text(&a.out.join(REPORT), &page.html())?;
+    files.write(&a.out.join(REPORT), page.html());
     let diagnosis = made.diagnosis;
     let json = serde_json::to_string_pretty(&diagnosis).map_err(|source| Failure::Json { source })?;
-    write_text(&a.out.join("diagnosis.json"), &format!("{json}\n"))?;
+    files.write(&a.out.join("diagnosis.json"), format!("{json}\n"));
+    files.commit()?;
     let mut text = format!(
         "{}: {}\n",
         diagnosis.id,

@@ -102,11 +102,6 @@ pub enum Failure {
     Child { what: String, source: std::io::Error },
     #[error(transparent)]
     Study(#[from] StudyError),
-    /// Two algorithms that share no code disagree: no answer can be trusted.
-    #[error(
-        "stability: the Nyquist count finds {by_count} unstable poles and the eigenvalues {by_eigenvalues} (largest |z| = {largest:.4e}): no answer is given; check the units of the gains"
-    )]
-    Disagreement { by_count: i64, by_eigenvalues: i64, largest: f64 },
     #[error("the result cannot be written as JSON: {source}")]
     Json { source: serde_json::Error },
     #[error("cannot write to stdout: {source}")]

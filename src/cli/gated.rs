@@ -6,7 +6,7 @@
 use super::proof::{self, OnSweep, Proof};
 use super::{Failure, Screen};
 use crate::controller::Controller;
-use crate::document::{below, sha256_hex, write_text};
+use crate::document::{FileSet, below, sha256_hex, write_text};
 use crate::frf::{ReadSettings, read_file};
 use crate::gate::features::{features, machine_folders, read_machines};
 use crate::gate::{Action, Gate, Table, Verdict};
@@ -218,7 +218,9 @@ fn tuned(job: &Job<'_>, row: &mut Row, screen: &mut Screen) -> Result<(), Failur
     if met || job.keep_infeasible {
         // The gate's words are part of the table: the certificate is of these bytes.
         let certificate = certificate.map(|c| c.and_then(|c| c.of_text(&table).map_err(|e| e.to_string())));
-        row.certificate = proof::write(&gains, &table, certificate.as_ref(), screen)?;
+        let mut files = FileSet::default();
+        row.certificate = proof::add(&gains, &table, certificate.as_ref(), &mut files)?;
+        proof::commit(files, screen)?;
         if let Some(proof) = &row.certificate {
             screen.say(&format!("machine {}: {}", row.id, proof.says));
         }

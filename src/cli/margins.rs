@@ -3,8 +3,8 @@
 use super::arguments::MarginsArguments;
 use super::{Ending, Failure, Screen, load, physics};
 use crate::feedback::{
-    Amplitudes, DescribedMargins, DescribedPlant, Margins, MeasuredLoop, ModelLoop, closed_loop_poles,
-    described_margins, linear_crossover_hz, margins, measured_margins,
+    Amplitudes, DescribedMargins, DescribedPlant, LoopVerdict, Margins, MeasuredLoop, ModelLoop, confirmed_margins,
+    described_margins, linear_crossover_hz, measured_margins,
 };
 use crate::lti::{DiscretePlant, Sections};
 use crate::physics::Context;
@@ -12,9 +12,6 @@ use crate::report::margins::{margins_text, measured_text};
 use crate::report::physical::{amplitude_table, limit_cycle_sentences};
 use serde::Serialize;
 use std::path::Path;
-
-/// A pole this close to the unit circle counts for either side: the eigenvalues of a matrix of order 40 are no surer.
-const ON_THE_CIRCLE: f64 = 1e-6;
 
 pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     let controller = load::controller(&a.controller)?;
@@ -45,7 +42,7 @@ pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, F
             let sweep = load::sweep(file, &a.reading, &taken, screen)?;
             let judged = measured_margins(&MeasuredLoop::new(&sweep.frf, &sections, a.hold_included)?)?;
             screen.result(&judged, &measured_text(&judged)?)?;
-            judged.margins.stable
+            judged.verdict == LoopVerdict::Stable
         }
         // The argument group demands one of the two.
         (None, None) => false,
@@ -76,7 +73,7 @@ fn of_model(
     let physics = physics::restored(file, &plant, context, screen)?;
     let sampled = DiscretePlant::of(&plant, sections.sample_time_s)
         .map_err(|source| Failure::Plant { file: file.into(), source })?;
-    let judged = judge(&ModelLoop::new(&sampled, sections)?)?;
+    let judged = confirmed_margins(&ModelLoop::new(&sampled, sections)?)?;
     if let Some(physics) = physics {
         physics::say_outside(file, &physics, screen);
         let described = DescribedPlant::new(&physics, linear_crossover_hz(&judged, sections))
@@ -97,17 +94,4 @@ fn of_model(
     }
     screen.result(&judged, &margins_text(&judged)?)?;
     Ok(judged.stable)
-}
-
-/// Margins whose stability verdict the eigenvalues confirm: two algorithms that share no code.
-pub(super) fn judge(l: &ModelLoop<'_>) -> Result<Margins, Failure> {
-    let judged = margins(l);
-    let poles = closed_loop_poles(l)?;
-    let surely = poles.iter().filter(|z| z.norm() > 1.0 + ON_THE_CIRCLE).count() as i64;
-    let possibly = poles.iter().filter(|z| z.norm() > 1.0 - ON_THE_CIRCLE).count() as i64;
-    if (surely..=possibly).contains(&judged.unstable_poles) {
-        return Ok(judged);
-    }
-    let largest = poles.first().map_or(0.0, |z| z.norm());
-    Err(Failure::Disagreement { by_count: judged.unstable_poles, by_eigenvalues: surely, largest })
 }

@@ -35,6 +35,7 @@ mod pareto;
 mod performance_arguments;
 mod physics;
 mod proof;
+mod reliability_readers;
 mod response;
 mod screen;
 mod simulate;

@@ -2,7 +2,7 @@
 
 use super::performance_arguments::NextSweepArguments;
 use super::{Ending, Failure, Screen, load};
-use crate::feedback::{PlanSettings, sweep_plan};
+use crate::feedback::{LoopVerdict, PlanSettings, sweep_plan};
 use crate::report::budget::{narrowing_table, tones_table};
 
 pub(super) fn run(a: &NextSweepArguments, screen: &mut Screen) -> Result<Ending, Failure> {
@@ -27,8 +27,12 @@ pub(super) fn run(a: &NextSweepArguments, screen: &mut Screen) -> Result<Ending,
     };
     let plan = sweep_plan(&sweep.frf, &sections, &settings)?;
     let none = "No tone narrows the intervals by 1 % of their mean width: none is planned.\n";
+    let known = match plan.before.verdict {
+        LoopVerdict::NotKnown => "Stability is NOT KNOWN from this sweep.\n",
+        _ => "",
+    };
     let text = format!(
-        "{}{}\n{}\n{:.2} s of machine time; every point again would take {:.2} s.\n",
+        "{known}{}{}\n{}\n{:.2} s of machine time; every point again would take {:.2} s.\n",
         if plan.tones.is_empty() { none } else { "" },
         tones_table(&plan, "command unit")?.text(),
         narrowing_table(&plan)?.text(),
@@ -36,5 +40,6 @@ pub(super) fn run(a: &NextSweepArguments, screen: &mut Screen) -> Result<Ending,
         plan.full_seconds
     );
     screen.result(&plan, &text)?;
-    Ok(Ending::Accepted)
+    // Margins that are not known are none to accept, however useful the tones.
+    Ok(if plan.before.verdict == LoopVerdict::NotKnown { Ending::Rejected } else { Ending::Accepted })
 }

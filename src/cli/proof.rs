@@ -5,7 +5,7 @@
 
 use super::{Failure, Screen, verify};
 use crate::controller::Controller;
-use crate::document::write_text;
+use crate::document::FileSet;
 use crate::frf::Sweep;
 use crate::lti::Plant;
 use crate::report::certificate::certificate_sentence;
@@ -27,29 +27,35 @@ pub(super) struct Proof {
     pub says: String,
 }
 
-/// Writes a table and its certificate, and says what is proved; none without a certificate asked for.
-pub(super) fn write(
+/// Adds a table and its certificate to the files of one result; what is proved, none without a certificate asked for.
+pub(super) fn add(
     gains: &Path,
     table: &GainTable,
     certificate: Option<&Result<Certificate, String>>,
-    screen: &mut Screen,
+    files: &mut FileSet,
 ) -> Result<Option<Proof>, Failure> {
-    table.write(gains)?;
-    screen.say(&format!("wrote {}", gains.display()));
+    files.write(gains, table.text()?);
     let file = verify::beside(gains);
-    // One of an earlier table would speak of this one.
-    if file.exists() && !matches!(certificate, Some(Ok(_))) {
-        std::fs::remove_file(&file).map_err(|source| Failure::Remove { file: file.clone(), source })?;
-    }
     Ok(match certificate {
-        None => None,
         Some(Ok(c)) => {
-            write_text(&file, &c.text()?)?;
-            screen.say(&format!("wrote {}", file.display()));
+            files.write(&file, c.text()?);
             Some(Proof { file: Some(file), proved: c.proved, says: certificate_sentence(c) })
         }
-        Some(Err(reason)) => Some(Proof { file: None, proved: false, says: format!("No certificate: {reason}.") }),
+        other => {
+            // One of an earlier table would speak of this one.
+            files.remove(&file);
+            let reason = other.and_then(|o| o.as_ref().err());
+            reason.map(|reason| Proof { file: None, proved: false, says: format!("No certificate: {reason}.") })
+        }
     })
+}
+
+/// Writes all files of one result, or none, and says which.
+pub(super) fn commit(files: FileSet, screen: &mut Screen) -> Result<(), Failure> {
+    let names: Vec<String> = files.files().map(|f| f.display().to_string()).collect();
+    files.commit()?;
+    names.iter().for_each(|name| screen.say(&format!("wrote {name}")));
+    Ok(())
 }
 
 /// A sweep that is tuned on, with the files that a certificate names.

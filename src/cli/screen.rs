@@ -2,9 +2,13 @@
 
 use super::Failure;
 use crate::document::printable;
+use crate::document::size_limits::cut;
 use serde::Serialize;
 use std::error::Error;
 use std::io::Write;
+
+/// Longest refusal (characters).
+const REFUSAL: usize = 20_000;
 
 /// The two streams. With `--json` stdout carries one document and nothing else.
 #[derive(Debug)]
@@ -48,6 +52,7 @@ impl Screen {
             }
             cause = c.source();
         }
-        self.say(&text);
+        // A backstop: the rooms quote pieces of a file, never a whole one.
+        self.say(&cut(&text, REFUSAL));
     }
 }

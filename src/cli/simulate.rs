@@ -1,9 +1,9 @@
 //! `servotune simulate`: one spiral write, its PES and DFT.
 
 use super::arguments::SimulateArguments;
-use super::{Ending, Failure, Screen, load, margins, physics};
+use super::{Ending, Failure, Screen, load, physics};
 use crate::document::write_text;
-use crate::feedback::{DescribedLoop, DescribedPlant, ModelLoop, linear_crossover_hz};
+use crate::feedback::{DescribedLoop, DescribedPlant, ModelLoop, confirmed_margins, linear_crossover_hz};
 use crate::lti::DiscretePlant;
 use crate::pes::{PesFigures, context, figures, simulate, simulate_physical};
 use crate::report::pes::{harmonics_table, pes_table};
@@ -35,7 +35,7 @@ pub(super) fn run(a: &SimulateArguments, screen: &mut Screen) -> Result<Ending, 
         controller.sections().map_err(|source| Failure::Controller { file: a.controller.clone(), source })?;
     let sampled = DiscretePlant::of(&plant, controller.sample_time_s)
         .map_err(|source| Failure::Plant { file: a.plant.clone(), source })?;
-    let judged = margins::judge(&ModelLoop::new(&sampled, &sections)?)?;
+    let judged = confirmed_margins(&ModelLoop::new(&sampled, &sections)?)?;
     let physics = physics::restored(&a.plant, &plant, &context(&profile, &controller), screen)?;
     let (run, loop_stable) = match &physics {
         None => (simulate(&plant, &controller, &profile)?, judged.stable),

@@ -1,8 +1,8 @@
 //! One slot tuned: what `tune` and `demo` share, from the machine to the gain table and the page.
 
-use super::{Failure, margins};
+use super::Failure;
 use crate::controller::Controller;
-use crate::feedback::{ModelLoop, OpenLoop};
+use crate::feedback::{ModelLoop, OpenLoop, confirmed_margins};
 use crate::frf::Sweep;
 use crate::identify::Identified;
 use crate::lti::{DiscretePlant, Plant};
@@ -57,7 +57,7 @@ fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Res
     let sections = c.sections().map_err(crate::tune::TuneError::from)?;
     let sampled = DiscretePlant::of(slot.plant, c.sample_time_s)?;
     let l = ModelLoop::new(&sampled, &sections)?;
-    let judged_margins = margins::judge(&l)?;
+    let judged_margins = confirmed_margins(&l)?;
     let (from, to) = (TAU * 10.0, l.end_rad_s());
     let n = (DRAWN_PER_DECADE * (to / from).log10()).ceil() as usize;
     let mut w: Vec<f64> = (0..=n).map(|i| from * (to / from).powf(i as f64 / n as f64)).collect();

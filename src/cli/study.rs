@@ -1,7 +1,7 @@
 //! `servotune study`: the tables and pictures of `results/`, made again.
 
 use super::arguments::{StudyArguments, StudyName};
-use super::{Ending, Failure, Screen, fleet_kills, fleet_reliability, fleet_study};
+use super::{Ending, Failure, Screen, fleet_kills, fleet_reliability, fleet_study, reliability_readers};
 use crate::document::write_text;
 use crate::study;
 use serde::Serialize;
@@ -19,6 +19,7 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::ReliabilityFleet => {
             Some(fleet_reliability::reliability(&a.out, a.kills.unwrap_or(300), a.changes, screen)?)
         }
+        StudyName::ReliabilityReaders => Some(reliability_readers::readers(&a.out, a.runs, screen)?),
         StudyName::FleetScale => Some(fleet_study::scale(&a.out, &a.sizes, screen)?),
         StudyName::FleetShared => Some(fleet_study::shared(&a.out, screen)?),
         _ => None,
@@ -47,6 +48,7 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::Fleet
         | StudyName::FleetKills
         | StudyName::ReliabilityFleet
+        | StudyName::ReliabilityReaders
         | StudyName::FleetScale
         | StudyName::FleetShared => study::Study::default(),
     };

@@ -2,7 +2,7 @@
 
 use crate::frf::{
     AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale, Measured,
-    PhaseConvention, ReadSettings, Unsorted,
+    Outliers, PhaseConvention, ReadSettings, Unsorted,
 };
 use crate::identify::{BodyChoice, Hold, IdentifySettings, OrderChoice, ZeroSide};
 use clap::{Args, ValueEnum};
@@ -36,6 +36,9 @@ pub(super) struct ReadingArguments {
     /// A row with NaN, an infinity or an empty field: refuse or drop
     #[arg(long, default_value_t, value_name = "WORD")]
     bad_points: BadPoints,
+    /// A single point far off its neighbours: drop (with a note), keep (a resonance seen in one point) or refuse
+    #[arg(long, default_value_t, value_name = "WORD")]
+    outliers: Outliers,
     /// Scale of a column of deviations: auto, absolute or relative
     #[arg(long, default_value_t, value_name = "WORD")]
     deviation: DeviationScale,
@@ -61,6 +64,7 @@ impl ReadingArguments {
             duplicates: self.duplicates,
             unsorted: self.unsorted,
             bad_points: self.bad_points,
+            outliers: self.outliers,
             deviation: self.deviation,
             columns: self.columns.clone(),
             dataset: self.dataset,
@@ -91,8 +95,13 @@ impl MeasuredArguments {
 
 fn columns(list: &str) -> Result<ColumnChoice, String> {
     let mut choice = ColumnChoice::default();
+    let mut roles: Vec<&str> = Vec::new();
     for part in list.split(',') {
         let (role, name) = part.split_once('=').ok_or_else(|| format!("found `{part}`; expected ROLE=COLUMN"))?;
+        if roles.contains(&role) {
+            return Err(format!("found the role `{role}` twice; expected each once"));
+        }
+        roles.push(role);
         let name = name.to_owned();
         match role {
             "frequency" => choice.frequency = name,

@@ -5,8 +5,8 @@ use super::proof::{self, Proof};
 use super::slot::{self, Slot};
 use super::{Ending, Failure, Screen, load, physics, tune_machines};
 use crate::controller::Controller;
-use crate::document::{check_target, read_text, sha256_hex, write_text};
-use crate::feedback::Amplitudes;
+use crate::document::{FileSet, check_target, read_text, sha256_hex};
+use crate::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
 use crate::frf::Sweep;
 use crate::identify::{self, Identified, IdentifySettings, identify};
 use crate::lti::Plant;
@@ -91,6 +91,14 @@ impl Given {
         }
     }
 
+    /// Whether `margins` would accept the loop: of a sweep it asks that the points tell stability.
+    fn knows(&self, controller: &Controller) -> Result<bool, Failure> {
+        let Given::Response { sweep, hold, .. } = self else { return Ok(true) };
+        let sections = controller.sections().map_err(TuneError::from)?;
+        let l = MeasuredLoop::new(&sweep.frf, &sections, *hold == Hold::Included)?;
+        Ok(measured_margins(&l)?.verdict != LoopVerdict::NotKnown)
+    }
+
     fn machine(&self) -> Machine<'_> {
         match self {
             Given::Model { plant, .. } => Machine::Model(plant),
@@ -128,20 +136,28 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     if let Some(file) = &a.controller {
         inputs.push(InputDigest { role: "controller".into(), sha256: sha256_hex(read_text(file)?.as_bytes()) });
     }
-    let reached = reach(a, &given, &spec, start.as_ref(), &settings, &inputs, screen)?;
+    let mut reached = reach(a, &given, &spec, start.as_ref(), &settings, &inputs, screen)?;
+    if !given.knows(reached.outcome.controller())? {
+        screen.say(
+            "stability is NOT KNOWN: within what these points leave open the loop of these gains may pass -1 on either side (`servotune margins --frf`); sweep more points around the crossings, or average longer",
+        );
+        reached.tuned = false;
+    }
+    // All that belongs to one table appears together or not at all.
+    let mut files = FileSet::default();
     let (outcome, table) = (&reached.outcome, &reached.table);
     let (mut written, mut proof) = (None, None);
     if reached.tuned || a.keep_infeasible {
-        proof = proof::write(&a.out, table, reached.certificate.as_ref(), screen)?;
+        proof = proof::add(&a.out, table, reached.certificate.as_ref(), &mut files)?;
         written = Some(a.out.as_path());
     } else {
         screen.say("no gain table was written: the limits are not met (--keep-infeasible writes the compromise)");
     }
     if let Some(file) = &a.report {
         let page = report(a, &given, &spec, start.as_ref(), &settings, &reached, proof.as_ref())?;
-        write_text(file, &page)?;
-        screen.say(&format!("wrote {}", file.display()));
+        files.write(file, page);
     }
+    proof::commit(files, screen)?;
     let units = given.units(&a.model);
     let physics = given.physics().zip(reached.physics.as_ref());
     let text = match physics {

@@ -80,6 +80,7 @@ impl VerifyArguments {
 /// Shares of a box, such as gain=5%,frequency=2%.
 pub(super) fn uncertainty(text: &str) -> Result<Uncertainty, String> {
     let mut u = Uncertainty::default();
+    let mut seen: Vec<&str> = Vec::new();
     for part in text.split(',') {
         let wrong =
             || format!("found `{part}`; expected gain, frequency, damping or delay with a share, such as gain=5%");
@@ -92,6 +93,10 @@ pub(super) fn uncertainty(text: &str) -> Result<Uncertainty, String> {
         if !(0.0..1.0).contains(&value) {
             return Err(format!("found `{part}`; expected a share of at least 0 and below 100 %"));
         }
+        if seen.contains(&key.trim()) {
+            return Err(format!("found `{}` twice; expected each once", key.trim()));
+        }
+        seen.push(key.trim());
         match key.trim() {
             "gain" => u.gain = value,
             "frequency" => u.frequency = value,

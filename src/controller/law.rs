@@ -65,6 +65,10 @@ impl<'a> Law<'a> {
             let answer: Vec<f64> = (0..n).map(|_| step_chain(&self.chain, &mut trial, 0.0)).collect();
             free.iter().enumerate().for_each(|(row, &k)| columns[(row, i)] = answer[k]);
         }
+        // A chain that runs away within the first samples tells nothing of where it began.
+        if !columns.iter().chain(right.iter()).all(|x| x.is_finite()) {
+            return memory;
+        }
         let svd = columns.svd(true, true);
         let least = SEEN * svd.singular_values.max();
         if let Ok(found) = svd.solve(&right, least) {

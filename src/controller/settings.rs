@@ -1,6 +1,7 @@
 //! The whole controller: what stands in controller.toml.
 
 use super::{Feedforward, Lowpass, Notch, Pid};
+use crate::document::size_limits::{DAMPING, FILTER_DAMPING, VALUE};
 use crate::lti::{Section, SectionError, Sections};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -34,10 +35,18 @@ pub enum ControllerError {
     /// A number is out of its range.
     #[error("{key} = {found}: expected {expected}")]
     Range { key: &'static str, found: f64, expected: &'static str },
+    /// A filter that hardly decays: nothing can be judged of a controller that rings for ever.
+    #[error(
+        "{filter} at {frequency_hz} Hz: its poles lie {away:e} from the unit circle; expected at least {least:e}: give it more damping or another corner"
+    )]
+    Rings { filter: &'static str, frequency_hz: f64, away: f64, least: f64 },
     /// A filter cannot be put into a section at this sample time.
     #[error(transparent)]
     Section(#[from] SectionError),
 }
+
+/// Least distance of a filter's poles from the unit circle: what rounding of its coefficients moves them by, a thousand times over.
+const LEAST_AWAY: f64 = 1e-11;
 
 impl Controller {
     /// Refuses numbers that are no controller; the key in the error is the one of the file.
@@ -60,7 +69,34 @@ impl Controller {
             range("feedforward.velocity_s", f.velocity_s, true, "a finite number")?;
             range("feedforward.acceleration_s2", f.acceleration_s2, true, "a finite number")?;
         }
-        self.chain().map(|_| ())
+        let gains = [("pid.kp", p.kp), ("pid.ki_per_s", p.ki_per_s), ("pid.kd_s", p.kd_s)];
+        for (key, found) in gains {
+            range(key, found, found.abs() <= VALUE[1], "a finite number of a size up to 1e30")?;
+        }
+        let damping = |key, found: f64, least: f64, expected| {
+            // What is no number at all is refused with the filter's own words below.
+            let good = !found.is_finite() || found <= 0.0 || (least..=DAMPING).contains(&found);
+            if good { Ok(()) } else { Err(ControllerError::Range { key, found, expected }) }
+        };
+        let poles = "a damping ratio from 1e-6 to 1e4";
+        for l in &self.lowpass {
+            damping("lowpass.damping_ratio", l.damping_ratio, FILTER_DAMPING, poles)?;
+        }
+        for n in &self.notch {
+            damping("notch.pole_damping_ratio", n.pole_damping_ratio, FILTER_DAMPING, poles)?;
+            damping("notch.zero_damping_ratio", n.zero_damping_ratio, 0.0, "a damping ratio from 0 to 1e4")?;
+        }
+        let chain = self.chain()?;
+        let lowpass = self.lowpass.iter().map(|l| ("low-pass", l.frequency_hz));
+        let filters = lowpass.chain(self.notch.iter().map(|n| ("notch", n.frequency_hz)));
+        for (section, (filter, frequency_hz)) in chain.iter().skip(1).zip(filters) {
+            // The rule of the second prover: a filter has no pole that is an integrator.
+            let away = section.poles().iter().map(|z| 1.0 - z.norm()).fold(f64::INFINITY, f64::min);
+            if away.is_nan() || away < LEAST_AWAY {
+                return Err(ControllerError::Rings { filter, frequency_hz, away, least: LEAST_AWAY });
+            }
+        }
+        Ok(())
     }
 
     fn chain(&self) -> Result<Vec<Section>, ControllerError> {

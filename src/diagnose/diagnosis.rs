@@ -7,6 +7,7 @@ use super::corrected::{Corrected, corrected};
 use super::finding::*;
 use super::fit_report::fit_report;
 use super::fitted::refit;
+use super::ground;
 use super::held_out::{astray, contradicts, held_out, mean, unseen};
 use super::judge::{Judged, rms};
 use super::line_finding::{line_findings, same_line};
@@ -53,6 +54,16 @@ pub enum DiagnoseError {
         "the plant has {poles} poles beside its resonance pairs, real or unstable ones among them: a diagnosis starts from a second-order body or a free inertia; give the machine's own body, and a lag as [[plant.physics]] is found again if it is there"
     )]
     Body { poles: usize },
+    /// The plant's simulation has nothing to do with the record.
+    #[error(
+        "record `{record}`: the plant as given simulates an error of {ratio:.1e} times the recorded motion; expected a model of this machine: check the units, the gains, the sample rate and the modes of the plant, or fit it anew (`servotune response`, `servotune identify`)"
+    )]
+    Unlike { record: String, ratio: f64 },
+    /// Nothing can be computed of these records under this plant.
+    #[error(
+        "{what} comes out as {found}: these records cannot be diagnosed under this plant; check the sample rate, the units, and the modes of the plant against half the sample rate"
+    )]
+    NotFinite { what: &'static str, found: f64 },
     /// Nothing moves.
     #[error("record `{record}`: the command never changes; expected a record in which the machine is driven")]
     Still { record: String },
@@ -126,6 +137,7 @@ pub fn diagnose(
     let law = controller.map(Law::new).transpose()?;
     let hygiene = check(case, &mut all, given, law.as_ref(), sample_time_s)?;
     let mut bench = Bench::new(given, all, sample_time_s, case.spindle_hz)?;
+    ground::check(&bench)?;
     let mut remarks = Vec::new();
     if controller.is_none() {
         progress("is the command held between samples, or measured");

@@ -66,6 +66,9 @@ pub(super) fn follows_motion(bench: &Bench, model: &Model, at: usize) -> bool {
     if repeats < REPEATS || moves.len() < 2 {
         return false;
     }
+    if !total.iter().chain(pull.iter()).all(|x| x.is_finite()) {
+        return false;
+    }
     let Some(common) = total.svd(true, true).solve(&pull, 1e-12).ok() else { return false };
     let between: f64 = moves
         .iter()

@@ -18,6 +18,7 @@ mod experiment;
 mod finding;
 mod fit_report;
 mod fitted;
+mod ground;
 mod held_out;
 mod hygiene;
 mod judge;

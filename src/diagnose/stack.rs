@@ -235,6 +235,10 @@ impl Normal {
             let gain = 2.0 * self.right.iter().sum::<f64>() - after;
             return Explained { gain, strengths: vec![1.0; m], concealed };
         }
+        // What overflowed on the way explains nothing, and no decomposition of it would end.
+        if !self.gram.iter().chain(&self.right).all(|x| x.is_finite()) {
+            return Explained { gain: 0.0, strengths: vec![0.0; m], concealed: 1.0 };
+        }
         // Scaled normal equations; directions that the others or the basis hold already are dropped.
         let unit = |i: usize| {
             let s = self.gram[(i, i)];
@@ -265,5 +269,19 @@ impl Normal {
         let mix = |x: f64, y: f64| (1.0 - share) * x + share * y;
         let gram = a.gram.zip_map(&b.gram, mix);
         Normal { right, gram, squares: a.squares.iter().zip(&b.squares).map(|(x, y)| mix(*x, *y)).collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equations_that_overflowed_explain_nothing() {
+        for bad in [f64::NAN, f64::INFINITY] {
+            let gram = DMatrix::from_row_slice(2, 2, &[1.0, bad, bad, 1.0]);
+            let e = Normal { right: vec![1.0, 1.0], gram, squares: vec![1.0, 1.0] }.explained(false);
+            assert_eq!((e.gain, e.strengths), (0.0, vec![0.0, 0.0]));
+        }
     }
 }

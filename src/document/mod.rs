@@ -4,12 +4,15 @@
 //! No control meaning lives here; the rooms define what stands in their files. Files: `../shared/contract.md` is
 //! restated in `specs/files.md`.
 
+mod bounded;
 mod digest;
 mod name;
 mod read;
+pub mod size_limits;
 mod write;
 
+pub use bounded::{Bounded, OverLimit};
 pub use digest::sha256_hex;
 pub use name::{A_NAME, LONGEST_NAME, NameError, below, check_name, printable};
-pub use read::{DocumentError, parse_toml, read_text, read_toml, way_on};
-pub use write::{Temporary, check_target, clear_abandoned, write_text, write_whole};
+pub use read::{DocumentError, parse_toml, read_table, read_text, read_toml, way_on};
+pub use write::{FileSet, Temporary, check_target, clear_abandoned, write_text, write_whole};

@@ -1,8 +1,9 @@
 //! Reading a TOML document: the error says file, line, column, what was found and what was expected.
 
 use super::NameError;
+use super::size_limits::{DOCUMENT_BYTES, TABLE_BYTES, cut};
 use serde::de::DeserializeOwned;
-use std::io::{self, ErrorKind};
+use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -16,6 +17,12 @@ pub enum DocumentError {
     /// The bytes are not UTF-8 text.
     #[error("{}: byte {offset} is not UTF-8 text; expected a text file, saved as UTF-8", file.display())]
     NotText { file: PathBuf, offset: usize },
+    /// The file is longer than any such document.
+    #[error("{}: longer than {limit} bytes; expected a document of at most that length", file.display())]
+    TooLong { file: PathBuf, limit: usize },
+    /// What stands at the place of a result is no file that could be replaced.
+    #[error("{}: found {found}; expected a regular file or a name not yet taken: name another", file.display())]
+    NoFile { file: PathBuf, found: &'static str },
     /// The text is not the document expected: a syntax error, a wrong type, a missing or an unknown key.
     #[error("{}:{line}:{column}: {found}", file.display())]
     Content { file: PathBuf, line: usize, column: usize, found: String },
@@ -52,13 +59,30 @@ pub fn way_on(refusal: &io::Error) -> &'static str {
     }
 }
 
-/// The whole text of a file.
+/// The whole text of a document, at most [`DOCUMENT_BYTES`] of it.
 pub fn read_text(file: &Path) -> Result<String, DocumentError> {
-    let bytes =
-        std::fs::read(file).map_err(|source| DocumentError::Io { file: file.into(), action: "read", source })?;
+    text_up_to(file, DOCUMENT_BYTES)
+}
+
+/// The whole text of a table, at most [`TABLE_BYTES`] of it.
+pub fn read_table(file: &Path) -> Result<String, DocumentError> {
+    text_up_to(file, TABLE_BYTES)
+}
+
+/// A pipe, a device or a file that grows tells no length beforehand: the bytes are counted as they come.
+fn text_up_to(file: &Path, limit: usize) -> Result<String, DocumentError> {
+    let fail = |source| DocumentError::Io { file: file.into(), action: "read", source };
+    let mut bytes = Vec::new();
+    std::fs::File::open(file).map_err(fail)?.take(limit as u64 + 1).read_to_end(&mut bytes).map_err(fail)?;
+    if bytes.len() > limit {
+        return Err(DocumentError::TooLong { file: file.into(), limit });
+    }
     String::from_utf8(bytes)
         .map_err(|e| DocumentError::NotText { file: file.into(), offset: e.utf8_error().valid_up_to() })
 }
+
+/// Longest message of the parser that is passed on (characters): it may quote a key of any length.
+const MESSAGE: usize = 600;
 
 /// The document in `text`; `file` only names it in an error.
 pub fn parse_toml<T: DeserializeOwned>(file: &Path, text: &str) -> Result<T, DocumentError> {
@@ -67,7 +91,7 @@ pub fn parse_toml<T: DeserializeOwned>(file: &Path, text: &str) -> Result<T, Doc
         let before = &text.as_bytes()[..at];
         let line = 1 + before.iter().filter(|&&b| b == b'\n').count();
         let column = 1 + before.iter().rev().take_while(|&&b| b != b'\n').count();
-        DocumentError::Content { file: file.into(), line, column, found: e.message().to_owned() }
+        DocumentError::Content { file: file.into(), line, column, found: cut(e.message(), MESSAGE) }
     })
 }
 

@@ -50,12 +50,26 @@ pub struct MarginIntervals {
     pub max_sensitivity: Interval,
 }
 
+/// What a sweep says about the loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LoopVerdict {
+    /// Stable, wherever in their intervals the values of the curve lie.
+    Stable,
+    /// Unstable likewise.
+    Unstable,
+    /// The curve may lie on either side of -1 within what is known of it: too few points, or too much noise.
+    NotKnown,
+}
+
 /// Margins of a measured loop.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeasuredMargins {
-    /// The margins of the interpolated curve.
+    /// The margins of the interpolated curve; `stable` only where the verdict is [`LoopVerdict::Stable`].
     #[serde(flatten)]
     pub margins: Margins,
+    /// What is known of stability.
+    pub verdict: LoopVerdict,
     /// Their intervals.
     pub intervals: MarginIntervals,
     /// Band that was judged (Hz): below and above it nothing is known.
@@ -211,7 +225,7 @@ pub fn measured_margins(l: &MeasuredLoop<'_>) -> Result<MeasuredMargins, Feedbac
     if end_gain >= 1.0 {
         return Err(FeedbackError::OpenEnd { end_hz: last / TAU, gain: end_gain });
     }
-    let m = margins(l);
+    let mut m = margins(l);
     let hz = |i: Interval| Interval { low: i.low / TAU, high: i.high / TAU };
     let gain_reach = m.gain_crossover_hz.map(|f| l.reach(f * TAU, |w| l.at(w).norm().ln()));
     let phase_reach = m.phase_crossover_hz.map(|f| l.reach(f * TAU, |w| (-l.at(w)).arg()));
@@ -225,7 +239,14 @@ pub fn measured_margins(l: &MeasuredLoop<'_>) -> Result<MeasuredMargins, Feedbac
         closest = closest.min((distance - radius).max(0.0));
         farthest = farthest.min(distance + radius);
     }
+    let verdict = match (closest > 0.0, m.stable) {
+        (false, _) => LoopVerdict::NotKnown,
+        (true, true) => LoopVerdict::Stable,
+        (true, false) => LoopVerdict::Unstable,
+    };
+    m.stable = verdict == LoopVerdict::Stable;
     Ok(MeasuredMargins {
+        verdict,
         intervals: MarginIntervals {
             phase_margin_deg: gain_reach.map(|r| l.range(r, degrees, 1f64.to_degrees())),
             gain_crossover_hz: gain_reach.map(hz),

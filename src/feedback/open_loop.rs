@@ -40,6 +40,11 @@ pub enum FeedbackError {
         "{found} points of the sweep lie below half the sample rate, {half_rate_hz} Hz; expected at least {expected}: sweep more points there"
     )]
     FewPoints { found: usize, half_rate_hz: f64, expected: usize },
+    /// Two algorithms that share no code disagree: no answer can be trusted.
+    #[error(
+        "stability: the Nyquist count finds {by_count} unstable poles and the eigenvalues {by_eigenvalues} (largest |z| = {largest:.4e}): no answer is given; check the units of the gains, and for filters or modes with next to no damping"
+    )]
+    Disagreement { by_count: i64, by_eigenvalues: i64, largest: f64 },
     /// The loop gain has not fallen below 1 where the sweep ends: what comes after it decides on stability.
     #[error(
         "the sweep ends at {end_hz:.2} Hz, where |L| = {gain:.4}; expected |L| below 1 there, or stability cannot be judged: sweep on to higher frequencies, or check the units of the gains"

@@ -1,6 +1,6 @@
 //! Poles of the closed loop, by eigenvalues: another way to stability than the Nyquist count.
 
-use super::{FeedbackError, ModelLoop};
+use super::{FeedbackError, Margins, ModelLoop, margins};
 use crate::lti::{DiscretePlant, Section};
 use nalgebra::{Complex, DMatrix, linalg::Schur};
 
@@ -14,6 +14,28 @@ pub fn closed_loop_poles(l: &ModelLoop<'_>) -> Result<Vec<Complex<f64>>, Feedbac
     let mut poles: Vec<Complex<f64>> = schur.complex_eigenvalues().iter().copied().collect();
     poles.sort_by(|a, b| b.norm().total_cmp(&a.norm()).then(b.im.total_cmp(&a.im)));
     Ok(poles)
+}
+
+/// A pole this close to the unit circle counts for either side: the eigenvalues of a matrix of order 40 are no surer.
+const ON_THE_CIRCLE: f64 = 1e-6;
+/// Largest order whose eigenvalues are asked: their work grows with its cube, and a delay of a thousand samples would take minutes.
+const LARGEST: usize = 400;
+
+/// Margins whose stability verdict the eigenvalues confirm: two algorithms that share no code. Refused where they disagree.
+pub fn confirmed_margins(l: &ModelLoop<'_>) -> Result<Margins, FeedbackError> {
+    let judged = margins(l);
+    let order = l.plant().real_form().output.len() + l.plant().whole_delay_samples() + 1 + 2 * l.sections().chain.len();
+    if order > LARGEST {
+        return Ok(judged);
+    }
+    let poles = closed_loop_poles(l)?;
+    let surely = poles.iter().filter(|z| z.norm() > 1.0 + ON_THE_CIRCLE).count() as i64;
+    let possibly = poles.iter().filter(|z| z.norm() > 1.0 - ON_THE_CIRCLE).count() as i64;
+    if (surely..=possibly).contains(&judged.unstable_poles) {
+        return Ok(judged);
+    }
+    let largest = poles.first().map_or(0.0, |z| z.norm());
+    Err(FeedbackError::Disagreement { by_count: judged.unstable_poles, by_eigenvalues: surely, largest })
 }
 
 /// x[k+1] = A x[k]; x is modal states, the commands u[k-1]..u[k-D-1], two states a section.

@@ -5,7 +5,8 @@
 
 use super::FleetError;
 use super::source::{CELSIUS, EXPECTED_CELSIUS, FileSource, SlotFiles, SlotName};
-use crate::document::{printable, read_text};
+use crate::document::size_limits::cut;
+use crate::document::{printable, read_table};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -32,7 +33,7 @@ fn parquet_rows(file: &Path) -> Result<Rows, FleetError> {
 }
 
 fn csv_rows(file: &Path) -> Result<Rows, FleetError> {
-    let text = read_text(file)?;
+    let text = read_table(file)?;
     let fail = |source| FleetError::Csv { file: file.into(), source };
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
@@ -57,7 +58,7 @@ fn of_rows(file: &Path, header: &[String], rows: Vec<Vec<String>>) -> Result<Fil
     let place = |name: &str| header.iter().position(|h| h == name);
     for column in NEEDED {
         if place(column).is_none() {
-            return Err(FleetError::Column { file: file.into(), column, found: header.join(", ") });
+            return Err(FleetError::Column { file: file.into(), column, found: cut(&header.join(", "), 400) });
         }
     }
     let base = file.parent().unwrap_or(Path::new("."));

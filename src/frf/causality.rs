@@ -50,7 +50,8 @@ const LEAD_DEG: f64 = 10.0;
 const LEAD_RATIO: f64 = 1.5;
 /// Largest delay searched, as phase lag at the highest frequency (rad).
 const LARGEST_LAG: f64 = 6.0 * PI;
-/// At most this many points are compared; the gain is integrated over all.
+/// At most so many points are compared, and the gain is integrated over at most so many: of a longer sweep every second, third, ... is taken.
+const INTEGRATED: usize = 4000;
 const COMPARED: usize = 200;
 
 impl Misfit {
@@ -110,6 +111,10 @@ pub(crate) fn evidence(misfits: &[Misfit], answer: impl Fn(&Reading) -> bool) ->
 /// where a magnitude is not positive.
 pub(crate) fn misfits(w: &[f64], magnitude: &[f64], phase: &[f64], readings: &[Reading]) -> Vec<Misfit> {
     let n = w.len();
+    if n > INTEGRATED {
+        let some = |x: &[f64]| x.iter().copied().step_by(n.div_ceil(INTEGRATED)).collect::<Vec<f64>>();
+        return misfits(&some(w), &some(magnitude), &some(phase), readings);
+    }
     if n < LEAST_POINTS || w[n - 1] < LEAST_SPAN * w[0] {
         return Vec::new();
     }

@@ -3,8 +3,10 @@
 //! In: nothing. Out: [`FrfError`]. Spec: `specs/frf.md`.
 
 use super::causality::Evidence;
+use super::dead::{Channel, Dead};
 use super::response::FrfShapeError;
 use super::settings::Measured;
+use crate::document::size_limits::quoted;
 use crate::document::way_on;
 use std::fmt;
 use thiserror::Error;
@@ -111,8 +113,16 @@ impl fmt::Display for Doubt {
     }
 }
 
+/// Names that a message lists at most.
+const LISTED: usize = 20;
+
 fn list(names: &[String]) -> String {
-    if names.is_empty() { "none".to_owned() } else { names.join(" | ") }
+    if names.is_empty() {
+        return "none".to_owned();
+    }
+    let shown: Vec<String> = names.iter().take(LISTED).map(|n| quoted(n)).collect();
+    let more = names.len().saturating_sub(LISTED);
+    shown.join(" | ") + &if more > 0 { format!(" | and {more} more") } else { String::new() }
 }
 
 /// Why a sweep file or a response is refused. `file` is the name as given; lines and columns count from 1.
@@ -135,10 +145,11 @@ pub enum FrfError {
     NoRows { file: String, lines: u64 },
     #[error("{file}, line {line}: a quotation mark is opened and never closed")]
     OpenQuote { file: String, line: u64 },
-    #[error("{file}, line {line}, column {column}: found `{found}`; expected a number")]
+    #[error("{file}, line {line}, column {column}: found `{}`; expected a number", quoted(found))]
     NotANumber { file: String, line: u64, column: usize, found: String },
     #[error(
-        "{file}, line {line}, column {column}: found `{found}`; expected a finite number (--bad-points drop leaves such rows out)"
+        "{file}, line {line}, column {column}: found `{}`; expected a finite number (--bad-points drop leaves such rows out)",
+        quoted(found)
     )]
     NonFinite { file: String, line: u64, column: usize, found: String },
     #[error(
@@ -148,7 +159,8 @@ pub enum FrfError {
     #[error("{file}, line {line}: found {found} fields; expected {expected} as in the rows before")]
     FieldCount { file: String, line: u64, found: usize, expected: usize },
     #[error(
-        "{file}, line {line}: the last line `{found}` is cut off; expected {expected} complete fields and a line break (if it is complete, end it with one)"
+        "{file}, line {line}: the last line `{}` is cut off; expected {expected} complete fields and a line break (if it is complete, end it with one)",
+        quoted(found)
     )]
     CutLine { file: String, line: u64, found: String, expected: usize },
     #[error(
@@ -161,7 +173,7 @@ pub enum FrfError {
     ColumnAbsent { file: String, wanted: &'static str, header: Vec<String> },
     #[error("{file}: several columns could be the {wanted}: {}; choose one by name", list(candidates))]
     ColumnTwice { file: String, wanted: &'static str, candidates: Vec<String> },
-    #[error("{file}: no column is named `{found}`; the header has: {}", list(header))]
+    #[error("{file}: no column is named `{}`; the header has: {}", quoted(found), list(header))]
     ColumnName { file: String, found: String, header: Vec<String> },
     #[error("{file}, line {line}: found frequency {found}; expected a positive one")]
     Frequency { file: String, line: u64, found: f64 },
@@ -181,6 +193,18 @@ pub enum FrfError {
     Unsorted { file: String, line: u64, before: f64, found: f64 },
     #[error("{file}: all {rows} magnitudes are {found}; a measured response varies")]
     ConstantMagnitude { file: String, rows: usize, found: f64 },
+    #[error("{file}: the {channel} {dead}: measure again, or leave these rows out")]
+    DeadChannel { file: String, channel: Channel, dead: Dead },
+    #[error("{file}, line {line}: found phase {found}; expected at most 1e7 deg of size")]
+    PhaseSize { file: String, line: u64, found: f64 },
+    #[error(
+        "{file}, line {line}: the point at {at_hz:.6} Hz stands alone, a factor of {factor:.3e} off its neighbours (--outliers drop leaves it out, --outliers keep takes it as a resonance)"
+    )]
+    Outlier { file: String, line: u64, at_hz: f64, factor: f64 },
+    #[error(
+        "{file}: {found} of {points} points stand alone, far off their neighbours, the first at {first_hz:.6} Hz in line {line}; expected a few at most: measure again (--outliers keep takes them as they are)"
+    )]
+    Outliers { file: String, found: usize, points: usize, line: u64, first_hz: f64 },
     #[error(
         "{file}: the sweep covers {found_low_hz} to {found_high_hz} Hz; {declared_low_hz} to {declared_high_hz} Hz was declared: it stopped early or rows are missing"
     )]
@@ -189,7 +213,7 @@ pub enum FrfError {
     RowsCut { file: String, found: usize, declared: usize },
     #[error("{file}: the data do not tell {question}: {doubt}")]
     Ambiguous { file: String, question: Question, doubt: Doubt },
-    #[error("{file}: the header says `{says}`, the data say otherwise: {doubt}; undecided {question}")]
+    #[error("{file}: the header says `{}`, the data say otherwise: {doubt}; undecided {question}", quoted(says))]
     Contradiction { file: String, question: Question, says: String, doubt: Doubt },
     #[error(
         "{file}: the phase rises with frequency as no causal system's does, as if the file held the complex conjugate: {evidence} (--conjugate yes undoes it, --conjugate no takes the file as it is)"
@@ -204,7 +228,7 @@ pub enum FrfError {
     DatasetAbsent { file: String, wanted: usize, datasets: Vec<String> },
     #[error("{file}, dataset {dataset}: it is of function type {found}; expected 4, a frequency response")]
     DatasetFunction { file: String, dataset: usize, found: i64 },
-    #[error("{file}, dataset {dataset}, line {line}: found `{found}` where {expected} stands by the format")]
+    #[error("{file}, dataset {dataset}, line {line}: found `{}` where {expected} stands by the format", quoted(found))]
     DatasetField { file: String, dataset: usize, line: u64, found: String, expected: &'static str },
     #[error("{file}, dataset {dataset}: found {found} data values; its header declares {expected}")]
     DatasetLength { file: String, dataset: usize, found: usize, expected: usize },

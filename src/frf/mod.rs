@@ -8,15 +8,18 @@ mod bytes;
 mod causality;
 mod closed_loop;
 mod columns;
+mod dead;
 mod decide;
 mod error;
 mod estimate;
+mod gather;
 mod header;
 mod interpolate;
 mod minimum_phase;
 mod note;
 mod number;
 mod order;
+mod outlier;
 mod phase;
 mod read;
 mod response;
@@ -29,8 +32,10 @@ mod write;
 pub use algebra::{feedback, product, ratio};
 pub use causality::{Evidence, Misfit, Reading};
 pub use closed_loop::{Opened, open_loop, scatter};
+pub use dead::{Channel, Dead};
 pub use error::{Doubt, FrfError, NotText, Question};
 pub use estimate::{Estimate, PeriodicSettings, SegmentSettings, periodic, segments};
+pub use gather::{GATHERED_ABOVE, Gathered, gathered};
 pub use interpolate::{Interpolation, resample};
 pub use note::{Ground, Note};
 pub use phase::{check_order, phase_rad};
@@ -38,6 +43,6 @@ pub use read::{Sweep, read_bytes, read_file};
 pub use response::{Frf, FrfShapeError};
 pub use settings::{
     AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale, Measured,
-    PhaseConvention, ReadSettings, UnknownWord, Unsorted,
+    Outliers, PhaseConvention, ReadSettings, UnknownWord, Unsorted,
 };
 pub use write::{PhaseDisplay, write_bod, write_bod_as};

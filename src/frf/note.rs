@@ -4,7 +4,11 @@
 
 use super::causality::Evidence;
 use super::settings::{AngleUnit, FrequencyUnit, MagnitudeScale};
+use crate::document::size_limits::quoted;
 use std::fmt;
+
+/// Names that a note lists at most.
+const LISTED: usize = 20;
 
 /// Where a decision comes from.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +32,7 @@ pub enum Ground {
 impl fmt::Display for Ground {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Ground::Header(words) => write!(f, "the header says `{words}`"),
+            Ground::Header(words) => write!(f, "the header says `{}`", quoted(words)),
             Ground::Format => f.write_str("the file format fixes it"),
             Ground::GainPhase(evidence) => evidence.fmt(f),
             Ground::Value(value) => write!(f, "the value {value} allows nothing else"),
@@ -70,6 +74,8 @@ pub enum Note {
     Averaged { frequencies: usize, rows: usize },
     /// Rows were left out on demand.
     Dropped { rows: usize, first_line: u64 },
+    /// A single point far off its neighbours was left out.
+    Outlier { line: u64, at_hz: f64, factor: f64 },
     /// Part of the sweep is missing.
     Gap { from_hz: f64, to_hz: f64, missing: usize },
     /// The last line has no line break.
@@ -123,6 +129,10 @@ impl fmt::Display for Note {
             Note::Dropped { rows, first_line } => {
                 write!(f, "{rows} rows without finite numbers were left out, the first in line {first_line}.")
             }
+            Note::Outlier { line, at_hz, factor } => write!(
+                f,
+                "The point at {at_hz:.6} Hz (line {line}) stands alone, a factor of {factor:.3e} off its neighbours, and was left out (--outliers keep takes it as a resonance)."
+            ),
             Note::Gap { from_hz, to_hz, missing } => {
                 write!(f, "About {missing} points are missing between {from_hz:.6} and {to_hz:.6} Hz.")
             }
@@ -133,8 +143,15 @@ impl fmt::Display for Note {
             Note::Deviation { relative, ground } => {
                 write!(f, "Standard deviation read as {}: {ground}.", if *relative { "relative" } else { "absolute" })
             }
-            Note::ColumnsIgnored { names } => write!(f, "Columns not used: {}.", names.join(", ")),
-            Note::Dataset { number, of, title } => write!(f, "Read dataset {number} of {of}: {title}."),
+            Note::ColumnsIgnored { names } => {
+                let shown: Vec<String> = names.iter().take(LISTED).map(|n| quoted(n)).collect();
+                let more = names.len().saturating_sub(LISTED);
+                let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+                write!(f, "Columns not used: {}{more}.", shown.join(", "))
+            }
+            Note::Dataset { number, of, title } => {
+                write!(f, "Read dataset {number} of {of}: {}.", quoted(title))
+            }
             Note::DatasetBytes { declared, found } => {
                 write!(
                     f,

@@ -10,10 +10,12 @@ use super::error::FrfError;
 use super::header::Unit;
 use super::note::{Ground, Note};
 use super::order::{Declared, complete, declared, gaps, groups};
+use super::outlier;
 use super::response::Frf;
-use super::settings::{DeviationScale, MagnitudeScale, ReadSettings};
+use super::settings::{DeviationScale, MagnitudeScale, Outliers, ReadSettings};
 use super::table::table;
 use super::uff;
+use crate::document::size_limits::PHASE_DEG;
 use nalgebra::Complex;
 use std::f64::consts::{LN_10, PI, TAU};
 use std::path::Path;
@@ -80,7 +82,13 @@ fn assemble(
     gaps(&hz, notes);
     let (first, second) = (pick(&columns.first), pick(&columns.second));
     varies(file, columns, &first, &second)?;
+    super::dead::constant(file, columns.pair, &first, &second)?;
     positive(file, columns, settings)?;
+    if let Some(i) = columns.second.iter().position(|p| columns.pair == Pair::Polar && p.abs() > PHASE_DEG) {
+        return Err(FrfError::PhaseSize { file: file.to_owned(), line: columns.line[i], found: columns.second[i] });
+    }
+    let line: Vec<u64> = groups.iter().map(|g| columns.line[g[0]]).collect();
+    super::dead::stuck(file, columns, (&hz, &line), (&first, &second))?;
     let reading = reading(file, columns, (&w, &first, &second), settings, notes)?;
     let rows = rows(file, columns, reading)?;
     let mean = |f: &dyn Fn(usize) -> f64, g: &[usize]| g.iter().map(|&i| f(i)).sum::<f64>() / g.len() as f64;
@@ -97,7 +105,45 @@ fn assemble(
         return Err(FrfError::Coherence { file: file.to_owned(), line: columns.line[i], found: c[i] });
     }
     let coherence = columns.coherence.as_ref().map(|c| groups.iter().map(|g| mean(&|i| c[i].min(1.0), g)).collect());
-    let frf = Frf::new(w, value, relative).map_err(|source| FrfError::Shape { file: file.to_owned(), source })?;
+    let shape = |source| FrfError::Shape { file: file.to_owned(), source };
+    let frf = Frf::new(w, value, relative).map_err(shape)?;
+    without_single_points(file, frf, coherence, &line, settings, notes)
+}
+
+/// Most points that may stand alone: these, or one in so many.
+const ALONE: usize = 3;
+const ONE_IN: usize = 100;
+
+/// The response without the points that stand alone, each with a note; as it is where the caller keeps them.
+fn without_single_points(
+    file: &str,
+    frf: Frf,
+    coherence: Option<Vec<f64>>,
+    line: &[u64],
+    settings: &ReadSettings,
+    notes: &mut Vec<Note>,
+) -> Result<(Frf, Option<Vec<f64>>), FrfError> {
+    let alone = match settings.outliers {
+        Outliers::Keep => Vec::new(),
+        Outliers::Drop | Outliers::Refuse => outlier::alone(frf.w_rad_s(), frf.value()),
+    };
+    let Some(&(first, off)) = alone.first() else { return Ok((frf, coherence)) };
+    let hz = |i: usize| frf.w_rad_s()[i] / TAU;
+    if settings.outliers == Outliers::Refuse {
+        let (line, at_hz, factor) = (line[first], hz(first), off.exp());
+        return Err(FrfError::Outlier { file: file.to_owned(), line, at_hz, factor });
+    }
+    if alone.len() > ALONE.max(frf.len() / ONE_IN) {
+        let (found, points, line, first_hz) = (alone.len(), frf.len(), line[first], hz(first));
+        return Err(FrfError::Outliers { file: file.to_owned(), found, points, line, first_hz });
+    }
+    notes.extend(alone.iter().map(|&(i, off)| Note::Outlier { line: line[i], at_hz: hz(i), factor: off.exp() }));
+    let kept: Vec<usize> = (0..frf.len()).filter(|i| !alone.iter().any(|(a, _)| a == i)).collect();
+    let pick = |all: &[f64]| kept.iter().map(|&i| all[i]).collect::<Vec<f64>>();
+    let value = kept.iter().map(|&i| frf.value()[i]).collect();
+    let coherence = coherence.map(|c| pick(&c));
+    let frf = Frf::new(pick(frf.w_rad_s()), value, frf.relative_std().map(pick))
+        .map_err(|source| FrfError::Shape { file: file.to_owned(), source })?;
     Ok((frf, coherence))
 }
 

@@ -1,12 +1,13 @@
 //! The measured response itself: frequencies, complex values, and how uncertain each one is.
 
+use crate::document::size_limits::{SWEEP_POINTS, SWEEP_RAD_S, VALUE};
 use nalgebra::Complex;
 use thiserror::Error;
 
 /// A frequency response on an ascending grid.
 ///
-/// * `w_rad_s`: angular frequencies, strictly ascending, positive, finite (rad/s)
-/// * `value`: position over command at each frequency (position_unit / command_unit), not zero, finite
+/// * `w_rad_s`: angular frequencies, strictly ascending, from 1e-6 to 1e10 rad/s, a million at most
+/// * `value`: position over command at each frequency (position_unit / command_unit), of a size from 1e-30 to 1e30
 /// * `relative_std`: standard deviation of each value divided by its magnitude, where the file carries it
 ///
 /// The fields are private so that the promise of the first two lines holds for every `Frf`.
@@ -29,11 +30,14 @@ pub enum FrfShapeError {
     #[error("a response needs at least one point")]
     Empty,
     /// A frequency is not positive and finite, or not above the one before it.
-    #[error("point {index}: frequency {found_hz} Hz; expected finite, positive and above the point before")]
+    #[error("point {index}: frequency {found_hz} Hz; expected one between 2e-7 and 1.6e9 Hz, above the point before")]
     Frequency { index: usize, found_hz: f64 },
-    /// A value is zero or not finite.
-    #[error("point {index} at {at_hz} Hz: the response is zero or not finite")]
+    /// A value is zero, not finite, or of a size that cannot be computed with.
+    #[error("point {index} at {at_hz} Hz: the response is zero, not finite, or beyond 1e-30 to 1e30")]
     Value { index: usize, at_hz: f64 },
+    /// More points than any sweep has.
+    #[error("{found} points; expected at most {limit}")]
+    Points { found: usize, limit: usize },
     /// A standard deviation is negative or not finite.
     #[error("point {index} at {at_hz} Hz: the standard deviation is negative or not finite")]
     Deviation { index: usize, at_hz: f64 },
@@ -53,18 +57,21 @@ impl Frf {
         if w_rad_s.is_empty() {
             return Err(FrfShapeError::Empty);
         }
+        if value.len() > SWEEP_POINTS {
+            return Err(FrfShapeError::Points { found: value.len(), limit: SWEEP_POINTS });
+        }
         let mut before = 0.0;
         for (index, (&w, v)) in w_rad_s.iter().zip(&value).enumerate() {
             let at_hz = w / std::f64::consts::TAU;
-            if !w.is_finite() || w <= before {
+            if !(SWEEP_RAD_S[0]..=SWEEP_RAD_S[1]).contains(&w) || w <= before {
                 return Err(FrfShapeError::Frequency { index, found_hz: at_hz });
             }
             let size = v.norm();
-            if !size.is_finite() || size == 0.0 {
+            if !(VALUE[0]..=VALUE[1]).contains(&size) {
                 return Err(FrfShapeError::Value { index, at_hz });
             }
             if let Some(s) = relative_std.as_ref().map(|s| s[index])
-                && (!s.is_finite() || s < 0.0)
+                && !(0.0..=VALUE[1]).contains(&s)
             {
                 return Err(FrfShapeError::Deviation { index, at_hz });
             }

@@ -2,6 +2,7 @@
 //!
 //! In: the caller's words. Out: [`ReadSettings`]. Spec: `specs/frf.md`.
 
+use crate::document::size_limits;
 use std::fmt;
 use std::str::FromStr;
 
@@ -144,6 +145,17 @@ choice! {
     } default Plant
 }
 choice! {
+    /// What to do with a single point that stands far off its neighbours (`specs/frf.md`, "Dead channels and single points").
+    Outliers {
+        /// Leave it out, with a note that names its frequency.
+        Drop = "drop",
+        /// Take it as it is: a resonance so sharp that it shows in one point only.
+        Keep = "keep",
+        /// Refuse, naming line and frequency.
+        Refuse = "refuse",
+    } default Drop
+}
+choice! {
     /// How a column of standard deviations is scaled.
     DeviationScale {
         /// From its header word (`rel`, `%`, `dB`); otherwise absolute, with a note.
@@ -195,6 +207,8 @@ pub struct ReadSettings {
     pub unsorted: Unsorted,
     /// What to do with unusable rows.
     pub bad_points: BadPoints,
+    /// What to do with single points far off their neighbours.
+    pub outliers: Outliers,
     /// How a column of standard deviations is scaled.
     pub deviation: DeviationScale,
     /// Which columns to read; `None` finds them from the header or the contract's order.
@@ -220,12 +234,13 @@ impl Default for ReadSettings {
             duplicates: Duplicates::Refuse,
             unsorted: Unsorted::Refuse,
             bad_points: BadPoints::Refuse,
+            outliers: Outliers::Drop,
             deviation: DeviationScale::Auto,
             columns: None,
             dataset: None,
             expected_hz: None,
-            file_limit_bytes: 64 << 20,
-            inflated_limit_bytes: 128 << 20,
+            file_limit_bytes: size_limits::SWEEP_BYTES,
+            inflated_limit_bytes: size_limits::SWEEP_BYTES_UNPACKED,
         }
     }
 }

@@ -5,6 +5,7 @@
 
 use super::GateError;
 use crate::document::sha256_hex;
+use crate::document::size_limits::quoted;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -68,7 +69,7 @@ impl Table {
 
     /// Reads a CSV file. `label` names the column of classes; where the file lacks it, the table has no labels.
     pub fn read(file: &Path, label: Option<&str>) -> Result<Table, GateError> {
-        let text = crate::document::read_text(file)?;
+        let text = crate::document::read_table(file)?;
         Table::parse(file, &text, label)
     }
 
@@ -110,7 +111,7 @@ impl Table {
         let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
         for (id, &line) in ids.iter().zip(&lines).filter(|(id, _)| !id.is_empty()) {
             if let Some(first) = seen.insert(id, line) {
-                return Err(GateError::TwiceId { file: at(), id: id.clone(), first, line });
+                return Err(GateError::TwiceId { file: at(), id: quoted(id), first, line });
             }
         }
         let columns =
@@ -139,8 +140,8 @@ impl Table {
     pub fn column(&self, name: &str) -> Result<&Column, GateError> {
         let column = self.columns.iter().find(|c| c.name == name).ok_or_else(|| GateError::Column {
             file: self.file.clone(),
-            column: name.to_owned(),
-            found: self.columns.iter().map(|c| c.name.clone()).collect(),
+            column: quoted(name),
+            found: self.columns.iter().map(|c| quoted(&c.name)).collect(),
         })?;
         self.sound(column)?;
         Ok(column)
@@ -162,7 +163,7 @@ impl Table {
             Some((line, found)) => Err(GateError::Number {
                 file: self.file.clone(),
                 line: *line,
-                column: column.name.clone(),
+                column: quoted(&column.name),
                 found: found.clone(),
             }),
         }
@@ -193,7 +194,7 @@ impl Column {
     fn push(&mut self, field: &str, line: u64) {
         let value = if field.is_empty() { Some(f64::NAN) } else { field.parse().ok().filter(|x: &f64| x.is_finite()) };
         if value.is_none() && self.fault.is_none() {
-            self.fault = Some((line, field.to_owned()));
+            self.fault = Some((line, quoted(field)));
         }
         self.values.push(value.unwrap_or(f64::NAN));
     }
@@ -211,7 +212,7 @@ fn check_header(file: &Path, header: &[String]) -> Result<(), GateError> {
         if let Some(first) = header[..i].iter().position(|h| h == name) {
             return Err(GateError::TwiceNamed {
                 file: file.into(),
-                column: name.clone(),
+                column: quoted(name),
                 first: first + 1,
                 second: i + 1,
             });

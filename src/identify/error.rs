@@ -1,6 +1,7 @@
 //! Why a response cannot be identified.
 
 use crate::frf::FrfShapeError;
+use crate::lti::LtiError;
 use thiserror::Error;
 
 /// Broken input of identification. Unwelcome mathematics is no error: see the flags of [`Identified`](super::Identified).
@@ -18,6 +19,9 @@ pub enum IdentifyError {
         "{found} points are too few for {modes} resonance pairs: expected at least {needed}; ask for a lower order"
     )]
     TooFewPoints { found: usize, needed: usize, modes: usize },
+    /// The fit ended on a number that is none of a plant: what was measured fits no such model.
+    #[error("the fit ended without a plant, {0}: check the values and the units of the sweep")]
+    NoPlant(LtiError),
     /// The hold cannot be divided out at or above half the sample rate.
     #[error(
         "the response reaches {found_hz} Hz, not below half the sample rate, {nyquist_hz} Hz: lower high_hz or correct the sample time"

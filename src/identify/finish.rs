@@ -11,7 +11,7 @@ use super::spread::{Spread, correlation_inflation};
 use super::sweep::{Sweep, median};
 use super::trust;
 use super::{BodyChoice, IdentifyError, IdentifySettings, ZeroSide};
-use crate::frf::Frf;
+use crate::frf::{Frf, gathered};
 use crate::lti::FrequencyResponse;
 use crate::numeric::golden::Bound;
 use crate::numeric::levenberg::Workspace;
@@ -29,9 +29,10 @@ const UNDETERMINED: f64 = 0.25;
 /// A plant model from a measured response.
 ///
 /// The joint fit minimises ln(measured / model), log magnitude and phase alike, over the noise deviation of each point;
-/// poles are stable by construction. A hard fit is no error: it shows in the residual, the intervals and the trusted band.
+/// poles are stable by construction. A sweep of more than [`GATHERED_ABOVE`](crate::frf::GATHERED_ABOVE) points is gathered first. A hard fit is no error: it shows in the residual, the intervals and the trusted band.
 pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, IdentifyError> {
-    let sweep = Sweep::new(frf, settings)?;
+    let long = gathered(frf);
+    let sweep = Sweep::new(long.as_ref().map_or(frf, |g| &g.frf), settings)?;
     let n = sweep.len();
     let (low, high) = (sweep.w[0], sweep.w[n - 1]);
     let ranges = Ranges {
@@ -92,6 +93,7 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
     let (position_unit, command_unit) = (settings.position_unit.clone(), settings.command_unit.clone());
     let spread = Spread { shape, x: x.clone(), root, sign: start.sign, position_unit, command_unit };
     let plant = shape.plant(&x, start.sign, &settings.position_unit, &settings.command_unit);
+    plant.check().map_err(IdentifyError::NoPlant)?;
 
     let residual: Vec<Complex<f64>> = sweep.w.iter().zip(&sweep.value).map(|(&w, v)| plant.at(w) / v - 1.0).collect();
     let size: Vec<f64> = residual.iter().map(|r| r.norm()).collect();
@@ -124,6 +126,7 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
         condition: joint.memory.qr.condition(),
         converged: out.converged,
         work: joint.work,
+        gathered_from: long.map(|g| g.points),
         w_rad_s: sweep.w.clone(),
         residual,
         plant,

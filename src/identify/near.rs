@@ -9,7 +9,7 @@ use super::shape::{LogFit, Ranges, Shape};
 use super::spread::{Spread, correlation_inflation};
 use super::sweep::Sweep;
 use super::{IdentifyError, IdentifySettings, Work, ZeroSide};
-use crate::frf::Frf;
+use crate::frf::{Frf, gathered};
 use crate::lti::{Body, FrequencyResponse, Plant};
 use crate::numeric::levenberg::Workspace;
 
@@ -42,7 +42,8 @@ pub fn identify_near(
     neighbours: &[Plant],
     settings: &IdentifySettings,
 ) -> Result<Option<Near>, IdentifyError> {
-    let sweep = Sweep::new(frf, settings)?;
+    let long = gathered(frf);
+    let sweep = Sweep::new(long.as_ref().map_or(frf, |g| &g.frf), settings)?;
     let n = sweep.len();
     let (low, high) = (sweep.w[0], sweep.w[n - 1]);
     let ranges = Ranges {
@@ -101,6 +102,7 @@ pub fn identify_near(
     root.iter_mut().for_each(|v| *v *= variance.sqrt());
     let (position_unit, command_unit) = (settings.position_unit.clone(), settings.command_unit.clone());
     let plant = shape.plant(&x, sign, &position_unit, &command_unit);
+    plant.check().map_err(IdentifyError::NoPlant)?;
     let ratio = {
         let fit = LogFit { shape, w: &sweep.w, target: &joint.target, weight: &joint.weight, ranges };
         let mut out = Vec::new();

@@ -122,7 +122,9 @@ pub struct Identified {
     pub stepwise_bounds: Option<(Bound, Bound)>,
     /// Names of parameters on an end of their range, as in the plant file.
     pub at_bound: Vec<String>,
-    /// Angular frequencies used (rad/s).
+    /// Points of the sweep where the fit saw means of neighbouring ones; none where it saw every point.
+    pub gathered_from: Option<usize>,
+    /// Angular frequencies used, those of the means for a gathered sweep (rad/s).
     pub w_rad_s: Vec<f64>,
     /// model / measured - 1 at each of them.
     pub residual: Vec<Complex<f64>>,

@@ -5,10 +5,8 @@
 //! which is the modified z-transform (Åström & Wittenmark, Computer-Controlled Systems, ch. 2), eq. (31)'s counterpart.
 
 use super::{FrequencyResponse, LtiError, ModalForm, Plant};
+use crate::document::size_limits::DELAY_SAMPLES;
 use nalgebra::{Complex, DMatrix};
-
-/// Longest delay taken (samples): a guard against a delay typed in the wrong unit.
-const DELAY_LIMIT: usize = 1000;
 
 /// The exactly sampled plant. Arrays hold one entry per term; a complex pole stands for itself and its conjugate.
 ///
@@ -72,9 +70,9 @@ impl DiscretePlant {
     /// Samples a sum of modes at `sample_time_s` (s, above 0).
     pub fn of_modal(modal: &ModalForm, sample_time_s: f64) -> Result<DiscretePlant, LtiError> {
         let samples = modal.delay_s / sample_time_s;
-        if samples > DELAY_LIMIT as f64 {
+        if samples > DELAY_SAMPLES as f64 {
             let delay_s = modal.delay_s;
-            return Err(LtiError::Delay { delay_s, sample_time_s, samples, limit: DELAY_LIMIT });
+            return Err(LtiError::Delay { delay_s, sample_time_s, samples, limit: DELAY_SAMPLES });
         }
         // A delay within rounding of whole samples is that many samples: 79.2 us at 39.6 us is two, not one and a rest.
         let nearest = samples.round();

@@ -3,6 +3,7 @@
 //! P(s) = resonance_gain exp(-delay s) body(s) Π (s² + 2 ζz ωz s + ωz²)/(s² + 2 ζp ωp s + ωp²), eqs. (21), (29), (30).
 
 use super::{FrequencyResponse, Rational};
+use crate::document::size_limits::{DAMPING, PLANT_MODES, PLANT_RAD_S, VALUE};
 use nalgebra::Complex;
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -203,52 +204,45 @@ impl Plant {
 
     /// Refuses numbers that are no plant; the key in the error is the one of the plant file. Only a rational body may be unstable.
     pub fn check(&self) -> Result<(), LtiError> {
-        let finite = |key: &str, found: f64| {
-            let expected = "a finite number, not 0";
-            if found.is_finite() && found != 0.0 {
-                Ok(())
-            } else {
-                Err(LtiError::Range { key: key.into(), found, expected })
-            }
+        let range = |key: String, found: f64, good: bool, expected: &'static str| {
+            if found.is_finite() && good { Ok(()) } else { Err(LtiError::Range { key, found, expected }) }
         };
-        let positive = |key: &str, found: f64| {
-            let expected = "a finite number above 0";
-            if found.is_finite() && found > 0.0 {
-                Ok(())
-            } else {
-                Err(LtiError::Range { key: key.into(), found, expected })
-            }
+        let gain = |key: &str, found: f64| {
+            let good = (VALUE[0]..=VALUE[1]).contains(&found.abs());
+            range(key.into(), found, good, "a number of a size from 1e-30 to 1e30, not 0")
         };
-        let not_negative = |key: &str, found: f64| {
-            let expected = "a finite number, at least 0";
-            if found.is_finite() && found >= 0.0 {
-                Ok(())
-            } else {
-                Err(LtiError::Range { key: key.into(), found, expected })
-            }
+        let root = |key: String, found: f64| {
+            let good = (PLANT_RAD_S[0]..=PLANT_RAD_S[1]).contains(&found);
+            range(key, found, good, "a frequency above 0, from 1e-4 to 1e9 rad/s")
+        };
+        let damping = |key: String, found: f64| {
+            range(key, found, found > 0.0 && found <= DAMPING, "a finite number above 0, at most 1e4")
         };
         match self.body {
             Body::Rational(ref r) => r.check(self.modes.len())?,
             Body::SecondOrder { dc_gain, natural_frequency_rad_s, damping_ratio } => {
-                finite("plant.dc_gain", dc_gain)?;
-                positive("plant.natural_frequency_rad_s", natural_frequency_rad_s)?;
-                positive("plant.damping_ratio", damping_ratio)?;
+                gain("plant.dc_gain", dc_gain)?;
+                root("plant.natural_frequency_rad_s".into(), natural_frequency_rad_s)?;
+                damping("plant.damping_ratio".into(), damping_ratio)?;
             }
-            Body::FreeInertia { acceleration_gain, viscous_rate_per_s } => {
-                finite("plant.acceleration_gain", acceleration_gain)?;
-                not_negative("plant.viscous_rate_per_s", viscous_rate_per_s)?;
+            Body::FreeInertia { acceleration_gain, viscous_rate_per_s: rate } => {
+                gain("plant.acceleration_gain", acceleration_gain)?;
+                let good = (0.0..=PLANT_RAD_S[1]).contains(&rate);
+                range("plant.viscous_rate_per_s".into(), rate, good, "a finite number, at least 0 and at most 1e9")?;
             }
         }
-        not_negative("plant.delay_s", self.delay_s)?;
-        finite("plant.resonance_gain", self.resonance_gain)?;
+        range("plant.delay_s".into(), self.delay_s, self.delay_s >= 0.0, "a finite number, at least 0")?;
+        gain("plant.resonance_gain", self.resonance_gain)?;
+        if self.modes.len() > PLANT_MODES {
+            let found = self.modes.len() as f64;
+            return range("plant.modes".into(), found, false, "at most 200 modes");
+        }
         for (i, m) in self.modes.iter().enumerate() {
-            positive(&format!("plant.modes[{i}].zero_rad_s"), m.zero_rad_s)?;
-            positive(&format!("plant.modes[{i}].pole_rad_s"), m.pole_rad_s)?;
-            positive(&format!("plant.modes[{i}].pole_damping_ratio"), m.pole_damping_ratio)?;
-            if !m.zero_damping_ratio.is_finite() {
-                let key = format!("plant.modes[{i}].zero_damping_ratio");
-                return Err(LtiError::Range { key, found: m.zero_damping_ratio, expected: "a finite number" });
-            }
+            root(format!("plant.modes[{i}].zero_rad_s"), m.zero_rad_s)?;
+            root(format!("plant.modes[{i}].pole_rad_s"), m.pole_rad_s)?;
+            damping(format!("plant.modes[{i}].pole_damping_ratio"), m.pole_damping_ratio)?;
+            let (key, zero) = (format!("plant.modes[{i}].zero_damping_ratio"), m.zero_damping_ratio);
+            range(key, zero, zero.abs() <= DAMPING, "a finite number of a size up to 1e4")?;
         }
         Ok(())
     }

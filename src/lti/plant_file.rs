@@ -144,7 +144,7 @@ mod tests {
     use crate::lti::FrequencyResponse;
     use std::path::Path;
 
-    const FREE: &str = "position_unit='m'\ncommand_unit='V'\n[plant]\nnatural_frequency_rad_s=0\nacceleration_gain=2.0\nviscous_rate_per_s=1.0\n";
+    const FREE: &str = "position_unit='m'\ncommand_unit='V'\n[plant]\nnatural_frequency_rad_s=0\nacceleration_gain=2.0\nviscous_rate_per_s=1.0\ndelay_s=0.0\n";
 
     #[test]
     fn a_plant_survives_the_way_to_the_file_and_back() {

@@ -13,10 +13,10 @@ pub const HIGH_BAND_HZ: [f64; 2] = [1500.0, 3000.0];
 pub struct PesFigures {
     /// Harmonics 1 to N/2.
     pub harmonics: Vec<Harmonic>,
-    /// Euclidean norm over 600 to 1500 Hz, eq. (42).
-    pub dft_low: f64,
-    /// Euclidean norm over 1500 to 3000 Hz, eq. (43).
-    pub dft_high: f64,
+    /// Euclidean norm over 600 to 1500 Hz, eq. (42); none where the window has no bin there.
+    pub dft_low: Option<f64>,
+    /// Euclidean norm over 1500 to 3000 Hz, eq. (43); none where the window has no bin there.
+    pub dft_high: Option<f64>,
     /// Largest less smallest PES of the window.
     pub pes_range: f64,
     /// Standard deviation of the window, eq. (44) (divided by N).
@@ -37,14 +37,16 @@ pub fn window_figures(window: &[f64], rate_hz: f64) -> PesFigures {
     dft.amplitudes(window, &mut amplitude);
     let harmonics =
         dft.bins().iter().zip(&amplitude).map(|(&k, &amplitude)| Harmonic { k, hz: dft.hz(k), amplitude }).collect();
+    // Without a bin there is no figure: a norm of nothing would be 0, the best of all.
+    let band = |hz| dft.inside(hz).next().map(|_| dft.band(&amplitude, hz));
     let n = window.len() as f64;
     let mean = window.iter().sum::<f64>() / n;
     let high = window.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let low = window.iter().copied().fold(f64::INFINITY, f64::min);
     PesFigures {
         harmonics,
-        dft_low: dft.band(&amplitude, LOW_BAND_HZ),
-        dft_high: dft.band(&amplitude, HIGH_BAND_HZ),
+        dft_low: band(LOW_BAND_HZ),
+        dft_high: band(HIGH_BAND_HZ),
         pes_range: high - low,
         pes_std: (window.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt(),
     }

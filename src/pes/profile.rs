@@ -1,5 +1,6 @@
 //! profile.toml: the spiral write that is simulated.
 
+use crate::document::size_limits::WRITE_SAMPLES;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -97,9 +98,6 @@ pub enum ProfileError {
     Length { duration_s: f64, samples: f64, limit: usize },
 }
 
-/// Longest record simulated (samples), 80 s at the paper's rate.
-const SAMPLE_LIMIT: usize = 2_000_000;
-
 impl Profile {
     /// Refuses numbers that are no spiral write; the key in the error is the one of the file.
     pub fn check(&self) -> Result<(), ProfileError> {
@@ -133,8 +131,8 @@ impl Profile {
             range("noise.runout.phase_deg", r.phase_deg, true, "a finite angle")?;
         }
         let samples = s.duration_s * rate;
-        if samples > SAMPLE_LIMIT as f64 {
-            return Err(ProfileError::Length { duration_s: s.duration_s, samples, limit: SAMPLE_LIMIT });
+        if samples > WRITE_SAMPLES as f64 {
+            return Err(ProfileError::Length { duration_s: s.duration_s, samples, limit: WRITE_SAMPLES });
         }
         let [first, last] = self.pes.window;
         let available = self.servo_samples().saturating_sub(self.first_servo_sample());
@@ -142,6 +140,14 @@ impl Profile {
             return Err(ProfileError::Window { first, last, available });
         }
         Ok(())
+    }
+
+    /// Bins of the window's DFT, from 1 to N/2, that lie in a band (Hz, ends included).
+    pub fn bins_in(&self, [low_hz, high_hz]: [f64; 2]) -> usize {
+        let [first, last] = self.pes.window;
+        let n = last.saturating_sub(first);
+        let hz = |k: usize| k as f64 * self.pes.sample_rate_hz / n as f64;
+        (1..=n / 2).filter(|&k| (low_hz..=high_hz).contains(&hz(k))).count()
     }
 
     /// Number of servo samples in the record: those at j/rate <= duration_s.

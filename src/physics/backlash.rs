@@ -30,7 +30,8 @@ struct Play {
 
 impl Play {
     fn next(&self, from: &Sample, to: &Sample) -> f64 {
-        self.part.unwrap_or(from.x).clamp(to.x - self.half, to.x + self.half)
+        // Not `clamp`, which panics where the motion is no number.
+        self.part.unwrap_or(from.x).max(to.x - self.half).min(to.x + self.half)
     }
 }
 

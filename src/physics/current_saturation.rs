@@ -26,7 +26,7 @@ struct Clip {
 
 impl Law for Clip {
     fn columns(&self, _from: &Sample, to: &Sample, out: &mut [f64]) {
-        out[0] = to.u.clamp(-self.limit, self.limit) - to.u;
+        out[0] = to.u.max(-self.limit).min(self.limit) - to.u;
     }
 }
 

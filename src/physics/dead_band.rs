@@ -28,7 +28,7 @@ struct Zone {
 
 impl Law for Zone {
     fn columns(&self, _from: &Sample, to: &Sample, out: &mut [f64]) {
-        out[0] = -to.u.clamp(-self.half, self.half);
+        out[0] = -to.u.max(-self.half).min(self.half);
     }
 }
 

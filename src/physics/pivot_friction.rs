@@ -90,7 +90,7 @@ impl MaxwellSlip {
     fn moved(&self, dx: f64) -> [f64; ELEMENTS] {
         let mut next = self.stretch;
         for (s, y) in next.iter_mut().zip(&self.yields) {
-            *s = (*s + dx).clamp(-y, *y);
+            *s = (*s + dx).max(-y).min(*y);
         }
         next
     }

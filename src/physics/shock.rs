@@ -31,8 +31,8 @@ struct Pulse {
 
 impl Law for Pulse {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        let a = (from.t - self.start).clamp(0.0, self.width);
-        let b = (to.t - self.start).clamp(0.0, self.width);
+        let a = (from.t - self.start).max(0.0).min(self.width);
+        let b = (to.t - self.start).max(0.0).min(self.width);
         let step = to.t - from.t;
         out[0] = if b > a && step > 0.0 {
             // cos p - cos q as a product: no cancellation within a wide pulse.

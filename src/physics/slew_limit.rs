@@ -36,7 +36,7 @@ impl Limiter {
     fn next(&self, from: &Sample, to: &Sample) -> [f64; 2] {
         let now = self.current.unwrap_or(from.u);
         let off = to.u - now;
-        let end = now + off.clamp(-self.step, self.step);
+        let end = now + off.max(-self.step).min(self.step);
         if !self.ramps {
             return [end, end];
         }

@@ -1,9 +1,11 @@
 //! Chosen columns of a CSV file, by the names in its header.
 
 use super::RecordingError;
+use crate::document::size_limits::{self, quoted as cut};
+use crate::document::{Bounded, OverLimit};
 use flate2::read::MultiGzDecoder;
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Columns of one record, in the order asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,45 +17,115 @@ pub struct Columns {
 /// Shortest record that is one.
 const LEAST_ROWS: usize = 2;
 
-/// Opens a comma-separated file with a header line; gzip is recognised by its first bytes.
-pub(super) fn open_table(file: &Path) -> Result<csv::Reader<Box<dyn Read>>, RecordingError> {
-    let io = |source| RecordingError::Io { file: file.into(), source };
-    let mut bytes = BufReader::new(std::fs::File::open(file).map_err(io)?);
-    let packed = bytes.fill_buf().map_err(io)?.starts_with(&[0x1f, 0x8b]);
-    let text: Box<dyn Read> = if packed { Box::new(MultiGzDecoder::new(bytes)) } else { Box::new(bytes) };
-    Ok(csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text))
+/// A comma-separated file with its header read; bytes, rows and samples are limited as [`size_limits`] says.
+pub(super) struct Rows {
+    file: PathBuf,
+    reader: csv::Reader<Bounded<Box<dyn Read>>>,
+    header: csv::StringRecord,
+    row: csv::StringRecord,
+}
+
+impl Rows {
+    /// Opens a file; gzip is recognised by its first bytes.
+    pub fn open(file: &Path) -> Result<Rows, RecordingError> {
+        let io = |source| RecordingError::Io { file: file.into(), source };
+        let mut bytes = BufReader::new(std::fs::File::open(file).map_err(io)?);
+        let packed = bytes.fill_buf().map_err(io)?.starts_with(&[0x1f, 0x8b]);
+        let text: Box<dyn Read> = if packed { Box::new(MultiGzDecoder::new(bytes)) } else { Box::new(bytes) };
+        let text = Bounded::new(text, size_limits::RECORD_BYTES_UNPACKED, size_limits::ROW_BYTES);
+        let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
+        let (header, row) = (csv::StringRecord::new(), csv::StringRecord::new());
+        let mut rows = Rows { file: file.into(), reader, header, row };
+        rows.header = match rows.reader.headers() {
+            Ok(header) => header.clone(),
+            Err(e) => return Err(rows.refuse(e)),
+        };
+        rows.reader.get_ref().row_ended();
+        Ok(rows)
+    }
+
+    fn refuse(&self, source: csv::Error) -> RecordingError {
+        let file = self.file.clone();
+        let over = if let csv::ErrorKind::Io(e) = source.kind() { OverLimit::of(e) } else { None };
+        match over {
+            Some(source) => RecordingError::Size { file, source },
+            None => RecordingError::Table { file, source },
+        }
+    }
+
+    /// Where a column stands; none where it is absent. Two of one name are refused: nobody can say which is meant.
+    pub fn place(&self, name: &str) -> Result<Option<usize>, RecordingError> {
+        let mut found = self.header.iter().enumerate().filter(|(_, h)| *h == name).map(|(i, _)| i);
+        match (found.next(), found.next()) {
+            (Some(first), Some(second)) => Err(RecordingError::ColumnTwice {
+                file: self.file.clone(),
+                column: cut(name),
+                first: first + 1,
+                second: second + 1,
+            }),
+            (first, _) => Ok(first),
+        }
+    }
+
+    /// The same, refused where it is absent.
+    pub fn need(&self, name: &str) -> Result<usize, RecordingError> {
+        self.place(name)?.ok_or_else(|| RecordingError::Column {
+            file: self.file.clone(),
+            wanted: cut(name),
+            found: self.header.iter().take(NAMED).map(cut).collect(),
+        })
+    }
+
+    /// The next row; none at the end.
+    pub fn next(&mut self) -> Result<Option<&csv::StringRecord>, RecordingError> {
+        match self.reader.read_record(&mut self.row) {
+            Ok(true) => {}
+            Ok(false) => return Ok(None),
+            Err(e) => return Err(self.refuse(e)),
+        }
+        self.reader.get_ref().row_ended();
+        Ok(Some(&self.row))
+    }
+
+    /// Refuses more samples than a record may have.
+    pub fn fits(&self, kept: usize) -> Result<(), RecordingError> {
+        let limit = size_limits::RECORD_SAMPLES;
+        if kept > limit { Err(RecordingError::Long { file: self.file.clone(), limit }) } else { Ok(()) }
+    }
+
+    /// The refusal of a field of the row read last.
+    pub fn number(&self, column: &str, found: &str) -> RecordingError {
+        RecordingError::Number {
+            file: self.file.clone(),
+            line: self.row.position().map_or(0, csv::Position::line),
+            column: cut(column),
+            found: cut(found),
+        }
+    }
+}
+
+/// Columns of a header that a refusal lists at most.
+const NAMED: usize = 20;
+
+/// A field as a finite number of a size that can be computed with.
+pub(super) fn number(field: &str) -> Option<f64> {
+    field.parse::<f64>().ok().filter(|x| x.is_finite() && x.abs() <= size_limits::VALUE[1])
 }
 
 /// Reads the columns `wanted` of a comma-separated file with a header line; gzip is recognised by its first bytes.
 pub fn read_columns(file: &Path, wanted: &[&str]) -> Result<Columns, RecordingError> {
-    let mut rows = open_table(file)?;
-    let table = |source| RecordingError::Table { file: file.into(), source };
-    let header = rows.headers().map_err(table)?.clone();
-    let place = |name: &&str| {
-        header.iter().position(|h| h == *name).ok_or_else(|| RecordingError::Column {
-            file: file.into(),
-            wanted: (*name).to_owned(),
-            found: header.iter().map(str::to_owned).collect(),
-        })
-    };
-    let places = wanted.iter().map(place).collect::<Result<Vec<usize>, _>>()?;
+    let mut rows = Rows::open(file)?;
+    let places = wanted.iter().map(|name| rows.need(name)).collect::<Result<Vec<usize>, _>>()?;
     let mut values = vec![Vec::new(); wanted.len()];
-    let mut row = csv::StringRecord::new();
-    while rows.read_record(&mut row).map_err(table)? {
-        for ((&at, name), column) in places.iter().zip(wanted).zip(&mut values) {
-            let field = row.get(at).unwrap_or_default();
-            match field.parse::<f64>() {
-                Ok(x) if x.is_finite() => column.push(x),
-                _ => {
-                    return Err(RecordingError::Number {
-                        file: file.into(),
-                        line: row.position().map_or(0, csv::Position::line),
-                        column: (*name).to_owned(),
-                        found: field.to_owned(),
-                    });
-                }
+    while let Some(row) = rows.next()? {
+        let found: Vec<Option<f64>> = places.iter().map(|&at| number(row.get(at).unwrap_or_default())).collect();
+        for (k, (found, column)) in found.into_iter().zip(&mut values).enumerate() {
+            match found {
+                Some(x) => column.push(x),
+                None => return Err(rows.number(wanted[k], rows.row.get(places[k]).unwrap_or_default())),
             }
         }
+        rows.fits(values.first().map_or(0, Vec::len))?;
     }
     let rows = values.first().map_or(0, Vec::len);
     if rows < LEAST_ROWS {

@@ -17,8 +17,17 @@ pub enum RecordingError {
     /// A column is missing.
     #[error("{}: no column `{wanted}`; the header has: {}", file.display(), found.join(", "))]
     Column { file: PathBuf, wanted: String, found: Vec<String> },
+    /// Two columns of one name.
+    #[error("{}: column `{column}` stands in places {first} and {second} of the header; expected it once", file.display())]
+    ColumnTwice { file: PathBuf, column: String, first: usize, second: usize },
+    /// The file is longer than any record.
+    #[error("{}: {source}; expected a record within that", file.display())]
+    Size { file: PathBuf, source: crate::document::OverLimit },
+    /// There are more rows than any record has.
+    #[error("{}: more than {limit} samples; cut it into shorter records, or read a part of it (`diagnose --rows`)", file.display())]
+    Long { file: PathBuf, limit: usize },
     /// A field is no number.
-    #[error("{}:{line}: column `{column}`: found `{found}`; expected a finite number", file.display())]
+    #[error("{}:{line}: column `{column}`: found `{found}`; expected a finite number of a size up to 1e30", file.display())]
     Number { file: PathBuf, line: u64, column: String, found: String },
     /// There are too few rows.
     #[error("{}: {rows} rows; expected at least {needed}", file.display())]

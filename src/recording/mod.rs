@@ -6,9 +6,11 @@
 mod case;
 mod columns;
 mod error;
+mod packed;
 mod record;
 
 pub use case::{Case, RecordEntry, Role};
 pub use columns::{Columns, read_columns};
 pub use error::RecordingError;
+pub use packed::gzip;
 pub use record::{ClockGap, ColumnNames, Record, RecordSettings};

@@ -1,7 +1,7 @@
 //! One time record of a machine: reference, excitation, command, position, and what else was logged.
 
 use super::RecordingError;
-use super::columns::open_table;
+use super::columns::{Rows, number};
 use std::path::{Path, PathBuf};
 
 /// Names of the columns in the file; the contract's names by default.
@@ -92,59 +92,48 @@ impl Record {
 
     /// Reads a record.
     pub fn read(file: &Path, settings: &RecordSettings) -> Result<Record, RecordingError> {
-        let mut rows = open_table(file)?;
-        let table = |source| RecordingError::Table { file: file.into(), source };
-        let header = rows.headers().map_err(table)?.clone();
+        let mut rows = Rows::open(file)?;
         let names = &settings.names;
-        let place = |name: &str| header.iter().position(|h| h == name);
-        let need = |name: &str| {
-            place(name).ok_or_else(|| RecordingError::Column {
-                file: file.into(),
-                wanted: name.to_owned(),
-                found: header.iter().map(str::to_owned).collect(),
-            })
-        };
         let clock = match settings.sample_time_s {
-            Some(_) => place(&names.time),
-            None => Some(need(&names.time)?),
+            Some(_) => rows.place(&names.time)?,
+            None => Some(rows.need(&names.time)?),
         };
         // Order of the columns below; the last three may be absent, and PES may be blank.
         let wanted: [(&str, Option<usize>); 8] = [
             (&names.time, clock),
-            (&names.command, Some(need(&names.command)?)),
-            (&names.position, Some(need(&names.position)?)),
-            (&names.reference, place(&names.reference)),
-            (&names.excitation, place(&names.excitation)),
-            ("pes", place("pes")),
-            ("spindle_rad", place("spindle_rad")),
-            ("temperature_c", place("temperature_c")),
+            (&names.command, Some(rows.need(&names.command)?)),
+            (&names.position, Some(rows.need(&names.position)?)),
+            (&names.reference, rows.place(&names.reference)?),
+            (&names.excitation, rows.place(&names.excitation)?),
+            ("pes", rows.place("pes")?),
+            ("spindle_rad", rows.place("spindle_rad")?),
+            ("temperature_c", rows.place("temperature_c")?),
         ];
         let mut values: [Vec<f64>; 8] = std::array::from_fn(|_| Vec::new());
-        let mut row = csv::StringRecord::new();
         let [first, last] = settings.rows.unwrap_or([0, usize::MAX]);
         let mut index = 0;
-        while rows.read_record(&mut row).map_err(table)? {
+        while let Some(row) = rows.next()? {
             index += 1;
             if index <= first || index > last {
                 continue;
             }
+            let mut wrong = None;
             for (k, (name, at)) in wanted.iter().enumerate() {
                 let Some(at) = at else { continue };
                 let field = row.get(*at).unwrap_or_default();
-                let value = match field.parse::<f64>() {
-                    Ok(x) if x.is_finite() => x,
-                    _ if k == 5 && field.is_empty() => f64::NAN,
-                    _ => {
-                        return Err(RecordingError::Number {
-                            file: file.into(),
-                            line: row.position().map_or(0, csv::Position::line),
-                            column: (*name).to_owned(),
-                            found: field.to_owned(),
-                        });
+                match number(field) {
+                    Some(x) => values[k].push(x),
+                    None if k == 5 && field.is_empty() => values[k].push(f64::NAN),
+                    None => {
+                        wrong = Some((*name, field.to_owned()));
+                        break;
                     }
-                };
-                values[k].push(value);
+                }
             }
+            if let Some((name, field)) = wrong {
+                return Err(rows.number(name, &field));
+            }
+            rows.fits(values[2].len())?;
         }
         let [time, command, position, reference, excitation, pes, spindle, temperature] = values;
         if position.len() < LEAST_ROWS {

@@ -124,6 +124,12 @@ pub fn identified_sentences(id: &Identified) -> Vec<String> {
             "The model is NOT to be trusted anywhere: no stretch of the sweep is followed closely enough.".to_owned()
         },
     ];
+    if let Some(points) = id.gathered_from {
+        said.push(format!(
+            "The sweep's {points} points were gathered to {} for the fit: each is the mean of neighbours that lie on one line. Margins of a sweep are judged over every point.",
+            id.w_rad_s.len()
+        ));
+    }
     if let crate::identify::BodyEvidence::BelowSweep { lowest_hz } = id.body {
         let form =
             if matches!(id.plant.body, Body::FreeInertia { .. }) { "a free inertia" } else { "the form asked for" };

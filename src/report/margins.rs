@@ -3,7 +3,7 @@
 use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Cell, Column, Table, Verdict};
-use crate::feedback::{Interval, MarginIntervals, Margins, MeasuredMargins};
+use crate::feedback::{Interval, LoopVerdict, MarginIntervals, Margins, MeasuredMargins};
 
 /// The figures of one loop as rows of name, value, unit, place.
 pub fn margins_table(m: &Margins) -> Result<Table, ReportError> {
@@ -85,10 +85,10 @@ pub fn interval_table(caption: &str, g: &Margins, i: &MarginIntervals) -> Result
 
 /// The named margins of a measured loop with their 95 % intervals.
 pub fn measured_table(m: &MeasuredMargins) -> Result<Table, ReportError> {
-    let caption = if m.margins.stable {
-        "Margins of the measured loop (stable)"
-    } else {
-        "Margins of the measured loop (UNSTABLE)"
+    let caption = match m.verdict {
+        LoopVerdict::Stable => "Margins of the measured loop (stable)",
+        LoopVerdict::Unstable => "Margins of the measured loop (UNSTABLE)",
+        LoopVerdict::NotKnown => "Margins of the measured loop (stability NOT KNOWN)",
     };
     interval_table(caption, &m.margins, &m.intervals)
 }
@@ -96,8 +96,15 @@ pub fn measured_table(m: &MeasuredMargins) -> Result<Table, ReportError> {
 /// Tables of a measured loop for a terminal, with what is taken for granted.
 pub fn measured_text(m: &MeasuredMargins) -> Result<String, ReportError> {
     let format = NumberFormat::Significant(4);
+    let mut beyond = match m.margins.gain_margin_db {
+        None => "No phase crossing lies within the sweep: the gain margin is not known.\n".to_owned(),
+        Some(_) => String::new(),
+    };
+    if m.verdict == LoopVerdict::NotKnown {
+        beyond += "Within what these points leave open the curve may pass -1 on either side: sweep more points around the crossings, or average longer.\n";
+    }
     Ok(format!(
-        "{}\n{}\nJudged from {} to {} Hz. Taken for granted: |L| stays below 1 above (it is {} there), no crossing lies below.\n",
+        "{}\n{}\n{beyond}Judged from {} to {} Hz. Taken for granted: |L| stays below 1 above (it is {} there), no crossing lies below.\n",
         measured_table(m)?.text(),
         crossings_table(&m.margins)?.text(),
         format.text(m.band_hz.low),

@@ -97,7 +97,7 @@ pub fn price_table(views: &[PriceView<'_>], units: Units<'_>) -> Result<Table, R
     );
     for v in views {
         let ((lm, lf), (pm, pf)) = (v.linear, v.physical);
-        let dft = |f: Option<&PesFigures>, low: bool| f.map(|f| if low { f.dft_low } else { f.dft_high });
+        let dft = |f: Option<&PesFigures>, low: bool| f.and_then(|f| if low { f.dft_low } else { f.dft_high });
         for (figure, linear, physical, unit) in [
             ("phase margin", lm.phase_margin_deg, pm.phase_margin_deg, "deg"),
             ("gain crossover there", lm.gain_crossover_hz, pm.gain_crossover_hz, "Hz"),

@@ -107,8 +107,8 @@ fn cards(view: &SlotView<'_>) -> Vec<Card> {
         _ => (String::new(), None),
     };
     let figures = view.after.write.as_ref().map(|(_, f)| f);
-    let low = figures.map(|f| f.dft_low);
-    let high = figures.map(|f| f.dft_high);
+    let low = figures.and_then(|f| f.dft_low);
+    let high = figures.and_then(|f| f.dft_high);
     let (pm_note, pm) = at_least(m.phase_margin_deg, wanted.phase_margin_deg);
     let (gm_note, gm) = at_least(m.gain_margin_db, wanted.gain_margin_db);
     let (ms_note, ms) = at_most(Some(m.max_sensitivity), wanted.max_sensitivity);

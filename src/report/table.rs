@@ -6,6 +6,7 @@
 use super::error::ReportError;
 use super::number::{MISSING, NumberFormat};
 use super::svg::harmful;
+use crate::document::size_limits::{CELL, cut};
 use maud::{Markup, html};
 
 /// A table whose rows all have one cell for each column.
@@ -293,7 +294,7 @@ impl Cell {
 
 /// Control characters would break the columns, or talk to the terminal.
 fn one_line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() || harmful(c) { ' ' } else { c }).collect()
+    cut(text, CELL).chars().map(|c| if c.is_control() || harmful(c) { ' ' } else { c }).collect()
 }
 
 #[cfg(test)]

@@ -159,7 +159,7 @@ fn exact(plant: &Plant, c: &Controller, profile: &Profile, w: &WriteBox) -> Resu
     let f = figures(&run.pes, profile);
     let peak = run.command.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let bins = w.harmonics.iter().map(|h| f.harmonics[h.k - 1].amplitude);
-    Ok([f.dft_low, f.dft_high].into_iter().chain(bins).chain([peak]).collect())
+    Ok([f.dft_low, f.dft_high].into_iter().map(Option::unwrap_or_default).chain(bins).chain([peak]).collect())
 }
 
 fn page(rows: &str, tally: &Tally) -> String {

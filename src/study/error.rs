@@ -54,6 +54,9 @@ pub enum StudyError {
     Gate(#[from] GateError),
     #[error("the numbers of the study cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
+    /// A trial could not be started or its files not be made.
+    #[error("a trial could not be started: {source}")]
+    Thread { source: std::io::Error },
     /// A measured record that this study rests on is not there.
     #[error("{}: the measured record that this study rests on is not there; give its folder with --data", file.display())]
     Absent { file: PathBuf },

@@ -21,8 +21,11 @@ mod measured;
 mod mirror;
 mod mismatch;
 mod motor;
+pub mod mutation;
 mod plants;
 mod prediction;
+mod reader_mutations;
+mod readers;
 mod recordings;
 
 pub use certificate::certificate;
@@ -41,6 +44,7 @@ pub use mismatch::mismatch;
 pub use motor::motor;
 pub use plants::plants;
 pub use prediction::prediction;
+pub use reader_mutations::{Reached, Tally, reader_mutations};
 pub use recordings::recordings;
 
 /// What a study hands over: files by name, relative to the results' folder.

@@ -133,7 +133,9 @@ fn machine(i: u64) -> Result<Vec<Judged>, StudyError> {
         let runs = predict_each(&model, &c, &profile, &PredictSettings::default(), ERRORS)?;
         profile.noise.seed = 1_000_000 + 1000 * i + run;
         let record = figures(&simulate(&truth, &c, &profile)?.pes, &profile);
-        for (band, seen) in [(0, record.dft_low), (1, record.dft_high)] {
+        for (band, seen) in
+            [(0, record.dft_low), (1, record.dft_high)].into_iter().filter_map(|(b, x)| x.map(|x| (b, x)))
+        {
             let mut inside = [false; ERRORS.len()];
             let mut error_db = 0.0;
             for (k, p) in runs.iter().enumerate() {

@@ -4,17 +4,17 @@
 
 use super::limits::MarginLimits;
 use super::requirements::{CurveFound, Found};
-use crate::feedback::{CurveLimit, Margins, OpenLoop, closed_loop_bandwidth, margins};
+use crate::feedback::{CurveLimit, Margins, OpenLoop, closed_loop_bandwidth};
 use nalgebra::Complex;
 
 /// Margins, and the figures of the loop that a spec may limit.
 pub(super) fn exact_loop(
     l: &impl OpenLoop,
+    m: Margins,
     plant: &dyn Fn(f64) -> Complex<f64>,
     limits: &MarginLimits,
     curves: &[CurveLimit],
 ) -> (Margins, Found) {
-    let m = margins(l);
     let outside = |hz: f64| !limits.phase_stabilised_hz.iter().any(|[from, to]| (*from..=*to).contains(&hz));
     let ends = m.gain_crossings.iter().map(|c| c.hz).filter(|hz| outside(*hz));
     let ends = ends.fold(None, |ends: Option<[f64; 2]>, hz| {

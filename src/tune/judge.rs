@@ -6,7 +6,7 @@ use super::requirements::{Found, Judged, Requirement};
 use super::step_figures::{overshoot, settling_s};
 use super::{Machine, Spec, TuneError};
 use crate::controller::Controller;
-use crate::feedback::{Margins, ModelLoop};
+use crate::feedback::{Margins, ModelLoop, OpenLoop, confirmed_margins, margins};
 use crate::lti::{DiscretePlant, FrequencyResponse, Plant};
 use crate::pes::{Profile, SpectralPes, SpectralWork, StepScene, StepWork, WindowDft, simulate};
 use serde::Serialize;
@@ -60,11 +60,17 @@ pub(super) fn judge_loop(m: &Machine<'_>, controller: &Controller, spec: &Spec) 
     Ok(match m {
         Machine::Model(plant) => {
             let sampled = DiscretePlant::of(plant, controller.sample_time_s)?;
-            exact_loop(&ModelLoop::new(&sampled, &sections)?, &|w| sampled.at(w), limits, curves)
+            let l = ModelLoop::new(&sampled, &sections)?;
+            exact_loop(&l, confirmed_margins(&l)?, &|w| sampled.at(w), limits, curves)
         }
         Machine::Response { frf, hold, continuation } => {
             let plant = curve(frf, *hold, *continuation, controller.sample_time_s)?;
-            exact_loop(&measured_loop(frf, *hold, &sections)?, &|w| plant.at(w), limits, curves)
+            let l = measured_loop(frf, *hold, &sections)?;
+            let (margins, mut found) = exact_loop(&l, margins(&l), &|w| plant.at(w), limits, curves);
+            // A sweep that ends before L turns negative has its last point to speak of; beyond it |L| is taken to stay below that.
+            found.within_sweep = true;
+            found.gain_margin_db = margins.gain_margin_db.or_else(|| Some(-20.0 * l.at(l.end_rad_s()).norm().log10()));
+            (margins, found)
         }
     })
 }

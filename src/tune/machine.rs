@@ -10,7 +10,7 @@ use super::write_figures::{WriteBuffers, WriteSource};
 use super::{Spec, TuneError};
 use crate::controller::Controller;
 use crate::feedback::{LoopOnGrid, LoopPower, Magnitude, MeasuredLoop, PowerWork, ResponseCurve, SampledPlant, hold};
-use crate::frf::Frf;
+use crate::frf::{Frf, gathered};
 use crate::lti::{DiscretePlant, FrequencyResponse, Plant, Section, Sections};
 use crate::pes::{Slopes, StepScene, StepWork};
 use nalgebra::Complex;
@@ -84,7 +84,9 @@ pub(super) fn curve(frf: &Frf, taken: Hold, continuation: Option<&Plant>, t: f64
         Hold::Included => Complex::new(1.0, 0.0),
         Hold::NotIncluded => hold(w * t),
     };
-    let mut curve = ResponseCurve::of(frf, t, held)?;
+    // A search reads the curve some hundred thousand times: of a long sweep the means of neighbours that lie on one line. Margins are judged over every point.
+    let long = gathered(frf);
+    let mut curve = ResponseCurve::of(long.as_ref().map_or(frf, |g| &g.frf), t, held)?;
     if let Some(plant) = continuation {
         curve = curve.continued(DiscretePlant::of(plant, t)?);
     }

@@ -92,8 +92,8 @@ pub fn judge_physical(
         max_sensitivity: described.worst.max_sensitivity,
         gain_crossover_hz: described.worst.gain_crossover_hz,
         gain_crossings_hz: crossings(&described),
-        dft_low: Some(f.dft_low),
-        dft_high: Some(f.dft_high),
+        dft_low: f.dft_low,
+        dft_high: f.dft_high,
         harmonics: spec.limits.harmonics.iter().map(|h| of(h.k)).collect(),
         command_peak: Some(write.command.iter().fold(0.0, |a, u| u.abs().max(a))),
         ..Found::default()

@@ -271,6 +271,7 @@ impl TuningProblem {
             max_sensitivity: q.max_sensitivity(),
             gain_crossings_hz: ends.map(|e| e.map(|w| w / TAU)),
             bandwidth_hz: None,
+            within_sweep: false,
             dft_low: figure(RecordFigure::Band(0)),
             dft_high: figure(RecordFigure::Band(1)),
             harmonics: (0..self.asked.harmonics.len()).filter_map(|k| figure(RecordFigure::Harmonic(k))).collect(),

@@ -58,6 +58,9 @@ pub struct Requirement {
 pub struct Found {
     /// Closed-loop poles outside the unit circle.
     pub unstable_poles: i64,
+    /// Read off a sweep: a margin without its crossing is not known, where that of a model is unlimited.
+    #[serde(skip_serializing_if = "is_false")]
+    pub within_sweep: bool,
     /// None without a gain crossing.
     pub phase_margin_deg: Option<f64>,
     /// None without a phase crossing.
@@ -102,6 +105,10 @@ pub struct CurveFound {
     pub ratio: f64,
     /// Where (Hz).
     pub hz: f64,
+}
+
+fn is_false(x: &bool) -> bool {
+    !x
 }
 
 /// Judged: one requirement with what was found.
@@ -224,12 +231,12 @@ impl Requirement {
         }
     }
 
-    /// The violation of the figures; a margin without its crossing is unlimited, a crossover without one is missed.
+    /// The violation of the figures; a margin without its crossing is unlimited on a model and missed on a sweep, a crossover without one is missed.
     pub fn violation_of(&self, found: &Found, harmonic: &mut usize) -> f64 {
         match self.found_in(found, harmonic) {
             Some(x) if x.is_nan() => f64::INFINITY,
             Some(x) => self.violation(x),
-            None if self.what == What::GainCrossover => NOTHING,
+            None if self.what == What::GainCrossover || found.within_sweep => NOTHING,
             None => f64::NEG_INFINITY,
         }
     }

@@ -1,6 +1,7 @@
 //! The certificate: every requirement of a spec with its proven bounds, on every machine given, and what does not fit.
 
 use super::bounds::{Bounded, Bounds, Stability};
+use super::size::fits;
 use super::table::{self, Finding};
 use super::write::{WriteFigures, write};
 use super::write_box::{BoxFigure, BoxSettings, BoxedLoop, WriteBox, bound_write};
@@ -183,6 +184,7 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
         if let Some(p) = plant.physics.first() {
             return Err(VerifyError::Physics { file: file.clone(), effect: p.effect.clone() });
         }
+        fits(&plant, t, &i.uncertainty).map_err(|source| VerifyError::PlantFile { file: file.clone(), source })?;
         let bounds = prove_loop(&plant, &held, t, &i.uncertainty, settings).map_err(in_table)?;
         let profile = spec.profile.as_ref();
         let figures = profile.map(|p| write(&plant, &held, &c, p));
@@ -305,7 +307,9 @@ fn limits(wanted: &[Requirement], b: &Bounds, w: Option<&WriteFigures>, over: Op
                     _ => boxed(around(w.command_peak, w.command_error()), w.command_error(), &|o| o.command_peak),
                 }),
             };
-            let unlimited = matches!(r.what, What::PhaseMargin | What::GainMargin) && proven.low.is_none();
+            // Of a sweep nothing is known beyond its ends: a margin without a crossing between them is not proved. A write is of models only.
+            let model = w.is_some();
+            let unlimited = model && matches!(r.what, What::PhaseMargin | What::GainMargin) && proven.low.is_none();
             let (good, bad) = match r.side {
                 Side::AtLeast => {
                     let least = r.limit - TOUCH * r.limit.abs();

@@ -26,6 +26,7 @@ mod range;
 mod roots;
 mod rounding;
 mod settings;
+mod size;
 mod spectrum_box;
 mod swept;
 mod table;
@@ -63,6 +64,7 @@ pub fn prove_loop(
     settings: &VerifySettings,
 ) -> Result<Bounds, VerifyError> {
     plant.check()?;
+    size::fits(plant, sample_time_s, uncertainty)?;
     prove::prove(&Sampled::new(plant, sections, sample_time_s, uncertainty)?, settings)
 }
 

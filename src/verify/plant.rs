@@ -124,6 +124,11 @@ const FAR: usize = 64;
 /// The same where aliases fall with the first power only.
 const FAR_OF_ONE: usize = 2000;
 
+/// Multiples of the sample rate from which three times above every mode of a plant all aliases are far.
+pub(super) fn aliases(top_rad_s: f64, t: f64) -> f64 {
+    (3.0 * top_rad_s * t / TAU + 0.5).ceil().max(2.0)
+}
+
 impl Product {
     pub fn of(plant: &Plant, t: f64) -> Product {
         let plant = &plant.paired();
