@@ -69,9 +69,9 @@ fn read(text: &str, settings: &ReadSettings) -> Result<servotune::frf::Sweep, Fr
 #[test]
 fn a_limit_on_a_band_without_a_bin_is_no_limit() {
     let short = SPIRAL.replace("window = [200, 400]", "window = [200, 210]");
-    match Spec::parse(PAPER, &short).unwrap_err() {
-        SpecError::NoBin { key, samples, rate_hz, band_hz } => {
-            assert_eq!((key, samples, rate_hz, band_hz), ("limits.dft_low", 10, 27_480.0, [600.0, 1500.0]));
+    match Spec::parse(PAPER, short.as_str()).unwrap_err() {
+        SpecError::EmptyBand { key, samples, rate_hz, band } => {
+            assert_eq!((key.as_str(), samples, rate_hz, band), ("limits.dft_low", 10, 27_480.0, [600.0, 1500.0]));
         }
         e => panic!("{e}"),
     }

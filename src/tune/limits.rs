@@ -125,7 +125,7 @@ impl Limits {
                 continue;
             }
             let band = *bands.get(i).ok_or(SpecError::NoBand { key, bands: bands.len() })?;
-            if !has_bin(band, samples, rate_hz) {
+            if profile.bins_in(band) == 0 {
                 return Err(SpecError::EmptyBand { key: format!("limits.{key}"), band, samples, rate_hz });
             }
         }
@@ -140,12 +140,4 @@ impl Limits {
         }
         Ok(())
     }
-}
-
-/// Whether a bin of the window's DFT, above 0 and up to half the rate, lies in the band.
-pub(super) fn has_bin([from, to]: [f64; 2], samples: usize, rate_hz: f64) -> bool {
-    (1..=samples / 2).any(|k| {
-        let hz = k as f64 * rate_hz / samples as f64;
-        from <= hz && hz <= to
-    })
 }

@@ -1,6 +1,5 @@
 //! What is tuned: a plant model or a measured response, prepared once for thousands of candidates.
 
-use super::limits::has_bin;
 use super::linear::SectionSlope;
 use super::objective::Minimise;
 use super::record_figures::{Asked, RecordFigure};
@@ -167,7 +166,7 @@ impl Prepared {
             let profile = spec.write("a figure of the PES")?;
             let [first, last] = profile.pes.window;
             for band in asked.bands_hz.iter().filter(|_| asked.minimise == Minimise::Dft) {
-                if !has_bin(*band, last - first, profile.pes.sample_rate_hz) {
+                if profile.bins_in(*band) == 0 {
                     let (samples, rate_hz) = (last - first, profile.pes.sample_rate_hz);
                     let key = "objective.bands_hz".to_owned();
                     return Err(super::SpecError::EmptyBand { key, band: *band, samples, rate_hz }.into());
