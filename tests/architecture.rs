@@ -20,7 +20,7 @@ const RANKS: [&[&str]; 11] = [
 
 /// Outside crates and the places where they may be named.
 const HOMES: [(&str, &[&str]); 12] = [
-    ("clarabel", &["src/tune/limit/cone.rs"]),
+    ("clarabel", &["src/tune/feedforward.rs"]),
     ("argmin", &["src/tune/search.rs"]),
     ("rustfft", &["src/numeric/spectrum.rs"]),
     (
@@ -28,7 +28,6 @@ const HOMES: [(&str, &[&str]); 12] = [
         &[
             "src/tune/search.rs",
             "src/tune/neighbours.rs",
-            "src/tune/limit/branch.rs",
             "src/gate/",
             "src/twin/",
             "src/study/",

@@ -8,6 +8,7 @@ mod bounds;
 mod confidence;
 mod ending;
 mod exact_loop;
+mod feedforward;
 mod from_table;
 mod gain_table;
 mod judge;

@@ -152,6 +152,13 @@ impl Outcome {
         }
     }
 
+    pub(super) fn set_before(&mut self, before: Option<Vec<Proof>>) {
+        match self {
+            Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => t.before = before,
+            Outcome::Infeasible(i) => i.before = before,
+        }
+    }
+
     /// What was made smallest.
     pub fn objective(&self) -> &Reached {
         match self {

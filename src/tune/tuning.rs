@@ -2,6 +2,7 @@
 
 use super::bounds::{Ranges, crossover_hz};
 use super::ending::{Ending, Settled};
+use super::feedforward::best_feedforward;
 use super::judge::lasting_objective;
 use super::neighbours::{BETTER, spread};
 use super::outcome::{Outcome, Reached, Tuned, Work};
@@ -70,7 +71,43 @@ pub fn tune_jointly(
 }
 
 /// The same with tables of neighbouring specs or machines as further starts; those of another shape are passed over.
+///
+/// With `structure.feedforward` the feedback is tuned first, then the feed-forward is set to the move of the first machine, and the feedback tuned again
+/// around it.
 pub fn tune_from(
+    machines: &[Machine<'_>],
+    spec: &Spec,
+    start: Option<&Controller>,
+    near: &[Controller],
+    settings: &TuneSettings,
+) -> Result<Outcome, TuneError> {
+    if !spec.structure.feedforward {
+        return tune_feedback(machines, spec, start, near, settings);
+    }
+    let model = match machines.first() {
+        Some(Machine::Model(plant)) => *plant,
+        Some(Machine::Response { continuation: Some(plant), .. }) => *plant,
+        Some(_) => return Err(TuneError::NeedsModel { what: "feed-forward" }),
+        None => return Err(TuneError::NoMachine),
+    };
+    spec.write("feed-forward")?;
+    let mut outcome = tune_feedback(machines, spec, start, near, settings)?;
+    for _ in 0..FORWARD_ROUNDS {
+        let mut around = outcome.controller().clone();
+        let Some(forward) = best_feedforward(model, &around, spec)? else { break };
+        around.feedforward = Some(forward);
+        outcome = tune_feedback(machines, spec, Some(&around), near, settings)?;
+    }
+    // What was before is the caller's start, not the round before.
+    let before = start.map(|c| judged(machines, c, spec)).transpose()?;
+    outcome.set_before(before);
+    Ok(outcome)
+}
+
+/// Rounds of feed-forward and feedback in turn.
+const FORWARD_ROUNDS: usize = 2;
+
+fn tune_feedback(
     machines: &[Machine<'_>],
     spec: &Spec,
     start: Option<&Controller>,

@@ -1,6 +1,6 @@
 //! The certificate: every requirement of a spec with its proven bounds, on every machine given, and what does not fit.
 
-use super::bounds::{Bounded, Bounds, Stability};
+use super::bounds::{Bounded, Bounds, ProvenCrossing, Stability};
 use super::size::fits;
 use super::table::{self, Finding};
 use super::write::{WriteFigures, write};
@@ -9,7 +9,7 @@ use super::{SweepAgain, SweepAssumption, Uncertainty, VerifyError, VerifySetting
 use crate::document::{parse_toml, read_text, sha256_hex};
 use crate::frf::Sweep;
 use crate::lti::{Plant, PlantFile};
-use crate::tune::{GainTable, Requirement, Side, Spec, SpecError, What};
+use crate::tune::{GainTable, Objective, Requirement, Side, Spec, SpecError, What};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -208,7 +208,7 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
             };
             bound_write(&boxed, &bins, &BoxSettings::default())
         });
-        let limits = limits(&wanted, &bounds, figures.as_ref(), write_box.as_ref());
+        let limits = limits(&spec, &wanted, &bounds, figures.as_ref(), write_box.as_ref());
         let (sha256, sweep_again) = (source.sha256(), vec![]);
         cases.push(CaseProof { sha256, bounds, write: figures, write_box, limits, sweep_again });
     }
@@ -222,7 +222,7 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
         let (bounds, sweep_again) = prove(&held[..], &i.uncertainty)?;
         let of_table = if plain { bounds.clone() } else { prove(table.sections(), &none)?.0 };
         unfit.push(table::figures(&table.after, &of_table, None));
-        let limits = limits(&wanted, &bounds, None, None);
+        let limits = limits(&spec, &wanted, &bounds, None, None);
         let sha256 = sweep.source_digest.clone();
         cases.push(CaseProof { sha256, bounds, write: None, write_box: None, limits, sweep_again });
     }
@@ -278,7 +278,24 @@ const MEMBERS: f64 = 10.0;
 /// the right side of a point.
 const TOUCH: f64 = 1e-4;
 
-fn limits(wanted: &[Requirement], b: &Bounds, w: Option<&WriteFigures>, over: Option<&WriteBox>) -> Vec<ProvenLimit> {
+/// Where every gain crossing outside these ranges (Hz) may lie. One that only may be counts on the side where it would miss.
+fn every_crossing(b: &Bounds, stabilised: &[[f64; 2]]) -> Bounded {
+    let free = |c: &&ProvenCrossing| !stabilised.iter().any(|[from, to]| *from <= c.hz.low && c.hz.high <= *to);
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for c in b.gain_crossings.iter().filter(free) {
+        (low, high) = (low.min(c.hz.low), high.max(c.hz.high));
+    }
+    if low <= high { Bounded { low: Some(low), high: Some(high), hz: None } } else { Bounded::default() }
+}
+
+fn limits(
+    spec: &Spec,
+    wanted: &[Requirement],
+    b: &Bounds,
+    w: Option<&WriteFigures>,
+    over: Option<&WriteBox>,
+) -> Vec<ProvenLimit> {
+    let usual = Objective::usual_bands();
     let around = |x: f64, e: f64| Bounded { low: Some(x - e), high: Some(x + e), hz: None };
     // Over a box the lower end stays a member's own, as with the margins: what that member misses is missed. Members round much as the plant does.
     let boxed = |own: Bounded, e: f64, figure: &dyn Fn(&WriteBox) -> Option<BoxFigure>| match over {
@@ -296,7 +313,12 @@ fn limits(wanted: &[Requirement], b: &Bounds, w: Option<&WriteFigures>, over: Op
                 What::PhaseMargin => b.phase_margin_deg,
                 What::GainMargin => b.gain_margin_db,
                 What::MaxSensitivity => b.max_sensitivity,
-                What::GainCrossover => b.gain_crossover_hz,
+                What::GainCrossover => every_crossing(b, &spec.margins.phase_stabilised_hz),
+                // No bound of these is computed.
+                What::Bandwidth | What::CommandRms | What::Overshoot | What::Settling | What::Curve { .. } => {
+                    Bounded::default()
+                }
+                What::DftLow | What::DftHigh if spec.objective.bands_hz != usual => Bounded::default(),
                 what => w.map_or(Bounded::default(), |w| match what {
                     What::DftLow => boxed(around(w.dft_low, w.error), w.error, &|o| o.dft_low),
                     What::DftHigh => boxed(around(w.dft_high, w.error), w.error, &|o| o.dft_high),
