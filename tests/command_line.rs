@@ -159,6 +159,8 @@ fn limits_that_cannot_be_met_are_an_answer_and_leave_no_table() {
         HEALTHY,
         "--spec",
         spec.to_str().unwrap(),
+        "--sample-time-s",
+        "39.6e-6",
         "--out",
         gains.to_str().unwrap(),
         "--json",
@@ -275,7 +277,7 @@ fn a_result_that_cannot_be_written_is_refused_before_the_work() {
     let below = file.join("x.json").to_str().unwrap().to_owned();
     let dir = dir.to_str().unwrap();
     let on = ["--plant", HEALTHY, "--spec", PAPER, "--out"];
-    for command in [&["limit"][..], &["pareto"], &["tune", "--gap"], &["verify", NOMINAL]] {
+    for command in [&["pareto"][..], &["tune"], &["verify", NOMINAL]] {
         for (out, said) in [(below.as_str(), "a part of this path is a file"), (dir, "expected a file, not a folder")] {
             let ran = servotune(&[command, &on, &[out]].concat());
             assert_eq!(ran.code, 2, "{command:?}: {}", ran.err);
@@ -290,7 +292,7 @@ fn a_result_that_cannot_be_written_is_refused_before_the_work() {
 }
 
 #[test]
-fn limit_pareto_and_next_sweep_refuse_what_they_cannot_do() {
+fn pareto_and_next_sweep_refuse_what_they_cannot_do() {
     let dir = folder("counts");
     let write = |name: &str, text: String| {
         let file = dir.join(name);
@@ -315,15 +317,16 @@ fn limit_pareto_and_next_sweep_refuse_what_they_cannot_do() {
         servotune(&["next-sweep", "--frf", &file, "--controller", NOMINAL, "--phase", "response"])
     };
     let out = dir.join("unused.html").to_str().unwrap().to_owned();
-    let long = on("limit", HEALTHY, &["--sample-time-s", "1", "--search", "0", "--rounds", "1", "--alone", "0"]);
     for (ran, said) in [
-        (on("limit", HEALTHY, &["--rounds", "0"]), vec!["--rounds", "`0`", "at least 1"]),
-        (long, vec!["1 taps", "expected a sample time", "sample_time_s"]),
+        (on("pareto", HEALTHY, &["--out", &out]), vec!["sample time", "--sample-time-s"]),
+        (on("tune", HEALTHY, &["--out", &out]), vec!["sample time", "--sample-time-s"]),
         (on("pareto", HEALTHY, &["--out", &out, "--points", "1"]), vec!["--points", "`1`", "at least 2"]),
-        (on("pareto", HEALTHY, &["--out", &out, "--from", "3", "--to", "2"]), vec!["max_sensitivity from = 3", "less"]),
+        (
+            on("pareto", HEALTHY, &["--sample-time-s", "39.6e-6", "--out", &out, "--from", "3", "--to", "2"]),
+            vec!["max_sensitivity from = 3", "less"],
+        ),
         (on("pareto", HEALTHY, &["--out", &out, "--plant", &metres]), vec!["metres.toml", "`m`", "expected `track`"]),
-        (on("limit", &dry, &[]), vec!["coulomb_friction", "linear"]),
-        (on("tune", &dry, &["--out", &out, "--gap"]), vec!["dry.toml", "--gap", "linear", "coulomb_friction"]),
+        (on("pareto", &dry, &["--sample-time-s", "39.6e-6", "--out", &out]), vec!["coulomb_friction", "linear"]),
         (next(&["--tones", "0"]), vec!["--tones", "`0`", "at least 1"]),
         (swept(4), vec!["3 points", "at least 4", "sweep more"]),
         (swept(12), vec!["|L| = 20", "48.94 Hz", "below 1", "sweep on"]),

@@ -45,6 +45,7 @@ mod sweep_arguments;
 mod train;
 mod tune;
 mod tune_machines;
+mod tune_text;
 mod twin;
 mod verify;
 mod verify_arguments;

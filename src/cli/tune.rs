@@ -3,6 +3,7 @@
 use super::arguments::{ModelArguments, TuneArguments};
 use super::proof::{self, Proof};
 use super::slot::{self, Slot};
+use super::tune_text::{physical_text, text};
 use super::{Ending, Failure, Screen, load, physics, tune_machines};
 use crate::controller::Controller;
 use crate::document::{FileSet, check_target, read_text, sha256_hex};
@@ -12,8 +13,7 @@ use crate::identify::{self, Identified, IdentifySettings, identify};
 use crate::lti::Plant;
 use crate::pes::context;
 use crate::physics::Restored;
-use crate::report::physical::{amplitude_table, limit_cycle_sentences};
-use crate::report::tuned::{Units, conflicts_table, gains_table, limits_table};
+use crate::report::tuned::Units;
 use crate::tune::{
     GainTable, Hold, InputDigest, Machine, Outcome, PhysicalTuning, Spec, TuneError, TuneSettings, sample_time_s, tune,
     tune_physical,
@@ -298,28 +298,6 @@ fn at_clock(sample_time_s: f64) -> Controller {
     Controller { sample_time_s, output_limit: None, pid, lowpass, notch, feedforward: None }
 }
 
-/// The outcome of a tuning with physics for a terminal.
-fn physical_text(
-    physics: &Restored,
-    t: &PhysicalTuning,
-    start: Option<&Controller>,
-    units: Units<'_>,
-) -> Result<String, Failure> {
-    let bounds = t.outcome.at_bounds();
-    let mut text = format!("{}\nPhysics: {}.\n\n", slot::physical_verdict(t).1, physics.names().join(", "));
-    text += &limits_table(t.before.as_ref().map(|b| &b.judged), Some(&t.after.judged), units)?.text();
-    text.push('\n');
-    text += &amplitude_table(&t.after.margins, &t.after.linear, units)?.text();
-    text += &limit_cycle_sentences(&t.after.margins, units);
-    if let Outcome::Infeasible(i) = &t.outcome {
-        text.push('\n');
-        text += &conflicts_table(i, units)?.text();
-    }
-    text.push('\n');
-    text += &gains_table(start, t.outcome.controller(), bounds)?.text();
-    Ok(text)
-}
-
 /// Settings of the model that continues the sweep: a sweep with the hold in it has it divided out first.
 pub(super) fn model_settings(a: &TuneArguments, sample_time_s: f64) -> IdentifySettings {
     let asked = a.model.settings();
@@ -379,34 +357,4 @@ pub(super) fn provenance(table: &GainTable) -> Vec<(String, String)> {
     }
     all.extend(p.inputs.iter().map(|i| (format!("{} (SHA-256)", i.role), i.sha256.clone())));
     all
-}
-
-/// The outcome for a terminal.
-pub(super) fn text(
-    outcome: &Outcome,
-    start: Option<&Controller>,
-    spec: &Spec,
-    units: Units<'_>,
-) -> Result<String, Failure> {
-    let before = outcome.before().and_then(|b| b.first()).map(|p| &p.judged);
-    let after = outcome.after().first().map(|p| &p.judged);
-    let mut text = format!("{}\n\n", slot::verdict(outcome).1);
-    text += &limits_table(before, after, units)?.text();
-    if let Outcome::Infeasible(i) = outcome {
-        text.push('\n');
-        text += &conflicts_table(i, units)?.text();
-    }
-    text.push('\n');
-    text += &gains_table(start, outcome.controller(), outcome.at_bounds())?.text();
-    let o = outcome.objective();
-    let unit = spec.objective.unit(units.position, units.command);
-    text += &format!(
-        "\nObjective {}: {:.4e} {unit}; {} of {} polishes ended there, {} candidates.\n",
-        o.name.name(),
-        o.value,
-        o.starts_at_best,
-        o.starts,
-        outcome.work().evaluations
-    );
-    Ok(text)
 }

@@ -4,6 +4,7 @@ use super::bench::Bench;
 use super::bump::{beyond, set_aside};
 use super::confirm::confirm;
 use super::corrected::{Corrected, corrected};
+use super::diagnose_error::DiagnoseError;
 use super::finding::*;
 use super::fit_report::fit_report;
 use super::fitted::refit;
@@ -18,55 +19,16 @@ use super::run::{Run, runs};
 use super::select::{self, SelectSettings, Selection};
 use super::swing::swing;
 use super::unrest::unrest;
-use crate::controller::{Controller, ControllerError, Law};
-use crate::lti::{Body, LtiError, Plant};
+use crate::controller::{Controller, Law};
+use crate::lti::{Body, Plant};
 use crate::physics::library;
 use crate::recording::Case;
-use thiserror::Error;
 
 /// How a diagnosis is made.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DiagnoseSettings {
     /// The search.
     pub select: SelectSettings,
-}
-
-/// Why a case cannot be diagnosed.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "each variant carries its own message")]
-pub enum DiagnoseError {
-    #[error(transparent)]
-    Plant(#[from] LtiError),
-    #[error(transparent)]
-    Controller(#[from] ControllerError),
-    /// Controller and records run at different rates.
-    #[error(
-        "sample time {controller_s} s in the controller, {records_s} s in the records: expected the same within 0.1 %"
-    )]
-    SampleTime { controller_s: f64, records_s: f64 },
-    /// The plant holds physics already.
-    #[error(
-        "the plant holds [[plant.physics]] effect \"{effect}\": a diagnosis starts from a linear plant; remove the table, and the effect is found again if it is there"
-    )]
-    Physics { effect: String },
-    /// The plant is no second-order body or free inertia with resonance pairs.
-    #[error(
-        "the plant has {poles} poles beside its resonance pairs, real or unstable ones among them: a diagnosis starts from a second-order body or a free inertia; give the machine's own body, and a lag as [[plant.physics]] is found again if it is there"
-    )]
-    Body { poles: usize },
-    /// The plant's simulation has nothing to do with the record.
-    #[error(
-        "record `{record}`: the plant as given simulates an error of {ratio:.1e} times the recorded motion; expected a model of this machine: check the units, the gains, the sample rate and the modes of the plant, or fit it anew (`servotune response`, `servotune identify`)"
-    )]
-    Unlike { record: String, ratio: f64 },
-    /// Nothing can be computed of these records under this plant.
-    #[error(
-        "{what} comes out as {found}: these records cannot be diagnosed under this plant; check the sample rate, the units, and the modes of the plant against half the sample rate"
-    )]
-    NotFinite { what: &'static str, found: f64 },
-    /// Nothing moves.
-    #[error("record `{record}`: the command never changes; expected a record in which the machine is driven")]
-    Still { record: String },
 }
 
 /// A diagnosis with what pictures and model files are made from.

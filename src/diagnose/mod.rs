@@ -12,6 +12,7 @@ mod clock;
 mod columns;
 mod confirm;
 mod corrected;
+mod diagnose_error;
 mod diagnosis;
 mod differing;
 mod experiment;
@@ -51,7 +52,8 @@ pub use bench::Bench;
 pub use bootstrap::Bootstrap;
 pub use confirm::Confirmation;
 pub use corrected::Corrected;
-pub use diagnosis::{DiagnoseError, DiagnoseSettings, Diagnosed, diagnose};
+pub use diagnose_error::DiagnoseError;
+pub use diagnosis::{DiagnoseSettings, Diagnosed, diagnose};
 pub use finding::{
     Diagnosis, Estimate, Finding, FitFigures, FitReport, NextExperiment, RecordFigures, Tried, Verdict, Where,
 };

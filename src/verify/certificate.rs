@@ -1,15 +1,16 @@
 //! The certificate: every requirement of a spec with its proven bounds, on every machine given, and what does not fit.
 
-use super::bounds::{Bounded, Bounds, ProvenCrossing, Stability};
+use super::bounds::{Bounded, Bounds, Stability};
+use super::proven_limits::proven_limits;
 use super::size::fits;
 use super::table::{self, Finding};
 use super::write::{WriteFigures, write};
-use super::write_box::{BoxFigure, BoxSettings, BoxedLoop, WriteBox, bound_write};
+use super::write_box::{BoxSettings, BoxedLoop, WriteBox, bound_write};
 use super::{SweepAgain, SweepAssumption, Uncertainty, VerifyError, VerifySettings, Word, prove_loop, prove_sweep};
 use crate::document::{parse_toml, read_text, sha256_hex};
 use crate::frf::Sweep;
 use crate::lti::{Plant, PlantFile};
-use crate::tune::{GainTable, Objective, Requirement, Side, Spec, SpecError, What};
+use crate::tune::{GainTable, Requirement, Spec, SpecError, What};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -208,7 +209,7 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
             };
             bound_write(&boxed, &bins, &BoxSettings::default())
         });
-        let limits = limits(&spec, &wanted, &bounds, figures.as_ref(), write_box.as_ref());
+        let limits = proven_limits(&spec, &wanted, &bounds, figures.as_ref(), write_box.as_ref());
         let (sha256, sweep_again) = (source.sha256(), vec![]);
         cases.push(CaseProof { sha256, bounds, write: figures, write_box, limits, sweep_again });
     }
@@ -222,7 +223,7 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
         let (bounds, sweep_again) = prove(&held[..], &i.uncertainty)?;
         let of_table = if plain { bounds.clone() } else { prove(table.sections(), &none)?.0 };
         unfit.push(table::figures(&table.after, &of_table, None));
-        let limits = limits(&spec, &wanted, &bounds, None, None);
+        let limits = proven_limits(&spec, &wanted, &bounds, None, None);
         let sha256 = sweep.source_digest.clone();
         cases.push(CaseProof { sha256, bounds, write: None, write_box: None, limits, sweep_again });
     }
@@ -269,97 +270,6 @@ fn assumptions(i: &Inputs<'_>) -> Vec<String> {
         all.push("no parameter moves further than its share; every mode and the body may move on their own".to_owned());
     }
     all
-}
-
-/// Rounding of a member's write, in that of the plant as it stands.
-const MEMBERS: f64 = 10.0;
-
-/// Share of a limit by which it may be missed: a search that ends on a limit stands on it, and no bound of finite width lies on
-/// the right side of a point.
-const TOUCH: f64 = 1e-4;
-
-/// Where every gain crossing outside these ranges (Hz) may lie. One that only may be counts on the side where it would miss.
-fn every_crossing(b: &Bounds, stabilised: &[[f64; 2]]) -> Bounded {
-    let free = |c: &&ProvenCrossing| !stabilised.iter().any(|[from, to]| *from <= c.hz.low && c.hz.high <= *to);
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for c in b.gain_crossings.iter().filter(free) {
-        (low, high) = (low.min(c.hz.low), high.max(c.hz.high));
-    }
-    if low <= high { Bounded { low: Some(low), high: Some(high), hz: None } } else { Bounded::default() }
-}
-
-fn limits(
-    spec: &Spec,
-    wanted: &[Requirement],
-    b: &Bounds,
-    w: Option<&WriteFigures>,
-    over: Option<&WriteBox>,
-) -> Vec<ProvenLimit> {
-    let usual = Objective::usual_bands();
-    let around = |x: f64, e: f64| Bounded { low: Some(x - e), high: Some(x + e), hz: None };
-    // Over a box the lower end stays a member's own, as with the margins: what that member misses is missed. Members round much as the plant does.
-    let boxed = |own: Bounded, e: f64, figure: &dyn Fn(&WriteBox) -> Option<BoxFigure>| match over {
-        None => own,
-        Some(o) => figure(o).map_or(Bounded { high: None, ..own }, |f| Bounded {
-            low: own.low.map(|l| l.max(f.seen - MEMBERS * e)),
-            high: Some(f.most + MEMBERS * e),
-            hz: None,
-        }),
-    };
-    wanted
-        .iter()
-        .map(|r| {
-            let proven = match r.what {
-                What::PhaseMargin => b.phase_margin_deg,
-                What::GainMargin => b.gain_margin_db,
-                What::MaxSensitivity => b.max_sensitivity,
-                What::GainCrossover => every_crossing(b, &spec.margins.phase_stabilised_hz),
-                // No bound of these is computed.
-                What::Bandwidth | What::CommandRms | What::Overshoot | What::Settling | What::Curve { .. } => {
-                    Bounded::default()
-                }
-                What::DftLow | What::DftHigh if spec.objective.bands_hz != usual => Bounded::default(),
-                what => w.map_or(Bounded::default(), |w| match what {
-                    What::DftLow => boxed(around(w.dft_low, w.error), w.error, &|o| o.dft_low),
-                    What::DftHigh => boxed(around(w.dft_high, w.error), w.error, &|o| o.dft_high),
-                    What::Harmonic { k } => w
-                        .harmonics
-                        .get(k - 1)
-                        .map_or(Bounded::default(), |a| boxed(around(*a, w.error), w.error, &|o| o.harmonic(k))),
-                    _ => boxed(around(w.command_peak, w.command_error()), w.command_error(), &|o| o.command_peak),
-                }),
-            };
-            // Of a sweep nothing is known beyond its ends: a margin without a crossing between them is not proved. A write is of models only.
-            let model = w.is_some();
-            let unlimited = model && matches!(r.what, What::PhaseMargin | What::GainMargin) && proven.low.is_none();
-            let (good, bad) = match r.side {
-                Side::AtLeast => {
-                    let least = r.limit - TOUCH * r.limit.abs();
-                    (unlimited || proven.low.is_some_and(|x| x >= least), proven.high.is_some_and(|x| x < least))
-                }
-                Side::AtMost => {
-                    let most = r.limit + TOUCH * r.limit.abs();
-                    (proven.high.is_some_and(|x| x <= most), proven.low.is_some_and(|x| x > most))
-                }
-            };
-            // A margin of an unstable loop is a number without a meaning.
-            let stable = b.stability == Stability::Stable;
-            let verdict = match (good && stable, bad || b.stability == Stability::Unstable) {
-                (true, _) => Verdict::Proved,
-                (_, true) => Verdict::Violated,
-                _ => Verdict::NotProved,
-            };
-            let side = if r.side == Side::AtLeast { "at_least" } else { "at_most" };
-            ProvenLimit {
-                name: r.what.to_string(),
-                side: side.into(),
-                required: r.limit,
-                unit: r.what.unit().into(),
-                proven,
-                verdict,
-            }
-        })
-        .collect()
 }
 
 impl Certificate {

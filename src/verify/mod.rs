@@ -22,6 +22,7 @@ mod moves;
 mod patch;
 mod plant;
 mod prove;
+mod proven_limits;
 mod range;
 mod roots;
 mod rounding;
