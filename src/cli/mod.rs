@@ -31,6 +31,7 @@ mod limit;
 mod limit_arguments;
 mod load;
 mod margins;
+mod margins_arguments;
 mod next_sweep;
 mod pareto;
 mod physics;

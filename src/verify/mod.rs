@@ -21,6 +21,7 @@ mod moves;
 mod patch;
 mod plant;
 mod prove;
+mod quadratic;
 mod range;
 mod roots;
 mod rounding;
