@@ -30,6 +30,7 @@ mod gated;
 mod identify;
 mod load;
 mod margins;
+mod margins_arguments;
 mod next_sweep;
 mod pareto;
 mod performance_arguments;

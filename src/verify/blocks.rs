@@ -117,7 +117,8 @@ mod tests {
         let c = |re: f64, im: f64| Complex::new(re, im);
         let mode = Mode { zero_rad_s: 6800.0, zero_damping_ratio: 0.02, pole_rad_s: 7000.0, pole_damping_ratio: 0.03 };
         let pair = |re: f64, im: f64| [c(re, im), c(re, -im)];
-        let cases: [(Vec<Complex<f64>>, Vec<Complex<f64>>); 5] = [
+        type Roots = Vec<Complex<f64>>;
+        let cases: [(Roots, Roots); 5] = [
             (vec![c(900.0, 0.0)], vec![c(0.0, 0.0), c(0.0, 0.0), c(-6e3, 0.0)]),
             (vec![], vec![c(250.0, 0.0), c(-250.0, 0.0), c(-6e3, 0.0)]),
             (vec![c(-30.0, 0.0), c(40.0, 0.0)], [pair(-80.0, 900.0), pair(20.0, 3e4)].concat()),

@@ -261,8 +261,12 @@ fn assumptions(i: &Inputs<'_>) -> Vec<String> {
             .to_owned(),
     ];
     if !i.sweeps.is_empty() {
+        let of = match i.sweeps.iter().map(|s| s.frf.unstable_poles()).max() {
+            None | Some(0) => "a stable plant".to_owned(),
+            Some(poles) => format!("a plant with {poles} poles in the right half-plane"),
+        };
         all.push(format!(
-            "each sweep is of a stable plant: around every interval a cubic in ln w and at most one mode, of damping at least {}; |L| > 1 below the sweep and < 1 above it, no crossing there",
+            "each sweep is of {of}: around every interval a cubic in ln w and at most one mode, of damping at least {}; |L| > 1 below the sweep and < 1 above it, no crossing there",
             i.assumption.least_damping
         ));
     }

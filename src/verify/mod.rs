@@ -23,6 +23,7 @@ mod patch;
 mod plant;
 mod prove;
 mod proven_limits;
+mod quadratic;
 mod range;
 mod roots;
 mod rounding;

@@ -3,7 +3,7 @@
 //! In: [`Rational`]. Out: its factors over a cell of frequencies, with their bounds; the sizes that the far aliases need.
 
 use super::expansion::Expansion;
-use super::plant::Quadratic;
+use super::quadratic::Quadratic;
 use crate::lti::Rational;
 use nalgebra::Complex;
 

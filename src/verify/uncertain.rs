@@ -3,7 +3,8 @@
 //! Every mode and the body may move on its own. The mode that moves L most is cut into pieces of its frequency range, and L is held by the
 //! union of their patches; what the others do is held by the hull of theirs.
 
-use super::plant::{Product, Quadratic, RigidBody};
+use super::plant::{Product, RigidBody};
+use super::quadratic::Quadratic;
 use super::{Patch, Range};
 use crate::lti::{Body, Plant};
 use crate::numeric::random::Random;
