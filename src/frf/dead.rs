@@ -74,6 +74,9 @@ const STEPS_MOVED: f64 = 12.0;
 const SCATTERS_MOVED: f64 = 6.0;
 /// The scatter beside it, in steps of the display, from which equal values in a row do not happen.
 const RESOLVED: f64 = 10.0;
+/// The same where the rest of the sweep hardly ever repeats itself, and the share of neighbours that then are equal at most.
+const RESOLVED_RARE: f64 = 3.0;
+const RARE: f64 = 0.02;
 /// Most different values, and fewest rows, of a channel that is shown in steps; least mean step (deg, dB).
 const VALUES: usize = 12;
 const STEPPED_ROWS: usize = 48;
@@ -139,7 +142,8 @@ pub(crate) fn stuck(
                 // Where the display resolves the noise on both sides, no two rows are equal, however flat the response.
                 let sides = [(from >= BESIDE, a.1), (column.len() - end >= BESIDE, b.1)];
                 let noise = sides.into_iter().filter(|s| s.0).map(|s| s.1).fold(f64::INFINITY, f64::min);
-                if moved || (noise.is_finite() && noise > RESOLVED * quantum) {
+                let resolved = if rare(column, from..end) { RESOLVED_RARE } else { RESOLVED };
+                if moved || (noise.is_finite() && noise > resolved * quantum) {
                     let (lines, hz) = ([line[from], line[end - 1]], [hz[from], hz[end - 1]]);
                     let (found, rows) = (column[from], end - from);
                     return Err(refuse(file, channel, Dead::Stuck { found, rows, lines, hz, expected_change }));
@@ -149,6 +153,17 @@ pub(crate) fn stuck(
         }
     }
     Ok(())
+}
+
+/// Whether neighbours outside a stretch are equal in few places only.
+fn rare(column: &[f64], stretch: std::ops::Range<usize>) -> bool {
+    let outside = |i: &usize| !(stretch.contains(i) && stretch.contains(&(i + 1)));
+    let (mut equal, mut all) = (0usize, 0usize);
+    for i in (0..column.len() - 1).filter(outside) {
+        all += 1;
+        equal += usize::from(column[i] == column[i + 1]);
+    }
+    equal as f64 <= RARE * all as f64
 }
 
 /// The different values, ascending.
