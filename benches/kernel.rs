@@ -6,7 +6,8 @@ use servotune::controller::{Controller, Lowpass, Notch, Pid};
 use servotune::feedback::{LoopOnGrid, SampledPlant};
 use servotune::lti::{Body, DiscretePlant, Mode, Plant, PlantFile, Section};
 use servotune::pes::{
-    Asked, Figure, Noise, PesClock, Profile, QuickScene, QuickWork, Record, Spiral, StepScene, StepWork,
+    Asked, Figure, Noise, NoisePower, NoisePowerWork, PesClock, Profile, QuickScene, QuickWork, Record, Spiral,
+    StepScene, StepWork, WindowDft,
 };
 use std::path::Path;
 
@@ -162,4 +163,42 @@ fn step_of_500_samples(b: Bencher, name: &str) {
     let scene = StepScene::new(&plant, 500);
     let mut work = StepWork::default();
     b.bench_local(|| scene.run(black_box(&chain), None, None, 500, &mut work));
+}
+
+fn noise(b: Bencher, slopes: bool) {
+    let (plant, chain) = prepared("healthy");
+    let grid = SampledPlant::of_model(&plant);
+    let dft = WindowDft::new(200, 27_480.0, (5..=21).collect());
+    let power = NoisePower::of(&profile(plant.sample_time_s()), &grid, &dft).unwrap();
+    let (mut on, mut work) = (LoopOnGrid::default(), NoisePowerWork::default());
+    grid.judge(&chain, &mut on);
+    let (mut bins, mut out) = (Vec::new(), Vec::new());
+    let shares = [1.0; 17];
+    b.bench_local(|| {
+        if slopes {
+            power.slopes(&grid, black_box(&chain), &on, &shares, [1.0, 1.0], &mut work, &mut out);
+            out.len() as f64
+        } else {
+            power.bins(black_box(&on), &mut work, &mut bins);
+            power.position.variance(&on)
+        }
+    });
+}
+
+#[divan::bench]
+fn noise_of_bins_and_window(b: Bencher) {
+    noise(b, false);
+}
+
+#[divan::bench]
+fn noise_slopes(b: Bencher) {
+    noise(b, true);
+}
+
+#[divan::bench]
+fn dft_of_17_bins(b: Bencher) {
+    let dft = WindowDft::new(200, 27_480.0, (5..=21).collect());
+    let window: Vec<f64> = (0..200).map(|i| f64::from(i * i % 13)).collect();
+    let mut amplitude = Vec::new();
+    b.bench_local(|| dft.amplitudes(black_box(&window), &mut amplitude));
 }

@@ -8,6 +8,7 @@
 use super::{Noise, Profile, WindowDft};
 use crate::feedback::{LoopOnGrid, LoopPower, Magnitude, PowerWork, SampledPlant, quadrature};
 use crate::lti::Section;
+use crate::numeric::wide::{Wide, widest};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
@@ -121,9 +122,7 @@ impl NoisePower {
         let NoisePowerWork { density: mix, mixed, power } = work;
         mix.clear();
         mix.resize(self.density.sensitivity.len(), 0.0);
-        for (share, leak) in bins.iter().zip(&self.leaks).filter(|(share, _)| **share != 0.0) {
-            mix.iter_mut().zip(leak).for_each(|(m, l)| *m += share * l);
-        }
+        widest(Mix { bins, leaks: &self.leaks, into: mix });
         let blend = |density: &[f64], p: &[f64], c: &[f64], out: &mut Vec<f64>| {
             out.clear();
             let parts = mix.iter().zip(density).zip(p.iter().zip(c));
@@ -133,6 +132,26 @@ impl NoisePower {
         blend(&d.sensitivity, &p.sensitivity, &c.sensitivity, &mut mixed.sensitivity);
         blend(&d.complementary, &p.complementary, &c.complementary, &mut mixed.complementary);
         mixed.slopes(grid, chain, on, power, out);
+    }
+}
+
+/// The weights of the density that a figure of the bins' powers has.
+struct Mix<'a> {
+    bins: &'a [f64],
+    leaks: &'a [Vec<f64>],
+    into: &'a mut [f64],
+}
+
+impl Wide for Mix<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        for (share, leak) in self.bins.iter().zip(self.leaks).filter(|(share, _)| **share != 0.0) {
+            for (m, l) in self.into.iter_mut().zip(leak) {
+                *m = share.mul_add(*l, *m);
+            }
+        }
     }
 }
 
