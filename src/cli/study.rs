@@ -5,6 +5,7 @@ use super::{Ending, Failure, Screen, fleet_kills, fleet_reliability, fleet_study
 use crate::document::write_text;
 use crate::study;
 use serde::Serialize;
+use std::path::{Path, PathBuf};
 
 #[derive(Serialize)]
 struct Written {
@@ -24,7 +25,10 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
         StudyName::FleetShared => Some(fleet_study::shared(&a.out, screen)?),
         _ => None,
     };
-    if let Some(files) = own {
+    if let Some(mut files) = own {
+        if matches!(a.study, StudyName::ReliabilityFleet | StudyName::ReliabilityReaders) {
+            files.push(reliability(&a.out)?);
+        }
         let written = Written { files: files.iter().map(|f| f.display().to_string()).collect() };
         screen.result(&written, &format!("{}\n", written.files.join("\n")))?;
         return Ok(Ending::Accepted);
@@ -60,4 +64,24 @@ pub(super) fn run(a: &StudyArguments, screen: &mut Screen) -> Result<Ending, Fai
     }
     screen.result(&written, &format!("{}\n", written.files.join("\n")))?;
     Ok(Ending::Accepted)
+}
+
+/// `reliability.md`: the halves that the folder holds, one below the other.
+///
+/// Each half takes minutes and is made again on its own.
+fn reliability(out: &Path) -> Result<PathBuf, Failure> {
+    let mut page = "# What a hostile trial finds\n\nThe halves are made by the commands that they name; each of them writes this page anew from what stands in the folder.\n".to_owned();
+    for (name, study) in
+        [("reliability_readers.md", "reliability-readers"), ("reliability_fleet.md", "reliability-fleet")]
+    {
+        match std::fs::read_to_string(out.join(name)) {
+            // Headings go one step down, below the title.
+            Ok(half) => page.extend(half.lines().flat_map(|l| ["\n", if l.starts_with('#') { "#" } else { "" }, l])),
+            Err(_) => page += &format!("\nNot made yet: `servotune study {study} --out {}`.", out.display()),
+        }
+        page.push('\n');
+    }
+    let file = out.join("reliability.md");
+    write_text(&file, &page)?;
+    Ok(file)
 }
