@@ -90,7 +90,20 @@ fn only_what_the_gate_calls_tunable_is_tuned_and_every_machine_has_its_row() {
     assert!(ran.err.contains("pes.csv:2") && ran.err.contains("void"), "{}", ran.err);
     let said = json(&servotune(&dir, &["classify", "fleet.csv", "--gate", "gate.json", "--json"]));
     let spec = paper();
-    let tune = ["tune", "--machines", "fleet", "--gate", "gate.json", "--spec", &spec, "--starts", "2", "--json"];
+    let tune = [
+        "tune",
+        "--machines",
+        "fleet",
+        "--gate",
+        "gate.json",
+        "--spec",
+        &spec,
+        "--sample-time-s",
+        "3.96e-5",
+        "--starts",
+        "2",
+        "--json",
+    ];
     let by_order = ["--out", "tuned", "--override", "L0002=sensor replaced, record lost", "--keep-infeasible"];
     let ran = servotune(&dir, &[&tune[..], &by_order].concat());
     // The empty folder cannot be tuned.

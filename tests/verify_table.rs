@@ -105,8 +105,19 @@ fn tune_proves_its_table_and_says_so() {
         .unwrap()
         .replace("max_sensitivity = 2.4", "max_sensitivity = 1.05");
     std::fs::write(dir.join("hard.toml"), hard).unwrap();
-    let words =
-        ["tune", "--plant", "plant.toml", "--spec", "hard.toml", "--starts", "2", "--keep-infeasible", "--json"];
+    let words = [
+        "tune",
+        "--plant",
+        "plant.toml",
+        "--spec",
+        "hard.toml",
+        "--sample-time-s",
+        "3.96e-5",
+        "--starts",
+        "2",
+        "--keep-infeasible",
+        "--json",
+    ];
     let (code, text, _) = run(&dir, &[&words[..], &["--out", "hard_gains.toml"]].concat());
     let document: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!((code, document["certificate"]["proved"].as_bool()), (1, Some(false)), "{text}");
@@ -127,7 +138,20 @@ fn a_table_tuned_on_a_sweep_says_what_the_sweep_does_not_prove() {
         .map(|(w, p)| format!("{},{},{}", w / TAU, 20.0 * p.norm().log10(), p.arg().to_degrees()))
         .collect();
     std::fs::write(dir.join("sweep.csv"), rows.join("\n") + "\n").unwrap();
-    let words = ["tune", "--frf", "sweep.csv", "--phase", "response", "--spec", "spec.toml", "--starts", "4", "--json"];
+    let words = [
+        "tune",
+        "--frf",
+        "sweep.csv",
+        "--phase",
+        "response",
+        "--spec",
+        "spec.toml",
+        "--sample-time-s",
+        "3.96e-5",
+        "--starts",
+        "4",
+        "--json",
+    ];
     let (_, text, said) =
         run(&dir, &[&words[..], &["--out", "mine.toml", "--report", "slot.html", "--keep-infeasible"]].concat());
     let document: serde_json::Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{said}"));

@@ -24,8 +24,6 @@ pub struct MeasuredLoop<'a> {
     start_phase: f64,
     /// Poles of the plant outside the unit circle, as stated.
     outside: usize,
-    /// Whether neither the first points nor the sections show a pole at rest.
-    level: bool,
 }
 
 /// A range.
@@ -107,8 +105,7 @@ impl<'a> MeasuredLoop<'a> {
             .collect();
         let outside = frf.unstable_poles();
         let start_phase = from_rest(phase[0] + PI * outside as f64);
-        let level = curve.integrators() + section_poles(sections).0 == 0;
-        Ok(MeasuredLoop { sections, curve, slack, start_phase, outside, level })
+        Ok(MeasuredLoop { sections, curve, slack, start_phase, outside })
     }
 
     /// Half width (95 %) of ln|L| and of arg L (rad) at a frequency of the band.
@@ -197,10 +194,6 @@ impl OpenLoop for MeasuredLoop<'_> {
     }
 
     fn start_angle(&self, w: f64, value: Complex<f64>) -> f64 {
-        // Level from rest on and below 1: 1 + L stays in the right half-plane up to here.
-        if self.level && value.norm() < 1.0 {
-            return (1.0 + value).arg();
-        }
         // The plant's phase is known as far as its branch; each section's is followed from z = 1 on its own.
         let step = Complex::new(1.0, 0.0) - Complex::from_polar(1.0, -w * self.sections.sample_time_s);
         let back = Complex::from_polar(1.0, -w * self.sections.sample_time_s);
