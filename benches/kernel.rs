@@ -1,5 +1,5 @@
 //! What the parts of one candidate cost on several machines. Run: `cargo bench --bench kernel`.
-#![allow(clippy::unwrap_used, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 
 use divan::{Bencher, black_box};
 use servotune::controller::{Controller, Lowpass, Notch, Pid};

@@ -57,6 +57,9 @@ struct Stationary {
     variances: [f64; 2],
 }
 
+/// What one unit of a state or a noise leads to: the next state, the position, the command.
+type Columns = (Vec<f64>, f64, f64);
+
 /// The sum of A^k B Bᵀ A^kᵀ, by doubling, solves the Lyapunov equation of the matrices that the simulation's own step has.
 fn stationary(plant: &DiscretePlant, chain: &[Section], noise: &Noise) -> Stationary {
     let form = plant.real_form();
@@ -94,11 +97,11 @@ fn stationary(plant: &DiscretePlant, chain: &[Section], noise: &Noise) -> Statio
         p += &a * &p * a.transpose();
         a = &a * &a;
     }
-    let row = |of: &dyn Fn(&(Vec<f64>, f64, f64)) -> f64| {
+    let row = |of: fn(&Columns) -> f64| {
         let c = DMatrix::from_fn(1, order, |_, j| of(&columns[j]));
         (&c * &p * c.transpose())[(0, 0)] + fresh.iter().map(|f| of(f).powi(2)).sum::<f64>()
     };
-    let variances = [row(&|x| x.1), row(&|x| x.2)];
+    let variances = [row(|x| x.1), row(|x| x.2)];
     Stationary { position: DMatrix::from_fn(1, order, |_, j| columns[j].1), a: once, p, variances }
 }
 

@@ -163,7 +163,8 @@ mod tests {
     }
 
     fn plant(body: &str) -> Result<Plant, LtiError> {
-        let text = format!("position_unit='um'\ncommand_unit='A'\n[plant]\n{body}\n");
+        let dead = if body.contains("delay_s") { "" } else { "delay_s=0\n" };
+        let text = format!("position_unit='um'\ncommand_unit='A'\n[plant]\n{dead}{body}\n");
         Plant::try_from(parse_toml::<PlantFile>(Path::new("p"), &text).unwrap())
     }
 

@@ -101,7 +101,7 @@ pub(super) struct PlantTable {
     pub lead_rad_s: Option<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lead_hz: Option<Vec<f64>>,
-    #[serde(default)]
+    // Required: a dead time left out would be read as none, and the margins come out too good.
     pub delay_s: f64,
     #[serde(default = "one")]
     pub resonance_gain: f64,

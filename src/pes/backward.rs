@@ -144,11 +144,11 @@ impl Loop {
             for j in 0..J {
                 acting[k][j] += direct.mul_add(slope[j], across(&driven[j]));
             }
-            for reading in left..read {
+            for (reading, value) in weighed.iter().enumerate().take(read).skip(left) {
                 let weights = &self.weights[reading * chunks.len()..(reading + 1) * chunks.len()];
                 for (s, [wr, wi]) in states.iter_mut().zip(weights) {
                     for j in 0..J {
-                        let less = [-weighed[reading][j]; CHUNK];
+                        let less = [-value[j]; CHUNK];
                         s[0][j] = fused(less, *wr, s[0][j]);
                         s[1][j] = fused(less, *wi, s[1][j]);
                     }

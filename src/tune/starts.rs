@@ -60,9 +60,10 @@ pub(super) fn starts(problem: &TuningProblem, given: &[Vec<f64>], seed: u64, cou
         order.into_iter().map(|i| (i as f64 + random.uniform()) / n as f64).collect()
     };
     let columns: [Vec<f64>; SHARES] = std::array::from_fn(|_| column());
+    let row = |i: usize| std::array::from_fn(|c| columns[c][i]);
     for i in 0..n {
         // Every other start lays its notches on modes, the rest anywhere between their bounds.
-        let shape = Shape::of(problem, &std::array::from_fn(|c| columns[c][i]), i % 2 == 0);
+        let shape = Shape::of(problem, &row(i), i % 2 == 0);
         all.push(shaped(problem, i % problem.machines.len(), &shape));
     }
     all
