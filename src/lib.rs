@@ -61,6 +61,8 @@ pub mod verify;
 
 pub mod report;
 
+pub mod answer;
+
 pub mod study;
 
 pub mod cli;

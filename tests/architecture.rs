@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 /// Rooms by rank; a room uses lower ranks only (`specs/decisions/rooms.md`).
-const RANKS: [&[&str]; 11] = [
+const RANKS: [&[&str]; 12] = [
     &["units", "document", "numeric"],
     &["frf", "recording", "lti"],
     &["controller", "physics"],
@@ -14,6 +14,7 @@ const RANKS: [&[&str]; 11] = [
     &["twin", "verify"],
     &["fleet"],
     &["report"],
+    &["answer"],
     &["study"],
     &["cli"],
 ];

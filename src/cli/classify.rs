@@ -2,72 +2,26 @@
 
 use super::gate_arguments::ClassifyArguments;
 use super::{Ending, Failure, Screen};
-use crate::gate::{Action, Decisions, Drift, Gate, Label, Table, Verdict, decisions};
+use crate::answer::classified;
+use crate::gate::{Gate, Table, Verdict};
 use crate::report::number::NumberFormat;
 use crate::report::table::{self, Column};
-use serde::Serialize;
-use std::path::Path;
-
-#[derive(Serialize)]
-struct Document<'a> {
-    gate: &'a Path,
-    classes: &'a [Label],
-    class_names: &'a [String],
-    rows: &'a [Verdict],
-    abstained: usize,
-    drift: &'a Drift,
-    /// Where the table has the gate's label column: what the decisions came to.
-    judged: Option<Judged>,
-}
-
-/// Decisions against the table's own labels.
-#[derive(Serialize)]
-struct Judged {
-    rows: usize,
-    accuracy: f64,
-    decisions: Decisions,
-}
 
 pub(super) fn run(a: &ClassifyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     let gate = Gate::read(&a.gate)?;
     let table = Table::read(&a.table, Some(&gate.label))?;
-    let rows = gate.classify(&table)?;
-    let drift = gate.drift(&table)?;
-    if drift.drifted {
-        let moved: Vec<&str> = drift.features.iter().filter(|f| f.drifted).map(|f| f.feature.as_str()).collect();
+    let document = classified(Some(&a.gate), &gate, &table)?;
+    if document.drift.drifted {
+        let features = document.drift.features.iter();
+        let moved: Vec<&str> = features.filter(|f| f.drifted).map(|f| f.feature.as_str()).collect();
         screen.say(&format!(
             "note: {} features are not distributed as in training (or the mix of classes differs): {}",
             moved.len(),
             moved.join(", ")
         ));
     }
-    let abstained = rows.iter().filter(|r| r.abstained || r.action == Action::Inspect).count();
-    let document = Document {
-        gate: &a.gate,
-        classes: &gate.classes.labels,
-        class_names: &gate.classes.names,
-        rows: &rows,
-        abstained,
-        drift: &drift,
-        judged: judged(&gate, &table, &rows),
-    };
-    screen.result(&document, &text(&rows)?)?;
-    Ok(if abstained == 0 { Ending::Accepted } else { Ending::Rejected })
-}
-
-/// Rows whose label is one of the gate's classes, judged.
-fn judged(gate: &Gate, table: &Table, rows: &[Verdict]) -> Option<Judged> {
-    let labels = table.labels()?;
-    let place = |l: &Label| gate.classes.labels.iter().position(|x| x == l);
-    let known =
-        labels.iter().zip(rows).filter_map(|(l, v)| Some((gate.classes.find(l)?, (place(&v.class)?, v.action))));
-    let (truth, said): (Vec<usize>, Vec<(usize, Action)>) = known.unzip();
-    let right = truth.iter().zip(&said).filter(|(t, (c, _))| *t == c).count();
-    (!truth.is_empty()).then(|| Judged {
-        rows: truth.len(),
-        accuracy: right as f64 / truth.len() as f64,
-        decisions: decisions(&truth, &said, &gate.classes, &gate.costs),
-    })
+    screen.result(&document, &text(&document.rows)?)?;
+    Ok(if document.abstained == 0 { Ending::Accepted } else { Ending::Rejected })
 }
 
 fn text(rows: &[Verdict]) -> Result<String, Failure> {

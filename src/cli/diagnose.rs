@@ -2,9 +2,9 @@
 
 use super::diagnose_arguments::DiagnoseArguments;
 use super::{Ending, Failure, Screen, load};
-use crate::diagnose::{DiagnoseSettings, Diagnosis, Verdict, diagnose};
+use crate::answer::{case_provenance, conclude, sure};
+use crate::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
 use crate::document::{FileSet, check_target};
-use crate::lti::PlantFile;
 use crate::recording::{Case, Record, RecordEntry, Role};
 use crate::report::diagnosis::diagnosis_page;
 use std::fmt::Write;
@@ -14,19 +14,6 @@ use std::path::PathBuf;
 const CORRECTED: &str = "plant_corrected.toml";
 /// The page for people, beside it.
 pub(super) const REPORT: &str = "report.html";
-
-/// What the report was made from.
-fn provenance(case: &Case) -> Vec<(String, String)> {
-    let name = |p: &PathBuf| p.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let mut rows = vec![
-        ("program".to_owned(), format!("servotune {}", env!("CARGO_PKG_VERSION"))),
-        ("plant".to_owned(), name(&case.plant)),
-    ];
-    rows.extend(case.controller.iter().map(|c| ("controller".to_owned(), name(c))));
-    let records: Vec<String> = case.records.iter().map(|(e, _)| e.name()).collect();
-    rows.push(("records".to_owned(), records.join(", ")));
-    rows
-}
 
 fn case(a: &DiagnoseArguments) -> Result<Case, Failure> {
     if let Some(folder) = &a.case {
@@ -65,8 +52,7 @@ fn case(a: &DiagnoseArguments) -> Result<Case, Failure> {
 pub(super) fn run(a: &DiagnoseArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     let (diagnosis, text) = make(a, screen)?;
     screen.result(&diagnosis, &text)?;
-    let sure = matches!(diagnosis.verdict, Verdict::NoMismatch | Verdict::Refit | Verdict::Named | Verdict::Family);
-    Ok(if sure { Ending::Accepted } else { Ending::Rejected })
+    Ok(if sure(&diagnosis) { Ending::Accepted } else { Ending::Rejected })
 }
 
 /// Diagnoses and writes every file; gives the diagnosis and what a person reads of it.
@@ -81,16 +67,12 @@ pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagno
         diagnose(&case, &plant, controller.as_ref(), &settings, |m| screen.say(&format!("{}: {m}", case.id)))?;
     // Model, page and findings belong together: all of them appear or none.
     let mut files = FileSet::default();
-    if made.diagnosis.corrects() {
-        let text =
-            toml::to_string(&PlantFile::from(&made.corrected.plant)).map_err(|source| Failure::Toml { source })?;
-        files.write(&a.out.join(CORRECTED), text);
-        made.diagnosis.corrected_model = Some(CORRECTED.into());
-    } else if made.diagnosis.verdict == Verdict::LocatedUnexplained {
-        made.diagnosis.remarks.push("no corrected plant is written: it would simulate worse than the given one".into());
+    let conclusion = conclude(&mut made, CORRECTED);
+    if let Some(plant) = &conclusion.corrected {
+        files.write(&a.out.join(CORRECTED), toml::to_string(plant).map_err(|source| Failure::Toml { source })?);
     }
     screen.say(&format!("{}: drawing the report", case.id));
-    let page = diagnosis_page(&made, provenance(&case))?;
+    let page = diagnosis_page(&made, case_provenance(&case))?;
     files.write(&a.out.join(REPORT), page.html());
     let diagnosis = made.diagnosis;
     let json = serde_json::to_string_pretty(&diagnosis).map_err(|source| Failure::Json { source })?;

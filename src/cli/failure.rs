@@ -1,5 +1,6 @@
 //! Why a command could not be done: one message, exit code 2.
 
+use crate::answer::AnswerError;
 use crate::controller::ControllerError;
 use crate::diagnose::DiagnoseError;
 use crate::document::DocumentError;
@@ -25,6 +26,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "each field is named in the message")]
 pub enum Failure {
+    #[error(transparent)]
+    Answer(#[from] AnswerError),
     #[error(transparent)]
     Document(#[from] DocumentError),
     #[error("{}: {source}", file.display())]

@@ -3,8 +3,9 @@
 //! In: a folder of machine folders, a gate, a spec. Out: a row for each machine with its class, action, reason and what became of it, and a gain
 //! table for each tuned one. A broken folder is a row with its error. What `tune --machines` and `demo` share.
 
-use super::proof::{self, OnSweep, Proof};
+use super::proof::{self, OnSweep};
 use super::{Failure, Screen};
+use crate::answer::Proof;
 use crate::controller::Controller;
 use crate::document::{FileSet, below, sha256_hex, write_text};
 use crate::frf::{ReadSettings, read_file};

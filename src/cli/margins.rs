@@ -1,36 +1,23 @@
 //! `servotune margins`: one loop judged, of a model or of a measured response.
 
 use super::arguments::MarginsArguments;
-use super::{Ending, Failure, Screen, load, physics};
-use crate::feedback::{
-    Amplitudes, DescribedMargins, DescribedPlant, LoopVerdict, Margins, MeasuredLoop, ModelLoop, confirmed_margins,
-    described_margins, linear_crossover_hz, measured_margins,
-};
-use crate::lti::{DiscretePlant, Sections};
-use crate::physics::Context;
+use super::{Ending, Failure, Screen, load};
+use crate::answer::{ModelMargins, Named, model_margins};
+use crate::controller::Controller;
+use crate::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
 use crate::report::margins::{margins_text, measured_text};
 use crate::report::physical::{amplitude_table, limit_cycle_sentences};
-use serde::Serialize;
 use std::path::Path;
 
 pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     let controller = load::controller(&a.controller)?;
-    let sections =
-        controller.sections().map_err(|source| Failure::Controller { file: a.controller.clone(), source })?;
     if a.frf.is_none() && a.taken.any() {
         return Err(Failure::MeasuredWithout);
     }
     let stable = match (&a.plant, &a.frf) {
         (Some(file), _) => {
-            let fallback = Context::default();
-            let context = Context {
-                sample_time_s: sections.sample_time_s,
-                travel: fallback.travel.max(a.amplitudes.1),
-                command: controller.output_limit.unwrap_or(fallback.command),
-                ..fallback
-            };
             let amplitudes = Amplitudes { low: a.amplitudes.0, high: a.amplitudes.1, ..Amplitudes::default() };
-            of_model(file, &sections, &context, &amplitudes, screen)?
+            of_model(file, Named { file: &a.controller, value: &controller }, &amplitudes, screen)?
         }
         (None, Some(file)) => {
             let taken = load::Taken {
@@ -39,6 +26,8 @@ pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, F
                 hold_included: a.hold_included,
                 controller: Some(&a.controller),
             };
+            let sections =
+                controller.sections().map_err(|source| Failure::Controller { file: a.controller.clone(), source })?;
             let sweep = load::sweep(file, &a.reading, &taken, screen)?;
             let judged = measured_margins(&MeasuredLoop::new(&sweep.frf, &sections, a.hold_included)?)?;
             screen.result(&judged, &measured_text(&judged)?)?;
@@ -50,48 +39,27 @@ pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, F
     Ok(if stable { Ending::Accepted } else { Ending::Rejected })
 }
 
-/// Margins of a plant with physics; the flattened ones are the worst over the amplitudes.
-#[derive(Serialize)]
-struct Described<'a> {
-    #[serde(flatten)]
-    margins: &'a DescribedMargins,
-    physics: Vec<&'static str>,
-    /// Disturbances: not in the margins.
-    outside: Vec<&'static str>,
-    /// Margins of the linear plant alone.
-    linear: &'a Margins,
-}
-
 fn of_model(
     file: &Path,
-    sections: &Sections,
-    context: &Context,
+    controller: Named<'_, Controller>,
     amplitudes: &Amplitudes,
     screen: &mut Screen,
 ) -> Result<bool, Failure> {
     let plant = load::plant(file)?;
-    let physics = physics::restored(file, &plant, context, screen)?;
-    let sampled = DiscretePlant::of(&plant, sections.sample_time_s)
-        .map_err(|source| Failure::Plant { file: file.into(), source })?;
-    let judged = confirmed_margins(&ModelLoop::new(&sampled, sections)?)?;
-    if let Some(physics) = physics {
-        physics::say_outside(file, &physics, screen);
-        let described = DescribedPlant::new(&physics, linear_crossover_hz(&judged, sections))
-            .map_err(|source| Failure::Plant { file: file.into(), source })?;
-        let all = described_margins(&described, sections, amplitudes)?;
-        let units = super::slot::units(&plant);
-        let names = physics.names();
-        let text = format!(
-            "Physics: {}. Worst over the amplitude:\n{}\n{}{}",
-            names.join(", "),
-            margins_text(&all.worst)?,
-            amplitude_table(&all, &judged, units)?.text(),
-            limit_cycle_sentences(&all, units),
-        );
-        let outside = physics::outside(&physics);
-        screen.result(&Described { margins: &all, physics: names, outside, linear: &judged }, &text)?;
-        return Ok(all.worst.stable);
-    }
-    screen.result(&judged, &margins_text(&judged)?)?;
-    Ok(judged.stable)
+    let judged = model_margins(Named { file, value: &plant }, controller, amplitudes, &mut |words| screen.say(words))?;
+    let text = match &judged {
+        ModelMargins::Linear(m) => margins_text(m)?,
+        ModelMargins::Described(d) => {
+            let units = super::slot::units(&plant);
+            format!(
+                "Physics: {}. Worst over the amplitude:\n{}\n{}{}",
+                d.physics.join(", "),
+                margins_text(&d.margins.worst)?,
+                amplitude_table(&d.margins, &d.linear, units)?.text(),
+                limit_cycle_sentences(&d.margins, units),
+            )
+        }
+    };
+    screen.result(&judged, &text)?;
+    Ok(judged.stable())
 }

@@ -34,7 +34,6 @@ mod margins_arguments;
 mod next_sweep;
 mod pareto;
 mod performance_arguments;
-mod physics;
 mod proof;
 mod reliability_readers;
 mod response;

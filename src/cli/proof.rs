@@ -4,28 +4,16 @@
 //! Spec: `specs/certificate.md`.
 
 use super::{Failure, Screen, verify};
+use crate::answer::Proof;
 use crate::controller::Controller;
 use crate::document::FileSet;
 use crate::frf::Sweep;
 use crate::lti::Plant;
-use crate::report::certificate::certificate_sentence;
 use crate::tune::{GainTable, Hold, InputDigest, Machine, Spec, TuneError, TuneSettings};
 use crate::verify::{
     Assurance, Assured, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, tune_assured,
 };
-use serde::Serialize;
-use std::path::{Path, PathBuf};
-
-/// What the proof of a table came to.
-#[derive(Clone, Debug, Serialize)]
-pub(super) struct Proof {
-    /// The certificate; absent where nothing could be proved or refused.
-    pub file: Option<PathBuf>,
-    /// Every limit is proved on every machine given.
-    pub proved: bool,
-    /// The same in a sentence: what is not proved, and by how much.
-    pub says: String,
-}
+use std::path::Path;
 
 /// Adds a table and its certificate to the files of one result; what is proved, none without a certificate asked for.
 pub(super) fn add(
@@ -36,18 +24,16 @@ pub(super) fn add(
 ) -> Result<Option<Proof>, Failure> {
     files.write(gains, table.text()?);
     let file = verify::beside(gains);
-    Ok(match certificate {
+    let mut proof = certificate.map(Proof::of);
+    match certificate {
         Some(Ok(c)) => {
             files.write(&file, c.text()?);
-            Some(Proof { file: Some(file), proved: c.proved, says: certificate_sentence(c) })
+            proof.iter_mut().for_each(|p| p.file = Some(file.clone()));
         }
-        other => {
-            // One of an earlier table would speak of this one.
-            files.remove(&file);
-            let reason = other.and_then(|o| o.as_ref().err());
-            reason.map(|reason| Proof { file: None, proved: false, says: format!("No certificate: {reason}.") })
-        }
-    })
+        // One of an earlier table would speak of this one.
+        _ => files.remove(&file),
+    }
+    Ok(proof)
 }
 
 /// Writes all files of one result, or none, and says which.

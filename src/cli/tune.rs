@@ -1,120 +1,15 @@
 //! `servotune tune`: gains that meet the limits, a gain table, a report.
 
-use super::arguments::{ModelArguments, TuneArguments};
-use super::proof::{self, Proof};
+use super::arguments::TuneArguments;
 use super::slot::{self, Slot};
 use super::tune_text::{physical_text, text};
-use super::{Ending, Failure, Screen, load, physics, tune_machines};
+use super::{Ending, Failure, Screen, load, proof, tune_machines};
+use crate::answer::{Asked, Given, Named, Proof, Reached, TunedDocument, given_model, given_sweep, tuned};
 use crate::controller::Controller;
 use crate::document::{FileSet, check_target, read_text, sha256_hex};
-use crate::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
-use crate::frf::Sweep;
-use crate::identify::{self, Identified, IdentifySettings, identify};
-use crate::lti::Plant;
-use crate::pes::context;
-use crate::physics::Restored;
-use crate::report::tuned::Units;
-use crate::tune::{
-    GainTable, Hold, InputDigest, Machine, Outcome, PhysicalTuning, Spec, TuneError, TuneSettings, sample_time_s, tune,
-    tune_physical,
-};
-use crate::verify::{Assurance, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, tune_assured};
-use serde::Serialize;
-use std::path::Path;
-
-#[derive(Serialize)]
-struct Document<'a> {
-    #[serde(flatten)]
-    outcome: &'a Outcome,
-    objective: Objective,
-    gain_table: Option<&'a Path>,
-    /// The proof of the table; absent without a table or by --no-certificate.
-    certificate: Option<&'a Proof>,
-    report: Option<&'a Path>,
-    /// Names and judgement of the physics; absent without any.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    physics: Option<Physics<'a>>,
-}
-
-/// What was made smallest, as the contract names it.
-#[derive(Serialize)]
-struct Objective {
-    name: &'static str,
-    value: f64,
-    unit: String,
-    /// No bound is computed.
-    lower_bound: Option<f64>,
-    starts: usize,
-    starts_at_best: usize,
-}
-
-#[derive(Serialize)]
-struct Physics<'a> {
-    effects: Vec<&'static str>,
-    amplitudes: &'a [f64],
-    rounds: usize,
-    before: Option<&'a crate::tune::PhysicalProof>,
-    after: &'a crate::tune::PhysicalProof,
-}
-
-/// What a tuning came to.
-struct Reached {
-    outcome: Outcome,
-    table: GainTable,
-    /// Every limit is met.
-    tuned: bool,
-    certificate: Option<Result<Certificate, String>>,
-    physics: Option<PhysicalTuning>,
-}
-
-/// What is tuned, as files gave it.
-enum Given {
-    Model {
-        plant: Box<Plant>,
-        source: Box<Source>,
-        physics: Option<Box<Restored>>,
-    },
-    /// With the model that continues it outside the sweep.
-    Response {
-        sweep: Box<Sweep>,
-        hold: Hold,
-        identified: Box<Identified>,
-    },
-}
-
-impl Given {
-    /// Units from the plant file, or as given for the sweep.
-    fn units<'a>(&'a self, words: &'a ModelArguments) -> Units<'a> {
-        match self {
-            Given::Model { plant, .. } => slot::units(plant),
-            Given::Response { .. } => Units { position: &words.position_unit, command: &words.command_unit },
-        }
-    }
-
-    /// Whether `margins` would accept the loop: of a sweep it asks that the points tell stability.
-    fn knows(&self, controller: &Controller) -> Result<bool, Failure> {
-        let Given::Response { sweep, hold, .. } = self else { return Ok(true) };
-        let sections = controller.sections().map_err(TuneError::from)?;
-        let l = MeasuredLoop::new(&sweep.frf, &sections, *hold == Hold::Included)?;
-        Ok(measured_margins(&l)?.verdict != LoopVerdict::NotKnown)
-    }
-
-    fn machine(&self) -> Machine<'_> {
-        match self {
-            Given::Model { plant, .. } => Machine::Model(plant),
-            Given::Response { sweep, hold, identified } => {
-                Machine::Response { frf: &sweep.frf, hold: *hold, continuation: Some(&identified.plant) }
-            }
-        }
-    }
-
-    fn physics(&self) -> Option<&Restored> {
-        match self {
-            Given::Model { physics, .. } => physics.as_deref(),
-            Given::Response { .. } => None,
-        }
-    }
-}
+use crate::identify::{self, IdentifySettings};
+use crate::tune::{GainTable, Hold, InputDigest, Machine, Spec, TuneError, TuneSettings, sample_time_s, tune};
+use crate::verify::Source;
 
 pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     if a.frf.is_none() && a.taken.any() {
@@ -131,18 +26,24 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     let start = a.controller.as_ref().map(|file| load::controller(file)).transpose()?;
     let settings = TuneSettings { sample_time_s: a.sample_time_s, starts: a.starts, ..TuneSettings::default() };
     let clock = sample_time_s(&spec, start.as_ref(), &settings)?;
-    let mut inputs = Vec::new();
-    let given = given(a, &spec, start.as_ref(), clock, &mut inputs, screen)?;
+    let (given, digest) = given(a, &spec, start.as_ref(), clock, screen)?;
+    let mut inputs = vec![digest];
     if let Some(file) = &a.controller {
         inputs.push(InputDigest { role: "controller".into(), sha256: sha256_hex(read_text(file)?.as_bytes()) });
     }
-    let mut reached = reach(a, &given, &spec, start.as_ref(), &settings, &inputs, screen)?;
-    if !given.knows(reached.outcome.controller())? {
-        screen.say(
-            "stability is NOT KNOWN: within what these points leave open the loop of these gains may pass -1 on either side (`servotune margins --frf`); sweep more points around the crossings, or average longer",
-        );
-        reached.tuned = false;
-    }
+    let profile = Spec::profile_path(&a.spec).map_err(TuneError::from)?.map(|p| Source::read(&p)).transpose()?;
+    let asked = Asked {
+        spec: &spec,
+        spec_source: &Source::read(&a.spec)?,
+        profile: profile.as_ref(),
+        start: start.as_ref(),
+        settings: &settings,
+        certificate: !a.no_certificate,
+        uncertainty: a.uncertainty.unwrap_or_default(),
+        inputs: &inputs,
+        gains: &a.out,
+    };
+    let reached = tuned(&given, &asked, &mut |words| screen.say(words))?;
     // All that belongs to one table appears together or not at all.
     let mut files = FileSet::default();
     let (outcome, table) = (&reached.outcome, &reached.table);
@@ -158,64 +59,31 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         files.write(file, page);
     }
     proof::commit(files, screen)?;
-    let units = given.units(&a.model);
+    let units = given.units();
     let physics = given.physics().zip(reached.physics.as_ref());
     let text = match physics {
         Some((physics, t)) => physical_text(physics, t, start.as_ref(), units)?,
         None => text(outcome, start.as_ref(), &spec, units)?,
     };
-    let certificate = proof.as_ref();
-    let said = certificate.map_or_else(String::new, |p| format!("{}\n", p.says));
-    let o = outcome.objective();
-    let document = Document {
-        outcome,
-        objective: Objective {
-            name: o.name.name(),
-            value: o.value,
-            unit: spec.objective.unit(units.position, units.command),
-            lower_bound: None,
-            starts: o.starts,
-            starts_at_best: o.starts_at_best,
-        },
-        gain_table: written,
-        certificate,
-        report: a.report.as_deref(),
-        physics: physics.map(|(physics, t)| Physics {
-            effects: physics.names(),
-            amplitudes: &t.amplitudes,
-            rounds: t.rounds,
-            before: t.before.as_ref(),
-            after: &t.after,
-        }),
-    };
+    let said = proof.as_ref().map_or_else(String::new, |p| format!("{}\n", p.says));
+    let document = TunedDocument::of(&given, &reached, &spec, proof.as_ref(), written, a.report.as_deref());
     screen.result(&document, &(text + &said))?;
     Ok(if reached.tuned { Ending::Accepted } else { Ending::Rejected })
 }
 
-/// The machine in the files, digests of them into `inputs`.
+/// The machine in the files, with its digest.
 fn given(
     a: &TuneArguments,
     spec: &Spec,
     start: Option<&Controller>,
     clock: f64,
-    inputs: &mut Vec<InputDigest>,
     screen: &mut Screen,
-) -> Result<Given, Failure> {
-    let mut input = |role: &str, sha256: String| inputs.push(InputDigest { role: role.into(), sha256 });
+) -> Result<(Given, InputDigest), Failure> {
     match (&a.plant, &a.frf) {
         (Some(file), _) => {
-            let mut plant = load::plant(file)?;
-            let physics = if plant.physics.is_empty() {
-                None
-            } else {
-                let clock = start.cloned().unwrap_or_else(|| at_clock(clock));
-                let profile = spec.write("tuning a plant with physics").map_err(TuneError::from)?;
-                physics::restored(file, &plant, &context(profile, &clock), screen)?.map(Box::new)
-            };
-            plant.physics.clear();
-            let source = Source::read(file)?;
-            input("plant", source.sha256());
-            Ok(Given::Model { plant: Box::new(plant), source: Box::new(source), physics })
+            let plant = load::plant(file)?;
+            let named = Named { file, value: &plant };
+            Ok(given_model(named, Source::read(file)?, spec, start, clock, &mut |words| screen.say(words))?)
         }
         (None, Some(file)) => {
             let taken = load::Taken {
@@ -225,77 +93,11 @@ fn given(
                 controller: a.controller.as_deref(),
             };
             let sweep = load::sweep(file, &a.reading, &taken, screen)?;
-            input("frf", sweep.source_digest.clone());
             let hold = if a.hold_included { Hold::Included } else { Hold::NotIncluded };
-            let identified = identify(&sweep.frf, &model_settings(a, clock))
-                .map_err(|source| Failure::Identify { file: file.clone(), source })?;
-            Ok(Given::Response { sweep: Box::new(sweep), hold, identified: Box::new(identified) })
+            Ok(given_sweep(file, sweep, hold, &a.model.settings(), clock)?)
         }
         (None, None) => Err(Failure::NoMachine),
     }
-}
-
-/// Tunes, and proves the table on the way.
-fn reach(
-    a: &TuneArguments,
-    given: &Given,
-    spec: &Spec,
-    start: Option<&Controller>,
-    settings: &TuneSettings,
-    inputs: &[InputDigest],
-    screen: &mut Screen,
-) -> Result<Reached, Failure> {
-    let units = given.units(&a.model);
-    let spec_source = Source::read(&a.spec)?;
-    if let Some(physics) = given.physics() {
-        let high = spec.write("tuning a plant with physics").map_err(TuneError::from)?.spiral.distance;
-        let amplitudes = Amplitudes { low: 0.01 * high, high, ..Amplitudes::default() };
-        let t = tune_physical(physics, spec, start, settings, &amplitudes)?;
-        let sha256 = spec_source.sha256();
-        let table = GainTable::of_physics(&t, &physics.names(), spec.search.seed, sha256, inputs.to_vec())?;
-        let table = table.in_units(units.position, units.command);
-        let reason =
-            "bounds are proved of linear plants; give an equivalent linear plant for each amplitude".to_owned();
-        let certificate = (!a.no_certificate).then_some(Err(reason));
-        return Ok(Reached { outcome: t.outcome.clone(), table, tuned: t.passes(), certificate, physics: Some(t) });
-    }
-    if a.no_certificate {
-        let outcome = tune(&given.machine(), spec, start, settings)?;
-        let table = GainTable::of(&outcome, spec.search.seed, spec_source.sha256(), inputs.to_vec())?;
-        let tuned = outcome.tuned().is_some();
-        let table = table.in_units(units.position, units.command);
-        return Ok(Reached { outcome, table, tuned, certificate: None, physics: None });
-    }
-    let profile = Spec::profile_path(&a.spec).map_err(TuneError::from)?.map(|p| Source::read(&p)).transpose()?;
-    let ground = match given {
-        Given::Model { plant, source, .. } => Ground::Plant { plant, source },
-        Given::Response { sweep, .. } => Ground::Sweep {
-            sweep,
-            machine: given.machine(),
-            assumption: SweepAssumption { least_damping: LEAST_DAMPING, hold_included: a.hold_included },
-        },
-    };
-    let job = Assurance {
-        ground,
-        spec,
-        spec_source: &spec_source,
-        profile: profile.as_ref(),
-        uncertainty: a.uncertainty.unwrap_or_default(),
-        start,
-        units: (units.position, units.command),
-        inputs,
-        gains: &a.out,
-    };
-    let done = tune_assured(&job, settings, &mut |words| screen.say(words))?;
-    let tuned = done.outcome.tuned().is_some();
-    Ok(Reached { outcome: done.outcome, table: done.table, tuned, certificate: done.certificate, physics: None })
-}
-
-/// A controller of nothing but a clock.
-fn at_clock(sample_time_s: f64) -> Controller {
-    let pid = crate::controller::Pid { kp: 1.0, ki_per_s: 0.0, kd_s: 0.0, derivative_filter_s: 0.0 };
-    let (lowpass, notch) = (Vec::new(), Vec::new());
-    Controller { sample_time_s, output_limit: None, pid, lowpass, notch, feedforward: None }
 }
 
 /// Settings of the model that continues the sweep: a sweep with the hold in it has it divided out first.
@@ -328,7 +130,7 @@ fn report(
     let slot = Slot {
         name: &name,
         plant,
-        units: given.units(&a.model),
+        units: given.units(),
         sweep,
         identified,
         spec,

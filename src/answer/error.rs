@@ -1,0 +1,52 @@
+//! Why there is no answer: the room's own words, behind the name of the file or value they are about.
+
+use crate::controller::ControllerError;
+use crate::document::DocumentError;
+use crate::feedback::FeedbackError;
+use crate::frf::FrfError;
+use crate::gate::GateError;
+use crate::identify::IdentifyError;
+use crate::lti::LtiError;
+use crate::pes::{PesError, ProfileError};
+use crate::physics::PhysicsError;
+use crate::report::ReportError;
+use crate::tune::{GainTableError, TuneError};
+use crate::verify::VerifyError;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Every way an answer can be refused.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "each field is named in the message")]
+pub enum AnswerError {
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    #[error("{}: {source}", file.display())]
+    Plant { file: PathBuf, source: LtiError },
+    #[error("{}: {source}", file.display())]
+    Controller { file: PathBuf, source: ControllerError },
+    #[error("{}: {source}", file.display())]
+    Profile { file: PathBuf, source: ProfileError },
+    #[error("{}: [[plant.physics]] {source}", file.display())]
+    Physics { file: PathBuf, source: PhysicsError },
+    #[error("{}: {source}", file.display())]
+    Identify { file: PathBuf, source: IdentifyError },
+    #[error(transparent)]
+    Sweep(#[from] FrfError),
+    #[error(transparent)]
+    Lti(#[from] LtiError),
+    #[error(transparent)]
+    Feedback(#[from] FeedbackError),
+    #[error(transparent)]
+    Pes(#[from] PesError),
+    #[error(transparent)]
+    Tune(#[from] TuneError),
+    #[error(transparent)]
+    GainTable(#[from] GainTableError),
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+    #[error(transparent)]
+    Gate(#[from] GateError),
+    #[error(transparent)]
+    Report(#[from] ReportError),
+}

@@ -1,0 +1,31 @@
+//! What a command answers, made from values instead of files: the documents that `--json` prints and Python's `.to_dict()` gives.
+//!
+//! In: plants, controllers, sweeps, each with the name that messages use. Out: documents to be serialised, whether all was accepted, and refusals
+//! with the name of what is wrong. No argument, stdout or exit code is known here. Fields: `../shared/contract.md`.
+
+mod classified;
+mod diagnosed;
+mod error;
+mod identified;
+mod judged;
+mod named;
+mod physics;
+mod proof;
+mod simulated;
+mod sweep;
+mod tuned;
+
+pub use classified::{Classified, Judged, classified};
+pub use diagnosed::{Conclusion, case_provenance, conclude, sure};
+pub use error::AnswerError;
+pub use identified::IdentifiedDocument;
+pub use judged::{Described, ModelMargins, model_context, model_margins};
+pub use named::{Named, controller, plant, profile};
+pub use physics::{outside, restored};
+pub use proof::Proof;
+pub use simulated::{Simulated, simulated};
+pub use sweep::{Ran, adjusted, opened};
+pub use tuned::{Asked, Given, Reached, TunedDocument, given_model, given_sweep, tuned};
+
+/// Who is told what was decided on the way.
+pub type Say<'a> = &'a mut dyn FnMut(&str);
