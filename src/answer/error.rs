@@ -3,6 +3,7 @@
 use crate::controller::ControllerError;
 use crate::document::DocumentError;
 use crate::feedback::FeedbackError;
+use crate::fleet::FleetError;
 use crate::frf::FrfError;
 use crate::gate::GateError;
 use crate::identify::IdentifyError;
@@ -47,6 +48,8 @@ pub enum AnswerError {
     Verify(#[from] VerifyError),
     #[error(transparent)]
     Gate(#[from] GateError),
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
     #[error(transparent)]
     Report(#[from] ReportError),
 }

@@ -6,18 +6,23 @@
 mod classified;
 mod diagnosed;
 mod error;
+mod fleet_page;
+mod fleet_slot;
+mod floor;
 mod identified;
 mod judged;
 mod named;
 mod physics;
 mod proof;
 mod simulated;
+pub mod slot;
 mod sweep;
 mod tuned;
 
 pub use classified::{Classified, Judged, classified};
 pub use diagnosed::{Conclusion, case_provenance, conclude, sure};
 pub use error::AnswerError;
+pub use floor::{FloorFiles, floor_files};
 pub use identified::IdentifiedDocument;
 pub use judged::{Described, ModelMargins, model_context, model_margins};
 pub use named::{Named, controller, plant, profile};

@@ -3,11 +3,11 @@
 
 use super::arguments::DemoArguments;
 use super::proof::{self, OnSweep};
-use super::slot::{self, Slot};
-use super::tune::provenance;
 use super::tune_text::text;
 use super::{Ending, Failure, Screen, demo_diagnosis, demo_fleet, demo_gate, gated};
 use crate::answer::Proof;
+use crate::answer::slot::provenance;
+use crate::answer::slot::{self, Slot};
 use crate::document::{FileSet, read_text, sha256_hex, write_text, write_whole};
 use crate::frf::{PhaseDisplay, ReadSettings, read_file, write_bod_as};
 use crate::identify::{IdentifySettings, identify};

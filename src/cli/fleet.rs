@@ -3,15 +3,12 @@
 use super::fleet_arguments::{FleetArguments, FleetCommand, FleetRunArguments};
 use super::fleet_clock::Clocked;
 use super::fleet_progress::Progress;
-use super::{Ending, Failure, Screen, fleet_page, fleet_progress, fleet_slot, fleet_store};
-use crate::document::write_text;
-use crate::fleet::{
-    self, Action, Asked, Context, Effort, FileSource, Fleet, Job, SlotRow, SlotSource, Stamp, Store, Verdict, Worker,
-    clear_pages, page_file, write_tables,
-};
+use super::{Ending, Failure, Screen, fleet_progress, fleet_store};
+use crate::answer::{FloorFiles, floor_files};
+use crate::fleet::{self, Action, Context, Effort, FileSource, Fleet, Job, SlotSource, Stamp, Store, Verdict, Worker};
 use crate::study::TwinSource;
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
@@ -137,17 +134,10 @@ pub(super) fn make(a: &FleetRunArguments, screen: &mut Screen) -> Result<(Docume
         certified += usize::from(row.certified.as_ref().is_some_and(|c| c.passes));
         Ok(())
     })?;
-    let all = store.runs()?;
-    let own = all.iter().position(|r| r.run == run).unwrap_or(0);
-    let before = all[..own].iter().filter(|r| r.finished.is_some()).map(|r| r.run.clone()).collect();
-    let asked = Asked { gains: source.count() <= MOST_GAIN_FILES, before };
-    let mut files = write_tables(&store, &run, &context, &a.out, &asked)?;
-    let (slots, reports) = slot_pages(&store, &run, &context, &source, a, screen)?;
-    let page = a.out.join("fleet.html");
-    write_text(&page, &fleet_page::html(&store, &run, &context, &asked.before, &reports)?)?;
-    files.push(page);
-    files.extend(slots);
-    store.finish(&run, &stamp(a.who.as_deref()))?;
+    let wanted = FloorFiles { out: &a.out, pages: a.pages };
+    let files = floor_files(&mut store, &run, &context, &source, &wanted, &stamp(a.who.as_deref()), &mut |words| {
+        screen.say(words);
+    })?;
     files.iter().for_each(|f| screen.say(&format!("wrote {}", f.display())));
     let files_seconds = begun.elapsed().as_secs_f64() - seconds;
     let slots = source.count();
@@ -177,44 +167,6 @@ pub(super) fn make(a: &FleetRunArguments, screen: &mut Screen) -> Result<(Docume
     Ok((document, text))
 }
 
-/// Full reports of the slots whose limits are missed most, or nearest to it.
-fn slot_pages(
-    store: &Store,
-    run: &str,
-    context: &Context,
-    source: &dyn SlotSource,
-    a: &FleetRunArguments,
-    screen: &mut Screen,
-) -> Result<(Vec<PathBuf>, BTreeSet<String>), Failure> {
-    let mut worst: Vec<(f64, SlotRow)> = Vec::new();
-    store.each_row(run, None, |row| {
-        let best = row.table.as_ref().or(row.nearest.as_ref()).map(|t| &t.proved).or(row.current.as_ref());
-        let Some(now) = best.map(|p| p.worst) else { return Ok(()) };
-        // Rows come in order: of equals the earlier stays.
-        if worst.len() < a.pages || worst.last().is_some_and(|w| now > w.0) {
-            let at = worst.partition_point(|w| w.0 >= now);
-            worst.insert(at, (now, row));
-            worst.truncate(a.pages);
-        }
-        Ok(())
-    })?;
-    let (mut files, mut slots) = (Vec::new(), BTreeSet::new());
-    for (_, row) in &worst {
-        let file = page_file(&a.out, row)?;
-        match fleet_slot::html(context, source, row) {
-            Ok(Some(page)) => {
-                write_text(&file, &page)?;
-                files.push(file);
-                slots.insert(row.id());
-            }
-            Ok(None) => {}
-            Err(e) => screen.say(&format!("note: no page of {}: {e}", row.id())),
-        }
-    }
-    clear_pages(&a.out, &files)?;
-    Ok((files, slots))
-}
-
 /// The shared tables in words.
 fn shared_words(s: &fleet::Shared) -> String {
     let share = |n: usize| format!("{n} ({:.1} %)", 100.0 * n as f64 / s.slots.max(1) as f64);
@@ -228,9 +180,6 @@ fn shared_words(s: &fleet::Shared) -> String {
         share(served)
     )
 }
-
-/// Slots above which no folder of gains is written for each: the tables have them all.
-const MOST_GAIN_FILES: usize = 20_000;
 
 #[cfg(test)]
 mod tests {

@@ -227,7 +227,7 @@ fn tuned(job: &Job<'_>, row: &mut Row, screen: &mut Screen) -> Result<(), Failur
         }
         row.gains = Some(gains);
     } else {
-        let (_, words) = super::slot::verdict(&outcome);
+        let (_, words) = crate::answer::slot::verdict(&outcome);
         screen.say(&format!("machine {}: {words}", row.id));
         row.fail(&words);
     }

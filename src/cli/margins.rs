@@ -50,7 +50,7 @@ fn of_model(
     let text = match &judged {
         ModelMargins::Linear(m) => margins_text(m)?,
         ModelMargins::Described(d) => {
-            let units = super::slot::units(&plant);
+            let units = crate::answer::slot::units(&plant);
             format!(
                 "Physics: {}. Worst over the amplitude:\n{}\n{}{}",
                 d.physics.join(", "),

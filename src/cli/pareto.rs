@@ -1,7 +1,8 @@
 //! `servotune pareto`: what a margin costs in DFT, over one or several machines.
 
 use super::performance_arguments::ParetoArguments;
-use super::{Ending, Failure, Screen, load, slot};
+use super::{Ending, Failure, Screen, load};
+use crate::answer::slot;
 use crate::document::{check_target, read_text, sha256_hex, write_text};
 use crate::report::pareto::{pareto_page, pareto_table};
 use crate::tune::{Machine, ParetoPoint, ParetoSettings, Spec, TuneError, TuneSettings, TuningProblem, judge, pareto};

@@ -1,14 +1,14 @@
 //! `servotune tune`: gains that meet the limits, a gain table, a report.
 
 use super::arguments::TuneArguments;
-use super::slot::{self, Slot};
 use super::tune_text::{physical_text, text};
 use super::{Ending, Failure, Screen, load, proof, tune_machines};
+use crate::answer::slot::{self, Slot};
 use crate::answer::{Asked, Given, Named, Proof, Reached, TunedDocument, given_model, given_sweep, tuned};
 use crate::controller::Controller;
 use crate::document::{FileSet, check_target, read_text, sha256_hex};
 use crate::identify::{self, IdentifySettings};
-use crate::tune::{GainTable, Hold, InputDigest, Machine, Spec, TuneError, TuneSettings, sample_time_s, tune};
+use crate::tune::{Hold, InputDigest, Machine, Spec, TuneError, TuneSettings, sample_time_s, tune};
 use crate::verify::Source;
 
 pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Failure> {
@@ -139,24 +139,8 @@ fn report(
         over_model: over_model.as_ref(),
         table: &reached.table,
         certificate: proof.map(|p| p.says.as_str()),
-        provenance: provenance(&reached.table),
+        provenance: slot::provenance(&reached.table),
         physics: given.physics().zip(reached.physics.as_ref()),
     };
     Ok(slot::page(&slot)?.html())
-}
-
-/// Provenance of a table for the foot of a page.
-pub(super) fn provenance(table: &GainTable) -> Vec<(String, String)> {
-    let p = &table.provenance;
-    let mut all = vec![
-        ("program".to_owned(), format!("servotune {}", p.program)),
-        ("seed".to_owned(), p.seed.to_string()),
-        ("candidates scored".to_owned(), p.evaluations.to_string()),
-        ("spec (SHA-256)".to_owned(), p.spec_sha256.clone()),
-    ];
-    if !p.physics.is_empty() {
-        all.push(("physics".to_owned(), p.physics.join(", ")));
-    }
-    all.extend(p.inputs.iter().map(|i| (format!("{} (SHA-256)", i.role), i.sha256.clone())));
-    all
 }

@@ -1,7 +1,7 @@
 //! A tuning in words for a terminal.
 
 use super::Failure;
-use super::slot;
+use crate::answer::slot;
 use crate::controller::Controller;
 use crate::physics::Restored;
 use crate::report::physical::{amplitude_table, limit_cycle_sentences};

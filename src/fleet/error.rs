@@ -23,6 +23,8 @@ pub enum FleetError {
     NoPlace { folder: PathBuf, source: std::io::Error },
     #[error("{}: found a file that is no database, expected a store or nothing; name another `store` in FLEET.toml, or another --out", file.display())]
     NoDatabase { file: PathBuf },
+    #[error("slot {found} of {slots}: expected a place from 0 on, below their number")]
+    Place { found: usize, slots: usize },
     #[error("{}: no slot found; expected folders such as T001/slots/S01 with a response.bod", folder.display())]
     NoSlot { folder: PathBuf },
     #[error("{}: {source}", file.display())]

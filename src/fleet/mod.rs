@@ -37,6 +37,7 @@ mod settings;
 mod share;
 mod slot;
 mod source;
+mod spread;
 mod store;
 mod store_run;
 mod table_source;
@@ -66,6 +67,7 @@ pub use settings::{Fleet, FleetFile, Input, MOST_CANDIDATES, Robust, Tables, Tem
 pub use share::{Shared, SharedTable, assigned};
 pub use slot::work;
 pub use source::{FileSource, Loaded, SlotName, SlotSource};
+pub use spread::{Hand, Spread};
 pub use store::Store;
 pub use store_run::{Inputs, Run, Stamp};
 pub use work_list::{WorkItem, work_list};

@@ -102,7 +102,7 @@ pub fn run(job: &Job<'_>, watch: &dyn Watch) -> Result<String, FleetError> {
 }
 
 /// What the run works on: the names of all slots, in order, are part of it.
-fn inputs(job: &Job<'_>) -> Inputs {
+pub(super) fn inputs(job: &Job<'_>) -> Inputs {
     let slots = job.source.count();
     let names: String = (0..slots).map(|i| job.source.name(i).id() + "\n").collect();
     Inputs { config: job.context.digest.clone(), slots, list: sha256_hex(names.as_bytes()) }

@@ -13,4 +13,4 @@ pub use case::{Case, RecordEntry, Role};
 pub use columns::{Columns, read_columns};
 pub use error::RecordingError;
 pub use packed::gzip;
-pub use record::{ClockGap, ColumnNames, Record, RecordSettings};
+pub use record::{ClockGap, ColumnNames, Record, RecordColumns, RecordSettings};

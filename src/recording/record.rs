@@ -76,6 +76,20 @@ pub struct Record {
     pub temperature_c: Option<Vec<f64>>,
 }
 
+/// Columns of a record, each as long as the position or empty where it is absent.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[allow(missing_docs, reason = "as in the file")]
+pub struct RecordColumns {
+    pub time: Vec<f64>,
+    pub command: Vec<f64>,
+    pub position: Vec<f64>,
+    pub reference: Vec<f64>,
+    pub excitation: Vec<f64>,
+    pub pes: Vec<f64>,
+    pub spindle_rad: Vec<f64>,
+    pub temperature_c: Vec<f64>,
+}
+
 /// Shortest record that can be judged.
 const LEAST_ROWS: usize = 64;
 
@@ -135,11 +149,23 @@ impl Record {
             }
             rows.fits(values[2].len())?;
         }
-        let [time, command, position, reference, excitation, pes, spindle, temperature] = values;
+        let [time, command, position, reference, excitation, pes, spindle_rad, temperature_c] = values;
+        let columns = RecordColumns { time, command, position, reference, excitation, pes, spindle_rad, temperature_c };
+        Record::of(file, columns, settings.sample_time_s, first)
+    }
+
+    /// A record of columns in memory; `file` names it, and `first` rows stood before them in it.
+    pub fn of(
+        file: &Path,
+        columns: RecordColumns,
+        sample_time_s: Option<f64>,
+        first: usize,
+    ) -> Result<Record, RecordingError> {
+        let RecordColumns { time, command, position, reference, excitation, pes, spindle_rad, temperature_c } = columns;
         if position.len() < LEAST_ROWS {
             return Err(RecordingError::Short { file: file.into(), rows: position.len(), needed: LEAST_ROWS });
         }
-        let (sample_time_s, gaps) = match settings.sample_time_s {
+        let (sample_time_s, gaps) = match sample_time_s {
             Some(t) if t.is_finite() && t > 0.0 => (t, Vec::new()),
             Some(found_s) => return Err(RecordingError::SampleTime { found_s }),
             None => clock_of(&time, file, first)?,
@@ -151,8 +177,8 @@ impl Record {
             excitation: if excitation.is_empty() { vec![0.0; position.len()] } else { excitation },
             reference: (!reference.is_empty()).then_some(reference),
             pes: (!pes.is_empty()).then_some(pes),
-            spindle_rad: (!spindle.is_empty()).then_some(spindle),
-            temperature_c: (!temperature.is_empty()).then_some(temperature),
+            spindle_rad: (!spindle_rad.is_empty()).then_some(spindle_rad),
+            temperature_c: (!temperature_c.is_empty()).then_some(temperature_c),
             command,
             position,
         })

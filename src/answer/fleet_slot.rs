@@ -1,8 +1,7 @@
 //! The full report of one slot of a fleet: what the fleet's page leads to.
 
-use super::Failure;
-use super::slot::{self, Slot};
-use super::tune::provenance;
+use super::AnswerError;
+use super::slot::{self, Slot, provenance};
 use crate::fleet::{Context, OwnTable, SlotRow, SlotSource, gain_table_of};
 use crate::frf::Sweep;
 use crate::lti::Plant;
@@ -14,7 +13,7 @@ pub(super) fn file(row: &SlotRow) -> String {
 }
 
 /// The page of a slot; none where it could not be identified or judged.
-pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) -> Result<Option<String>, Failure> {
+pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) -> Result<Option<String>, AnswerError> {
     let loaded = source.load(row.index);
     let (Some(frf), Some(model), Some(current)) = (loaded.machine.response, &row.model, &row.current) else {
         return Ok(None);

@@ -1,6 +1,6 @@
 //! One slot tuned: what `tune` and `demo` share, from the machine to the gain table and the page.
 
-use super::Failure;
+use super::AnswerError;
 use crate::controller::Controller;
 use crate::feedback::{ModelLoop, OpenLoop, confirmed_margins};
 use crate::frf::Sweep;
@@ -21,7 +21,7 @@ use crate::tune::{GainTable, Hold, Judged, Machine, Outcome, PhysicalTuning, Spe
 use std::f64::consts::TAU;
 
 /// A slot with everything that is known of it.
-pub(super) struct Slot<'a> {
+pub struct Slot<'a> {
     pub name: &'a str,
     /// The model: given, or identified from the sweep.
     pub plant: &'a Plant,
@@ -45,7 +45,7 @@ pub(super) struct Slot<'a> {
 }
 
 /// The units of a plant file.
-pub(super) fn units(plant: &Plant) -> Units<'_> {
+pub fn units(plant: &Plant) -> Units<'_> {
     Units { position: &plant.position_unit, command: &plant.command_unit }
 }
 
@@ -53,7 +53,7 @@ pub(super) fn units(plant: &Plant) -> Units<'_> {
 const DRAWN_PER_DECADE: f64 = 400.0;
 
 /// All that is drawn of one controller on the model.
-fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Result<LoopView, Failure> {
+fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Result<LoopView, AnswerError> {
     let sections = c.sections().map_err(crate::tune::TuneError::from)?;
     let sampled = DiscretePlant::of(slot.plant, c.sample_time_s)?;
     let l = ModelLoop::new(&sampled, &sections)?;
@@ -98,7 +98,7 @@ const DRAWS: usize = 200;
 const DRAW_SEED: u64 = 1;
 
 /// The page of the slot.
-pub(super) fn page(slot: &Slot<'_>) -> Result<Page, Failure> {
+pub fn page(slot: &Slot<'_>) -> Result<Page, AnswerError> {
     let after_controller = slot.outcome.controller();
     let judged_after = slot.physics.map_or(&slot.outcome.after()[0].judged, |(_, t)| &t.after.judged);
     let after = loop_view("after", slot, after_controller, judged_after.clone())?;
@@ -127,7 +127,7 @@ pub(super) fn page(slot: &Slot<'_>) -> Result<Page, Failure> {
 }
 
 /// The verdict in a sentence.
-pub(super) fn verdict(outcome: &Outcome) -> (Verdict, String) {
+pub fn verdict(outcome: &Outcome) -> (Verdict, String) {
     match outcome {
         Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => {
             let held = match outcome {
@@ -161,7 +161,7 @@ pub(super) fn verdict(outcome: &Outcome) -> (Verdict, String) {
 }
 
 /// The verdict of a tuning with physics.
-pub(super) fn physical_verdict(t: &PhysicalTuning) -> (Verdict, String) {
+pub fn physical_verdict(t: &PhysicalTuning) -> (Verdict, String) {
     match &t.outcome {
         o if o.tuned().is_some() && !t.after.judged.passes() => {
             let missed = t.after.judged.limits.iter().filter(|l| !l.met());
@@ -174,7 +174,11 @@ pub(super) fn physical_verdict(t: &PhysicalTuning) -> (Verdict, String) {
 }
 
 /// What the physics does to margins, write and gains.
-fn physical_sections(slot: &Slot<'_>, before: Option<&LoopView>, after: &LoopView) -> Result<Vec<Section>, Failure> {
+fn physical_sections(
+    slot: &Slot<'_>,
+    before: Option<&LoopView>,
+    after: &LoopView,
+) -> Result<Vec<Section>, AnswerError> {
     let Some((physics, tuning)) = slot.physics else { return Ok(vec![]) };
     let mut writes = Vec::new();
     for (view, c, proof) in [
@@ -214,7 +218,7 @@ fn physical_sections(slot: &Slot<'_>, before: Option<&LoopView>, after: &LoopVie
     Ok(vec![Section { heading: "Physics".into(), blocks }])
 }
 
-fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
+fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, AnswerError> {
     let sampled = DiscretePlant::of(slot.plant, slot.outcome.controller().sample_time_s)?;
     let table = Block::Table(sampled_table(&sampled)?);
     let eq31 = Block::Details("Sampled plant, exact (counterpart of the paper's eq. 31)".into(), vec![table]);
@@ -243,7 +247,7 @@ fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
     Ok(vec![Section { heading: "Plant".into(), blocks }])
 }
 
-fn gain_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
+fn gain_sections(slot: &Slot<'_>) -> Result<Vec<Section>, AnswerError> {
     let bounds = slot.outcome.at_bounds();
     let mut blocks = vec![Block::Table(gains_table(slot.start, slot.outcome.controller(), bounds)?)];
     if let Outcome::Infeasible(i) = slot.outcome {
@@ -279,4 +283,20 @@ fn gain_sections(slot: &Slot<'_>) -> Result<Vec<Section>, Failure> {
         });
     }
     Ok(sections)
+}
+
+/// Provenance of a table for the foot of a page.
+pub fn provenance(table: &GainTable) -> Vec<(String, String)> {
+    let p = &table.provenance;
+    let mut all = vec![
+        ("program".to_owned(), format!("servotune {}", p.program)),
+        ("seed".to_owned(), p.seed.to_string()),
+        ("candidates scored".to_owned(), p.evaluations.to_string()),
+        ("spec (SHA-256)".to_owned(), p.spec_sha256.clone()),
+    ];
+    if !p.physics.is_empty() {
+        all.push(("physics".to_owned(), p.physics.join(", ")));
+    }
+    all.extend(p.inputs.iter().map(|i| (format!("{} (SHA-256)", i.role), i.sha256.clone())));
+    all
 }

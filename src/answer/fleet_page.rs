@@ -1,6 +1,6 @@
 //! From the store to the page of a fleet.
 
-use super::{Failure, fleet_slot};
+use super::{AnswerError, fleet_slot};
 use crate::fleet::{Context, Proved, SlotRow, Store, Verdict, assigned, drift, work_list};
 use crate::lti::Plant;
 use crate::report::fleet::{CoverageLine, FleetView, SlotLine, fleet_page};
@@ -16,7 +16,7 @@ pub(super) fn html(
     context: &Context,
     before: &[String],
     reports: &BTreeSet<String>,
-) -> Result<String, Failure> {
+) -> Result<String, AnswerError> {
     let count = store.count_done(run)?;
     let step = count.div_ceil(SHOWN).max(1);
     let shared = store.shared(run)?.unwrap_or_default();
