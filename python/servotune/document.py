@@ -1,0 +1,34 @@
+"""The text of a file of the contract: from a path, or the text itself."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+PathLike = str | os.PathLike
+
+
+def text_of(source: PathLike, called: str) -> tuple[str, str]:
+    """The text and the name that messages use. A `str` with a line break is the text itself, anything else a path."""
+    if isinstance(source, str) and "\n" in source:
+        return source, called
+    path = Path(source)
+    return read(path), str(path)
+
+
+def read(path: Path) -> str:
+    """A text file; refused with the library's words where it is none."""
+    from servotune._core import DocumentRefused
+
+    try:
+        return path.read_text(encoding="utf-8", newline="")
+    except OSError as e:
+        raise DocumentRefused(f"{path}: cannot read: {e.strerror}; expected a text file") from e
+    except UnicodeDecodeError as e:
+        raise DocumentRefused(f"{path}: byte {e.start} is not UTF-8 text; expected a text file, saved as UTF-8") from e
+
+
+def write(path: PathLike, text: str) -> None:
+    """Writes a text as it is."""
+    with open(path, "w", encoding="utf-8", newline="") as out:
+        out.write(text)
