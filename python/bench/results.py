@@ -1,0 +1,197 @@
+"""Makes results/python.md: `python python/bench/results.py` with the package, python-control and the program at hand.
+
+What is measured: the time of a call of `margins` from Python and of its parts, python-control on the same loops with its agreement, and 1000 slots through
+the program, the single call and the batch, to the last bit.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import statistics
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import control
+import numpy as np
+import pyarrow as pa
+
+import servotune as st
+from servotune import _core, batch
+
+ROOT = Path(__file__).resolve().parents[2]
+SLOTS = 1000
+LOOPS = 200
+
+
+def plant(random: np.random.Generator) -> str:
+    """A machine around the paper's, ten pairs of modes, as plant.toml."""
+    modes = ""
+    for centre in np.geomspace(900.0, 4600.0, 10):
+        pole = 2 * np.pi * centre * random.uniform(0.97, 1.03)
+        damping = random.uniform(0.02, 0.05)
+        modes += (
+            f"[[plant.modes]]\nzero_rad_s = {pole * random.uniform(0.985, 1.015)!r}\nzero_damping_ratio = {damping!r}\n"
+            f"pole_rad_s = {pole!r}\npole_damping_ratio = {damping * random.uniform(0.9, 1.1)!r}\n"
+        )
+    return (
+        'position_unit = "track"\ncommand_unit = "V"\n[plant]\n'
+        f"dc_gain = {random.uniform(65.0, 85.0)!r}\nnatural_frequency_rad_s = {random.uniform(340.0, 400.0)!r}\n"
+        f"damping_ratio = {random.uniform(0.15, 0.3)!r}\ndelay_s = {random.uniform(50e-6, 80e-6)!r}\nresonance_gain = 1.0\n{modes}"
+    )
+
+
+def microseconds(call: Callable[[], object], repeats: int) -> tuple[float, float]:
+    """Median and best of so many calls."""
+    times = []
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        call()
+        times.append(1e6 * (time.perf_counter() - begun))
+    return statistics.median(times), min(times)
+
+
+def program() -> Path:
+    """The program, optimised where it is built so."""
+    named = os.environ.get("SERVOTUNE")
+    found = [Path(named)] if named else [ROOT / "target" / kind / "servotune" for kind in ("release", "debug")]
+    return next(p for p in found if p.exists())
+
+
+def speed(machine: st.Plant, law: st.Controller) -> list[str]:
+    """Time of a call and of its parts."""
+    core_plant, core_law = machine._core, law._core
+    whole, best = microseconds(lambda: st.margins(machine, law).phase_margin_deg, 2000)
+    inside, inside_best = microseconds(lambda: _core.margins_of_model(core_plant, core_law, 0.15, 15.0), 2000)
+    answer = _core.margins_of_model(core_plant, core_law, 0.15, 15.0)
+    reading, reading_best = microseconds(lambda: json.loads(answer.json), 2000)
+    empty, empty_best = microseconds(lambda: answer.accepted, 2000)
+    table = pa.table({"slot": [str(i) for i in range(SLOTS)], "plant": [machine.to_toml()] * SLOTS})
+    begun = time.perf_counter()
+    batch.margins(table, law, threads=1)
+    row = 1e6 * (time.perf_counter() - begun) / SLOTS
+    return [
+        "| what | median us | best us |",
+        "|---|---:|---:|",
+        f"| `margins(plant, controller).phase_margin_deg` | {whole:.1f} | {best:.1f} |",
+        f"| of which the library, with its document as JSON | {inside:.1f} | {inside_best:.1f} |",
+        f"| of which Python: arguments, the document taken apart | {whole - inside:.1f} | {best - inside_best:.1f} |",
+        f"| the document taken apart alone | {reading:.1f} | {reading_best:.1f} |",
+        f"| an attribute of a result | {empty:.2f} | {empty_best:.2f} |",
+        f"| one row of `batch.margins` on one thread, its plant.toml read | {row:.1f} | |",
+    ]
+
+
+def beside_control(machines: list[st.Plant], law: st.Controller) -> list[str]:
+    """python-control on the same loops: exactly sampled plant times sections, its margins on the function."""
+    t = law.sample_time_s
+    off = {"phase margin (deg)": [], "gain margin (dB)": [], "Ms (relative)": []}
+    times = {"found": [], "control": [], "frd": []}
+    grid = np.geomspace(2 * np.pi * 10.0, 0.999 * np.pi / t, 4000)
+    for machine in machines:
+        begun = time.perf_counter()
+        ours = st.margins(machine, law)
+        _ = ours.phase_margin_deg
+        times["found"].append(time.perf_counter() - begun)
+        sampled = machine.discretise(t)
+        loop = control.ss(sampled.a, sampled.b, sampled.c, sampled.d, t) * control.ss(law.to_control())
+        begun = time.perf_counter()
+        response = control.frd(loop, grid)
+        times["frd"].append(time.perf_counter() - begun)
+        gm, pm, sm, wpc, wgc, wms = control.stability_margins(response, returnall=True)
+        times["control"].append(time.perf_counter() - begun)
+        pm = pm[np.argmin(np.abs(pm))]
+        gm = 20 * np.log10(gm)
+        off["phase margin (deg)"].append(abs(pm - ours.phase_margin_deg))
+        off["gain margin (dB)"].append(abs(gm[np.argmin(np.abs(gm))] - ours.gain_margin_db))
+        off["Ms (relative)"].append(abs(1 / np.min(sm) / ours.max_sensitivity - 1))
+    ms = {name: 1e3 * statistics.median(found) for name, found in times.items()}
+    lines = [
+        f"{len(machines)} machines of order 22 under `specs/controllers/nominal.toml`; python-control {control.__version__}: `frd` of the exactly sampled plant times",
+        f"the controller at {len(grid)} frequencies, then `stability_margins`. It is given the sampled plant: its own `c2d` knows no dead time.",
+        "",
+        "| | median ms a loop |",
+        "|---|---:|",
+        f"| servotune | {ms['found']:.3f} |",
+        f"| python-control | {ms['control']:.2f} |",
+        f"| of which its frequency response | {ms['frd']:.2f} |",
+        "",
+        "| difference | median | largest |",
+        "|---|---:|---:|",
+    ]
+    return lines + [f"| {name} | {statistics.median(d):.1e} | {max(d):.1e} |" for name, d in off.items()]
+
+
+def same(machines: list[st.Plant], law: st.Controller, law_file: Path) -> list[str]:
+    """1000 slots through the program, the single call and the batch."""
+    table = pa.table({"slot": [str(i) for i in range(SLOTS)], "plant": [m.to_toml() for m in machines]})
+    begun = time.perf_counter()
+    rows = batch.margins(table, law).column("document").to_pylist()
+    spent = time.perf_counter() - begun
+    single = [st.margins(m, law).to_json() for m in machines]
+    named = program()
+    with tempfile.TemporaryDirectory() as folder:
+
+        def one(i: int) -> dict:
+            file = Path(folder) / f"{i}.toml"
+            file.write_text(machines[i].to_toml())
+            words = [str(named), "--json", "margins", "--plant", str(file), "--controller", str(law_file)]
+            return json.loads(subprocess.run(words, capture_output=True, check=False).stdout)
+
+        with ThreadPoolExecutor(2) as pool:
+            said = list(pool.map(one, range(SLOTS)))
+    batch_equal = sum(json.loads(row) == document for row, document in zip(rows, said))
+    single_equal = sum(json.loads(text) == document for text, document in zip(single, said))
+    bytes_equal = sum(a == b for a, b in zip(rows, single))
+    numbers = sum(text.count(":") for text in single)
+    return [
+        f"{SLOTS} plants of order 22. The documents of `servotune margins --json` (program built in `{named.parent.name}`), read by Python's json, against:",
+        "",
+        "| way | slots equal in every key and bit |",
+        "|---|---:|",
+        f"| `margins` | {single_equal} of {SLOTS} |",
+        f"| `batch.margins` ({SLOTS / spent:.0f} slots/s on {os.cpu_count()} cores) | {batch_equal} of {SLOTS} |",
+        f"| `margins` and `batch.margins`, byte by byte | {bytes_equal} of {SLOTS} |",
+        "",
+        f"{numbers} keys were compared in each.",
+    ]
+
+
+def main() -> None:
+    """Writes the page."""
+    random = np.random.default_rng(1)
+    machines = [st.Plant.from_toml(plant(random)) for _ in range(SLOTS)]
+    law_file = ROOT / "specs/controllers/nominal.toml"
+    law = st.Controller.from_toml(law_file)
+    load = os.getloadavg()[0]
+    page = [
+        "# The Python package, measured",
+        "",
+        f"Made by `python python/bench/results.py`; {platform.python_implementation()} {platform.python_version()}, numpy {np.__version__},"
+        f" {os.cpu_count()} cores, load {load:.1f} as it began (1.0 is one busy core; a load above the cores makes medians longer, the best tells the machine).",
+        "",
+        "## A call of `margins`",
+        "",
+        "One loop of order 22 with two filters.",
+        "",
+        *speed(machines[0], law),
+        "",
+        "## Beside python-control",
+        "",
+        *beside_control(machines[:LOOPS], law),
+        "",
+        "## The same figures",
+        "",
+        *same(machines, law, law_file),
+        "",
+    ]
+    (ROOT / "results/python.md").write_text("\n".join(page))
+
+
+if __name__ == "__main__":
+    main()

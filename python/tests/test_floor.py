@@ -1,0 +1,113 @@
+"""A floor over an engine is the floor of `fleet run`: the same rows, tables and pages."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+import servotune as st
+from servotune import floor
+
+SETTINGS = """
+[robust]
+draws = 1
+[tables]
+pilots = 2
+scouts = 2
+candidates = 4
+most = 2
+[untunable]
+explained = 1
+"""
+
+
+@pytest.fixture(scope="module")
+def fleet(program, tmp_path_factory) -> Path:
+    """A FLEET.toml of six slots, one of them poisoned."""
+    folder = tmp_path_factory.mktemp("floor")
+    program("twin", "fleet", "--out", folder, "--testers", 1)
+    for slot in sorted((folder / "testers/T001/slots").iterdir())[6:]:
+        shutil.rmtree(slot)
+    (folder / "testers/T001/slots/S02/response.bod").write_text("nothing to read")
+    names = "".join(
+        f'{key} = "{file}"\n' for key, file in [("spec", "spec.toml"), ("controller", "controller.toml")]
+    )
+    (folder / "FLEET.toml").write_text(f'{names}[input]\ntree = "testers"\n{SETTINGS}')
+    return folder / "FLEET.toml"
+
+
+@pytest.fixture(scope="module")
+def alone(program, fleet, tmp_path_factory) -> Path:
+    """What the program writes."""
+    out = tmp_path_factory.mktemp("alone")
+    program("fleet", "run", fleet, "--out", out, "--run", "one")
+    return out
+
+
+def rows(folder: Path) -> list[tuple]:
+    with sqlite3.connect(folder / "fleet.db") as store:
+        return store.execute("SELECT run, place, slot, digest, verdict, row FROM slots ORDER BY place").fetchall()
+
+
+def same(found: Path, alone: Path) -> None:
+    assert rows(found) == rows(alone)
+    names = {p.relative_to(alone) for p in alone.rglob("*") if p.is_file() and "fleet.db" not in str(p)}
+    assert {p.relative_to(found) for p in found.rglob("*") if p.is_file()} >= names
+    for name in names:
+        assert (found / name).read_bytes() == (alone / name).read_bytes(), name
+
+
+def test_threads(fleet, alone, tmp_path):
+    ran = floor.run(fleet, out=tmp_path, name="one", workers=2, batch=2)
+    assert ran.slots == 6 and sum(ran.verdicts.values()) == 6 and ran.verdicts["failed"] == 1
+    same(tmp_path, alone)
+    assert (tmp_path / "slots.parquet").exists() or pytest.importorskip("pyarrow") is None
+
+
+def test_ray(fleet, alone, tmp_path):
+    ray = pytest.importorskip("ray")
+    try:
+        floor.run(fleet, engine="ray", out=tmp_path, name="one", workers=2, batch=2)
+    finally:
+        ray.shutdown()
+    same(tmp_path, alone)
+
+
+def test_dask(fleet, alone, tmp_path):
+    pytest.importorskip("distributed")
+    floor.run(fleet, engine="dask", out=tmp_path, name="one", workers=2, batch=2)
+    same(tmp_path, alone)
+
+
+def test_a_run_goes_on_where_it_ended(fleet, alone, tmp_path, monkeypatch):
+    def torn(task, batches, workers):
+        """An engine that dies after one batch, and gives that one twice."""
+        yield task(batches[0])
+        yield task(batches[0])
+        if task.library is not None:
+            raise RuntimeError("the node is gone")
+        for batch in batches[1:]:
+            yield task(batch)
+
+    from servotune.floor import local
+
+    with monkeypatch.context() as patch:
+        patch.setattr(local, "spread", torn)
+        with pytest.raises(RuntimeError, match="the node is gone"):
+            floor.run(fleet, out=tmp_path, name="one", batch=2)
+    said = []
+    floor.run(fleet, out=tmp_path, name="one", said=said.append)
+    assert "slots: 4 of 6 left" in said
+    same(tmp_path, alone)
+
+
+def test_refusals(tmp_path):
+    with pytest.raises(ValueError, match="expected one of: local, ray, dask"):
+        floor.run("FLEET.toml", engine="abacus", out=tmp_path)
+    with pytest.raises(ValueError, match="expected spec= and controller="):
+        floor.run(tmp_path, out=tmp_path)
+    with pytest.raises(st.FleetRefused, match="FLEET.toml"):
+        floor.run(tmp_path / "FLEET.toml", out=tmp_path / "out")
