@@ -1,0 +1,35 @@
+//! `servotune identify`: a sweep file to a plant model.
+
+use super::arguments::IdentifyArguments;
+use super::{Ending, Failure, Screen, load};
+use servotune::document::write_text;
+use servotune::identify::{Hold, Identified, identify};
+use servotune::lti::PlantFile;
+use servotune_answer::IdentifiedDocument;
+use servotune_report::identified::{identified_sentences, ladder_table, order_table, parameter_table};
+
+pub(super) fn run(a: &IdentifyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let hold_included = a.model.settings().hold != Hold::NotIncluded;
+    let taken = load::Taken { how: &a.taken, unstable_poles: 0, hold_included, controller: a.controller.as_deref() };
+    let sweep = load::sweep(&a.frf, &a.reading, &taken, screen)?;
+    let id = identify(&sweep.frf, &a.model.settings())
+        .map_err(|source| Failure::Identify { file: a.frf.clone(), source })?;
+    let text = toml::to_string(&PlantFile::from(&id.plant)).map_err(|source| Failure::Toml { source })?;
+    write_text(&a.out, &text)?;
+    screen.say(&format!("wrote {}", a.out.display()));
+    let document = IdentifiedDocument::of(&sweep, &id);
+    screen.result(&document, &text_of(&id)?)?;
+    Ok(if document.accepted() { Ending::Accepted } else { Ending::Rejected })
+}
+
+fn text_of(id: &Identified) -> Result<String, Failure> {
+    let mut text = identified_sentences(id).join("\n") + "\n\n";
+    text += &ladder_table(id)?.text();
+    text.push('\n');
+    if !id.held_out.is_empty() {
+        text += &order_table(id)?.text();
+        text.push('\n');
+    }
+    text += &parameter_table(id)?.text();
+    Ok(text)
+}
