@@ -288,7 +288,7 @@ fn reach(
     };
     let done = tune_assured(&job, settings, &mut |words| screen.say(words))?;
     let tuned = done.outcome.tuned().is_some();
-    Ok(Reached { outcome: done.outcome, table: done.table, tuned, certificate: done.certificate, physics: None })
+    Ok(Reached { outcome: done.outcome, table: done.table, tuned, certificate: Some(done.certificate), physics: None })
 }
 
 /// A controller of nothing but a clock.
