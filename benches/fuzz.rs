@@ -14,12 +14,12 @@ fn main() -> ExitCode {
     let scratch = std::env::temp_dir().join(format!("servotune-fuzz-{}", std::process::id()));
     let (runs, seed) = (number("--runs", 20_000) as usize, number("--seed", 1));
     let limit = Duration::from_secs(20);
-    let tallies = servotune::study::reader_mutations(runs, seed, &scratch, limit, &mut |words| println!("{words}"));
+    let tallies = servotune_lab::reader_mutations(runs, seed, &scratch, limit, &mut |words| println!("{words}"));
     let _ = std::fs::remove_dir_all(&scratch);
     match tallies {
         Ok(all) => {
             all.iter().flat_map(|t| t.panics.iter().chain(&t.hangs).chain(&t.wrong)).for_each(|w| println!("{w}"));
-            if all.iter().all(servotune::study::Tally::sound) { ExitCode::SUCCESS } else { ExitCode::from(1) }
+            if all.iter().all(servotune_lab::Tally::sound) { ExitCode::SUCCESS } else { ExitCode::from(1) }
         }
         Err(e) => {
             eprintln!("{e}");

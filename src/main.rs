@@ -1,7 +1,100 @@
-//! The `servotune` program. Everything it does lives in the library; this file only starts it.
+//! The `servotune` program: the only place with arguments, files, stdout and exit codes.
+//!
+//! In: words typed by a person. Out: text or one JSON document on stdout, messages on stderr, and 0 (done, all accepted),
+//! 1 (done, something was rejected) or 2 (could not do it). Commands: `specs/files.md` and `servotune --help`.
 
+mod arguments;
+mod budget;
+mod classify;
+mod demo;
+mod demo_diagnosis;
+mod demo_fleet;
+mod demo_gate;
+mod diagnose;
+mod diagnose_arguments;
+mod failure;
+mod features;
+mod fleet;
+mod fleet_arguments;
+mod fleet_clock;
+mod fleet_page;
+mod fleet_progress;
+mod fleet_slot;
+mod fleet_store;
+mod fleet_twin;
+mod gate_arguments;
+mod gated;
+mod identify;
+mod load;
+mod margins;
+mod margins_arguments;
+mod next_sweep;
+mod pareto;
+mod performance_arguments;
+mod physics;
+mod proof;
+mod response;
+mod screen;
+mod simulate;
+mod slot;
+mod sweep_arguments;
+mod train;
+mod tune;
+mod tune_machines;
+mod tune_text;
+mod twin;
+mod verify;
+mod verify_arguments;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+use failure::Failure;
+use screen::Screen;
 use std::process::ExitCode;
 
+/// What a command that ran has to say by its exit code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ending {
+    /// 0: done, all accepted.
+    Accepted,
+    /// 1: done, and something was rejected, infeasible, abstained or failed.
+    Rejected,
+}
+
 fn main() -> ExitCode {
-    servotune::cli::main()
+    let arguments = match Arguments::try_parse() {
+        Ok(a) => a,
+        Err(e) => {
+            // Help and version are answers (0); a wrong word is a refusal (2). clap prints each where it belongs.
+            let _ = e.print();
+            return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
+        }
+    };
+    let mut screen = Screen::new(arguments.json);
+    let ending = match arguments.command {
+        Command::Demo(a) => demo::run(&a, &mut screen),
+        Command::Diagnose(a) => diagnose::run(&a, &mut screen),
+        Command::Features(a) => features::run(&a, &mut screen),
+        Command::Fleet(a) => fleet::run(&a, &mut screen),
+        Command::Identify(a) => identify::run(&a, &mut screen),
+        Command::Pareto(a) => pareto::run(&a, &mut screen),
+        Command::Budget(a) => budget::run(&a, &mut screen),
+        Command::NextSweep(a) => next_sweep::run(&a, &mut screen),
+        Command::Margins(a) => margins::run(&a, &mut screen),
+        Command::Response(a) => response::run(&a, &mut screen),
+        Command::Simulate(a) => simulate::run(&a, &mut screen),
+        Command::Tune(a) => tune::run(&a, &mut screen),
+        Command::Train(a) => train::run(&a, &mut screen),
+        Command::Classify(a) => classify::run(&a, &mut screen),
+        Command::Twin(a) => twin::run(&a, &mut screen),
+        Command::Verify(a) => verify::run(&a, &mut screen),
+    };
+    match ending {
+        Ok(Ending::Accepted) => ExitCode::SUCCESS,
+        Ok(Ending::Rejected) => ExitCode::from(1),
+        Err(failure) => {
+            screen.refuse(&failure);
+            ExitCode::from(2)
+        }
+    }
 }

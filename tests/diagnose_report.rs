@@ -5,7 +5,7 @@ use servotune::diagnose::{DiagnoseSettings, Diagnosed, Verdict, diagnose};
 use servotune::lti::{Body, DiscretePlant, Plant, PlantState};
 use servotune::numeric::random::Random;
 use servotune::recording::{Case, Record, RecordEntry, Role};
-use servotune::report::diagnosis::diagnosis_page;
+use servotune_report::diagnosis::diagnosis_page;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 

@@ -5,7 +5,7 @@ mod fleet_common;
 
 use fleet_common::{add_run, all, context, folder, installed, one, order, rows, stamp, store_of, tuned, words};
 use servotune::document::sha256_hex;
-use servotune::fleet::{Action, End, FleetError, Store, Which};
+use servotune_fleet::{Action, End, FleetError, Store, Which};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;

@@ -4,7 +4,7 @@
 mod fleet_common;
 
 use fleet_common::{all, context, folder, installed, rows, store_of, tuned};
-use servotune::fleet::{Action, FleetError, Store};
+use servotune_fleet::{Action, FleetError, Store};
 use std::path::{Path, PathBuf};
 
 /// A store with every tuned slot approved, closed and whole in its one file.
@@ -156,7 +156,7 @@ trait Refused {
 impl Refused for Store {
     /// Whether a store opened to be read refuses to be written to.
     fn begin_refused(mut self) -> bool {
-        let inputs = servotune::fleet::Inputs { config: String::new(), slots: 1, list: String::new() };
+        let inputs = servotune_fleet::Inputs { config: String::new(), slots: 1, list: String::new() };
         self.begin(None, &inputs, &fleet_common::stamp()).is_err()
     }
 }

@@ -1,7 +1,7 @@
 //! A run that is killed goes on where it was; the study `fleet-kills` does this five hundred times.
 #![allow(clippy::unwrap_used)]
 
-use servotune::fleet::Store;
+use servotune_fleet::Store;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;

@@ -6,10 +6,10 @@ mod fleet_common;
 
 use fleet_common::{fleet, folder};
 use servotune::document::check_name;
-use servotune::fleet::{FileSource, Input, SlotSource, Store};
 use servotune::gate::features::{features, machine_folders, read_machines};
 use servotune::recording::{Case, RecordSettings};
 use servotune::twin::fleet::FleetSettings;
+use servotune_fleet::{FileSource, Input, SlotSource, Store};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,12 +1,12 @@
 //! What a fleet is read from: FLEET.toml, a tree of folders, a table; and what its cases are.
 #![allow(clippy::unwrap_used)]
 
-use servotune::fleet::{Evidence, FileSource, Fleet, FleetError, Input, SlotSource, Temperature};
 use servotune::frf::Frf;
 use servotune::lti::{Body, FrequencyResponse, Plant};
 use servotune::tune::{Hold, Machine};
 use servotune::twin::fleet::FleetSettings;
 use servotune::twin::{MachineClass, paper_machine};
+use servotune_fleet::{Evidence, FileSource, Fleet, FleetError, Input, SlotSource, Temperature};
 use std::path::{Path, PathBuf};
 
 fn folder(name: &str) -> PathBuf {

@@ -4,7 +4,7 @@
 mod fleet_common;
 
 use fleet_common::{add_run, all, context, folder, one, order, rows, stamp, store_of, tuned, words};
-use servotune::fleet::{
+use servotune_fleet::{
     Action, Asked, FleetError, Inputs, SlotRow, Store, Verdict, Which, clear_pages, page_file, write_tables,
 };
 
@@ -69,14 +69,14 @@ fn an_order_names_the_run_it_stands_on_and_an_older_run_does_not_speak_over_a_la
     let (place, context, slots) = (folder("verdict_run"), context("verdict_run_context"), tuned());
     let mut store = store_of(&place, &context);
     let stamp = stamp();
-    let other = servotune::fleet::Order {
+    let other = servotune_fleet::Order {
         run: Some("run-0007"),
         ..order(Which::Slots(&slots[..1]), Action::Approve, None, &stamp)
     };
     assert!(matches!(store.carry_out(&other), Err(FleetError::OtherRun { found, .. }) if found == "run-0001"));
-    let none = servotune::fleet::Order { which: Which::All, ..other };
+    let none = servotune_fleet::Order { which: Which::All, ..other };
     assert_eq!(store.carry_out(&none).unwrap().revisions.len(), 0);
-    let meant = servotune::fleet::Order { run: Some("run-0001"), ..other };
+    let meant = servotune_fleet::Order { run: Some("run-0001"), ..other };
     assert_eq!(store.carry_out(&meant).unwrap().revisions[0].run.as_deref(), Some("run-0001"));
     // A run begun before the last one, and ended after it.
     let inputs = Inputs { config: "a".into(), slots: rows().len(), list: "list".into() };

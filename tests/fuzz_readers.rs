@@ -1,7 +1,7 @@
 //! A short seeded run of changed files through every reader: no panic, no hang, nothing wrong accepted. The long one: `cargo bench --bench fuzz`.
 #![allow(clippy::unwrap_used)]
 
-use servotune::study::{mutation::mutate, reader_mutations};
+use servotune_lab::{mutation::mutate, reader_mutations};
 use std::path::PathBuf;
 use std::time::Duration;
 

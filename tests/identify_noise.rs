@@ -5,7 +5,7 @@ use servotune::identify::{IdentifySettings, OrderChoice, identify};
 use servotune::lti::{Body, FrequencyResponse};
 use servotune::numeric::random::Random;
 use servotune::twin::plants::{log_grid, measure, random_plant};
-use servotune::twin::study_identify::{StudySettings, study};
+use servotune_lab::study_identify::{StudySettings, study};
 
 #[test]
 fn intervals_cover_the_truth_in_95_of_100_sweeps() {

@@ -15,11 +15,11 @@ use servotune::lti::{DiscretePlant, FrequencyResponse, LtiError, Plant, PlantFil
 use servotune::numeric::random::Random;
 use servotune::pes::{Profile, figures};
 use servotune::recording::{Record, RecordSettings, RecordingError, gzip, read_columns};
-use servotune::report::table::{Column, Table};
 use servotune::tune::{Hold, Machine, Spec, SpecError, judge};
 use servotune::twin::plants::{log_grid, measure};
 use servotune::twin::{MachineClass, nominal_controller, paper_machine};
 use servotune::verify::{Uncertainty, VerifyError, VerifySettings, prove_loop};
+use servotune_report::table::{Column, Table};
 use std::f64::consts::TAU;
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -1,11 +1,11 @@
 //! Whatever an input is called, a page is well formed, fetches nothing, and runs only its own script.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-use servotune::report::figure::{Axis, Circle, Figure, Ink, Kind, Mark, Note, Panel, Region, RuleLine, Series};
-use servotune::report::number::NumberFormat;
-use servotune::report::page::{Block, Card, Page, Section};
-use servotune::report::svg::{Size, standalone};
-use servotune::report::table::{Cell, Column, Table, Verdict};
+use servotune_report::figure::{Axis, Circle, Figure, Ink, Kind, Mark, Note, Panel, Region, RuleLine, Series};
+use servotune_report::number::NumberFormat;
+use servotune_report::page::{Block, Card, Page, Section};
+use servotune_report::svg::{Size, standalone};
+use servotune_report::table::{Cell, Column, Table, Verdict};
 use std::collections::BTreeSet;
 
 const NASTY: &str =

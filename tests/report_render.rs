@@ -2,16 +2,16 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use nalgebra::Complex;
-use servotune::report::bode::{BodeCurve, BodeMarks, bode_with_residual};
-use servotune::report::figure::{Figure, Ink};
-use servotune::report::number::NumberFormat;
-use servotune::report::nyquist::{NyquistMarks, nyquist};
-use servotune::report::page::{Block, Card, Page, Section};
-use servotune::report::sensitivity::sensitivity;
-use servotune::report::spectrum_bars::{SpectrumBars, spectrum_bars};
-use servotune::report::svg::{Size, standalone};
-use servotune::report::table::{Cell, Column, Table, Verdict};
-use servotune::report::time::{CurveKind, TimeCurve, TimePanel, time};
+use servotune_report::bode::{BodeCurve, BodeMarks, bode_with_residual};
+use servotune_report::figure::{Figure, Ink};
+use servotune_report::number::NumberFormat;
+use servotune_report::nyquist::{NyquistMarks, nyquist};
+use servotune_report::page::{Block, Card, Page, Section};
+use servotune_report::sensitivity::sensitivity;
+use servotune_report::spectrum_bars::{SpectrumBars, spectrum_bars};
+use servotune_report::svg::{Size, standalone};
+use servotune_report::table::{Cell, Column, Table, Verdict};
+use servotune_report::time::{CurveKind, TimeCurve, TimePanel, time};
 use std::f64::consts::TAU;
 
 type C = Complex<f64>;
@@ -132,7 +132,7 @@ fn figures() -> Vec<(&'static str, Figure)> {
         ("bode", bode_demo()),
         (
             "loop",
-            servotune::report::bode::bode("Open loop", "Cut at the plant input.", &[loop_curve], &loop_marks).unwrap(),
+            servotune_report::bode::bode("Open loop", "Cut at the plant input.", &[loop_curve], &loop_marks).unwrap(),
         ),
         (
             "nyquist",

@@ -1,0 +1,89 @@
+//! The front of margin against objective as a table and a picture; the budget of a PES as a table and bars.
+
+use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Series};
+use super::number::NumberFormat;
+use super::table::{Cell, Column, Table, Verdict};
+use super::{Page, ReportError, page};
+use servotune::tune::ParetoPoint;
+
+/// The points, tightest margin first.
+pub fn pareto_table(points: &[ParetoPoint], objective: (&str, &str), unit: &str) -> Result<Table, ReportError> {
+    let digits = NumberFormat::Significant(4);
+    let mut table = Table::new(
+        "Margin against objective",
+        vec![
+            Column::numbers("Ms allowed", "ratio", digits),
+            Column::words("limits"),
+            Column::words("on the front"),
+            Column::numbers("Ms found", "ratio", digits),
+            Column::numbers("phase margin", "deg", digits),
+            Column::numbers("DFT, low band", unit, digits),
+            Column::numbers("DFT, high band", unit, digits),
+            Column::numbers(objective.0, objective.1, digits),
+        ],
+    );
+    for p in points {
+        let met = if p.feasible { Cell::from("met") } else { Cell::from("missed").flagged(Verdict::Fail, "missed") };
+        table.push(vec![
+            p.allowed.into(),
+            met,
+            if p.on_front { "yes" } else { "" }.into(),
+            p.max_sensitivity.into(),
+            p.phase_margin_deg.into(),
+            p.dft_low.into(),
+            p.dft_high.into(),
+            p.objective.into(),
+        ])?;
+    }
+    Ok(table)
+}
+
+/// The objective over Ms; `now` is Ms and objective of the controller that runs today.
+pub fn pareto_figure(
+    title: &str,
+    caption: &str,
+    points: &[ParetoPoint],
+    now: Option<(f64, f64)>,
+    objective: (&str, &str),
+) -> Result<Figure, ReportError> {
+    let column = |of: &dyn Fn(&ParetoPoint) -> bool| -> (Vec<f64>, Vec<f64>) {
+        points.iter().filter(|p| of(p)).map(|p| (p.max_sensitivity, p.objective)).unzip()
+    };
+    let mut panel = Panel::new(Axis::linear("Ms", ""), Axis::linear(objective.0, objective.1));
+    let (x, y) = column(&|p| p.on_front);
+    panel.marks.push(Series::new("front", Ink::Data(0), Kind::Solid, &x, &y)?.into());
+    panel.marks.push(Series::new("tuned", Ink::Data(0), Kind::Points, &x, &y)?.into());
+    // A point that misses a limit far off would press the front flat: only those near it are drawn.
+    let most = y.iter().copied().fold(0.0, f64::max);
+    let (x, y) = column(&|p| !p.feasible && p.objective <= 2.0 * most);
+    if !x.is_empty() {
+        panel.marks.push(Series::new("a limit missed", Ink::Limit, Kind::Points, &x, &y)?.into());
+    }
+    if let Some((ms, value)) = now {
+        panel.marks.push(Series::new("today", Ink::Data(1), Kind::Points, &[ms], &[value])?.into());
+        panel.marks.push(RuleLine::vertical(ms, "", Ink::Muted));
+    }
+    Ok(Figure { title: title.to_owned(), caption: caption.to_owned(), share_x: true, panels: vec![panel] })
+}
+
+/// The front as a page of its own.
+pub fn pareto_page(
+    points: &[ParetoPoint],
+    now: Option<(f64, f64)>,
+    objective: (&str, &str),
+    unit: &str,
+    provenance: Vec<(String, String)>,
+) -> Result<Page, ReportError> {
+    let caption = "Each point is a table tuned to the Ms below it, worst machine; left is safer, lower is better.";
+    let figure = pareto_figure("What a margin costs", caption, points, now, objective)?;
+    Ok(Page {
+        title: "Margin against objective".into(),
+        subtitle: String::new(),
+        cards: vec![],
+        sections: vec![page::Section {
+            heading: "Front".into(),
+            blocks: vec![page::Block::Figure(figure), page::Block::Table(pareto_table(points, objective, unit)?)],
+        }],
+        provenance,
+    })
+}

@@ -1,0 +1,104 @@
+//! Why a command could not be done: one message, exit code 2.
+
+use servotune::controller::ControllerError;
+use servotune::diagnose::DiagnoseError;
+use servotune::document::DocumentError;
+use servotune::feedback::FeedbackError;
+use servotune::frf::{FrfError, FrfShapeError, Measured};
+use servotune::gate::GateError;
+use servotune::gate::features::FeatureError;
+use servotune::identify::IdentifyError;
+use servotune::lti::LtiError;
+use servotune::pes::{PesError, ProfileError};
+use servotune::physics::PhysicsError;
+use servotune::recording::RecordingError;
+use servotune::tune::{GainTableError, TuneError};
+use servotune::twin::TwinError;
+use servotune::verify::VerifyError;
+use servotune_fleet::FleetError;
+use servotune_report::ReportError;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Every way a command can end in a refusal.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "each field is named in the message")]
+pub enum Failure {
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    #[error("{}: {source}", file.display())]
+    Plant { file: PathBuf, source: LtiError },
+    #[error("{}: {source}", file.display())]
+    Controller { file: PathBuf, source: ControllerError },
+    #[error("{}: {source}", file.display())]
+    Profile { file: PathBuf, source: ProfileError },
+    #[error("{}: [[plant.physics]] {source}", file.display())]
+    Physics { file: PathBuf, source: PhysicsError },
+    #[error(transparent)]
+    Frf(#[from] FrfError),
+    #[error(transparent)]
+    Features(#[from] FeatureError),
+    #[error("{}: {source}", file.display())]
+    Identify { file: PathBuf, source: IdentifyError },
+    #[error("the result cannot be written as TOML: {source}")]
+    Toml { source: toml::ser::Error },
+    #[error(transparent)]
+    Feedback(#[from] FeedbackError),
+    #[error(transparent)]
+    Pes(#[from] PesError),
+    #[error(transparent)]
+    Lti(#[from] LtiError),
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    #[error(transparent)]
+    Tune(#[from] TuneError),
+    #[error(transparent)]
+    GainTable(#[from] GainTableError),
+    #[error(
+        "{}: position_unit is `{found}`; expected `{expected}` as in the first plant; give all plants in one unit",
+        file.display()
+    )]
+    Unit { file: PathBuf, found: String, expected: String },
+    #[error(
+        "--measured {measured} needs the controller that ran during the sweep; give it with --measured-with or --controller"
+    )]
+    NoController { measured: Measured },
+    #[error(
+        "--measured-with names the controller of a sweep in closed loop; expected --measured L, S, T, PS or CS beside it"
+    )]
+    MeasuredPlant,
+    #[error(
+        "--measured {measured}: the controller's hold is in such a sweep and is taken out; leave --hold-included and --hold-s out"
+    )]
+    HoldTwice { measured: Measured },
+    #[error("--measured and --measured-with speak of one sweep; expected --frf, found --plant or --machines")]
+    MeasuredWithout,
+    #[error("no machine: expected --plant PLANT, --frf FRF or --machines DIR with --gate GATE")]
+    NoMachine,
+    #[error("--override {id}: no such machine in {}; found {found}", folder.display())]
+    NoSuchMachine { folder: PathBuf, id: String, found: String },
+    #[error("{}: an old certificate cannot be removed: {source}", file.display())]
+    Remove { file: PathBuf, source: std::io::Error },
+    #[error("--override {id}: given twice; give each machine one reason")]
+    TwiceOverridden { id: String },
+    #[error("{}: already there; give a new folder, so that old gains are not taken for new ones", file.display())]
+    AlreadyThere { file: PathBuf },
+    #[error(transparent)]
+    Diagnose(#[from] DiagnoseError),
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+    #[error(transparent)]
+    Twin(#[from] TwinError),
+    #[error(transparent)]
+    Sweep(#[from] FrfShapeError),
+    #[error(transparent)]
+    Gate(#[from] GateError),
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
+    #[error("the result cannot be written as JSON: {source}")]
+    Json { source: serde_json::Error },
+    #[error("cannot write to stdout: {source}")]
+    Stdout { source: std::io::Error },
+}

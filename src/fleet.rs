@@ -1,0 +1,245 @@
+//! `servotune fleet`: all slots of all testers, from raw files to tables and report; history, revisions, differences.
+
+use super::fleet_arguments::{FleetArguments, FleetCommand, FleetRunArguments};
+use super::fleet_clock::Clocked;
+use super::fleet_progress::Progress;
+use super::{Ending, Failure, Screen, fleet_page, fleet_progress, fleet_slot, fleet_store};
+use serde::Serialize;
+use servotune::document::write_text;
+use servotune_fleet::{
+    self as fleet, Action, Asked, Context, Effort, FileSource, Fleet, Job, SlotRow, SlotSource, Stamp, Store, TwinSource,
+    Verdict, Worker, clear_pages, page_file, write_tables,
+};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+/// What a run came to.
+#[derive(Serialize)]
+pub(super) struct Document {
+    run: String,
+    slots: usize,
+    verdicts: BTreeMap<&'static str, usize>,
+    /// Tuned slots whose table the second prover certifies on the models of all cases.
+    certified: usize,
+    shared: Option<fleet::Shared>,
+    store: PathBuf,
+    files: Vec<PathBuf>,
+    /// Time of the run up to the store's last transaction, and of the files after it (s).
+    seconds: f64,
+    files_seconds: f64,
+    /// Slots worked on by this process in a second, pilots included in the time.
+    slots_per_s: f64,
+    /// From the first slot of the stage of every slot to its last (s), pilots and shared tables left out.
+    slots_stage_s: f64,
+    /// Processor time of that stage and of the run without its files (s), where the system tells.
+    slots_stage_cpu_s: Option<f64>,
+    cpu_s: Option<f64>,
+    /// Time of all threads together that went into reading or drawing slots (s).
+    loading_thread_s: f64,
+    /// Most memory that this process ever held (MiB), where the system tells.
+    peak_memory_mib: Option<f64>,
+}
+
+/// Most memory ever held, as Linux tells it.
+fn peak_memory_mib() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib / 1024.0)
+}
+
+pub(super) fn run(a: &FleetArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    match &a.what {
+        FleetCommand::Run(a) => run_floor(a, screen),
+        FleetCommand::Runs(a) => fleet_store::runs(a, screen),
+        FleetCommand::History(a) => fleet_store::history(a, screen),
+        FleetCommand::Diff(a) => fleet_store::diff(a, screen),
+        FleetCommand::Check(a) => fleet_store::check(a, screen),
+        FleetCommand::Approve(a) => fleet_store::revise(a, Action::Approve, screen),
+        FleetCommand::Apply(a) => fleet_store::revise(a, Action::Apply, screen),
+        FleetCommand::Rollback(a) => fleet_store::revise(a, Action::Rollback, screen),
+    }
+}
+
+/// Now, as RFC 3339 in universal time, to the second.
+pub(super) fn now() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let (days, rest) = (seconds / 86_400, seconds % 86_400);
+    let (year, month, day) = civil(days);
+    format!("{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z", rest / 3600, rest / 60 % 60, rest % 60)
+}
+
+/// Year, month and day of a day counted from 1970-01-01, by the Gregorian calendar's 400-year cycle.
+fn civil(days: u64) -> (u64, u64, u64) {
+    // Counted from 0000-03-01, so that the leap day ends a year.
+    let z = days + 719_468;
+    let (era, day_of_era) = (z / 146_097, z % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let m = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * m + 2) / 5 + 1;
+    let month = if m < 10 { m + 3 } else { m - 9 };
+    (era * 400 + year_of_era + u64::from(month <= 2), month, day)
+}
+
+/// Who does it: as said, else the user's name, else `unknown`.
+pub(super) fn stamp(who: Option<&str>) -> Stamp {
+    let user = || ["USER", "USERNAME", "LOGNAME"].iter().find_map(|k| std::env::var(k).ok());
+    let who = who.map(str::to_owned).or_else(user).unwrap_or_else(|| "unknown".into());
+    Stamp { who, at: now() }
+}
+
+/// The slots that a FLEET.toml names.
+fn source(file: &Path, fleet: &Fleet) -> Result<Box<dyn SlotSource>, Failure> {
+    Ok(match &fleet.file.input.twin {
+        Some(twin) => Box::new(TwinSource::of(twin)),
+        None => Box::new(FileSource::of(file, &fleet.file.input)?),
+    })
+}
+
+fn run_floor(a: &FleetRunArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let (document, text) = make(a, screen)?;
+    screen.result(&document, &text)?;
+    let served = document.verdicts[Verdict::Keeps.word()] + document.verdicts[Verdict::Tuned.word()];
+    Ok(if served == document.slots { Ending::Accepted } else { Ending::Rejected })
+}
+
+/// Works on a floor and writes its files; what it came to, as a document and in words.
+pub(super) fn make(a: &FleetRunArguments, screen: &mut Screen) -> Result<(Document, String), Failure> {
+    let fleet = Fleet::read(&a.fleet)?;
+    let context = Context::of(&fleet)?;
+    let source = Clocked::of(source(&a.fleet, &fleet)?);
+    let store_file = fleet.file.store.clone().unwrap_or_else(|| a.out.join("fleet.db"));
+    let mut store = Store::open(&store_file)?;
+    fleet_store::say_healed(&store.heal()?, screen);
+    let worker = Worker::at(&store_file, &format!("process-{}", std::process::id()))?;
+    let job = Job {
+        source: &source,
+        context: &context,
+        store: &store_file,
+        run: a.run.as_deref(),
+        stamp: stamp(a.who.as_deref()),
+        worker: &worker,
+        effort: Effort { threads: a.threads, chunk: a.chunk, limit_pages: None },
+    };
+    let progress = Progress::new();
+    let begun = Instant::now();
+    let run = fleet::run(&job, &progress);
+    progress.close();
+    let run = run?;
+    let (seconds, cpu_s) = (begun.elapsed().as_secs_f64(), fleet_progress::cpu_s());
+    let mut verdicts: BTreeMap<&'static str, usize> = Verdict::ALL.iter().map(|v| (v.word(), 0)).collect();
+    let mut certified = 0;
+    store.each_row(&run, None, |row| {
+        *verdicts.entry(row.verdict.word()).or_default() += 1;
+        certified += usize::from(row.certified.as_ref().is_some_and(|c| c.passes));
+        Ok(())
+    })?;
+    let all = store.runs()?;
+    let own = all.iter().position(|r| r.run == run).unwrap_or(0);
+    let before = all[..own].iter().filter(|r| r.finished.is_some()).map(|r| r.run.clone()).collect();
+    let asked = Asked { gains: source.count() <= MOST_GAIN_FILES, before };
+    let mut files = write_tables(&store, &run, &context, &a.out, &asked)?;
+    let (slots, reports) = slot_pages(&store, &run, &context, &source, a, screen)?;
+    let page = a.out.join("fleet.html");
+    write_text(&page, &fleet_page::html(&store, &run, &context, &asked.before, &reports)?)?;
+    files.push(page);
+    files.extend(slots);
+    store.finish(&run, &stamp(a.who.as_deref()))?;
+    files.iter().for_each(|f| screen.say(&format!("wrote {}", f.display())));
+    let files_seconds = begun.elapsed().as_secs_f64() - seconds;
+    let slots = source.count();
+    let counts: Vec<String> = Verdict::ALL.iter().map(|v| format!("{} {}", verdicts[v.word()], v.word())).collect();
+    let mut text = format!("run {run}: {slots} slots: {}\n", counts.join(", "));
+    let shared = store.shared(&run)?;
+    text += &shared.as_ref().map(shared_words).unwrap_or_default();
+    let slots_per_s = progress.earned() as f64 / seconds.max(1e-9);
+    text += &format!("{seconds:.1} s, {slots_per_s:.1} slots/s\n");
+    let document = Document {
+        run,
+        slots,
+        verdicts,
+        certified,
+        shared,
+        store: store_file,
+        files,
+        seconds,
+        files_seconds,
+        slots_per_s,
+        slots_stage_s: progress.slots_stage_s(),
+        slots_stage_cpu_s: progress.slots_stage_cpu_s(),
+        cpu_s,
+        loading_thread_s: source.seconds(),
+        peak_memory_mib: peak_memory_mib(),
+    };
+    Ok((document, text))
+}
+
+/// Full reports of the slots whose limits are missed most, or nearest to it.
+fn slot_pages(
+    store: &Store,
+    run: &str,
+    context: &Context,
+    source: &dyn SlotSource,
+    a: &FleetRunArguments,
+    screen: &mut Screen,
+) -> Result<(Vec<PathBuf>, BTreeSet<String>), Failure> {
+    let mut worst: Vec<(f64, SlotRow)> = Vec::new();
+    store.each_row(run, None, |row| {
+        let best = row.table.as_ref().or(row.nearest.as_ref()).map(|t| &t.proved).or(row.current.as_ref());
+        let Some(now) = best.map(|p| p.worst) else { return Ok(()) };
+        // Rows come in order: of equals the earlier stays.
+        if worst.len() < a.pages || worst.last().is_some_and(|w| now > w.0) {
+            let at = worst.partition_point(|w| w.0 >= now);
+            worst.insert(at, (now, row));
+            worst.truncate(a.pages);
+        }
+        Ok(())
+    })?;
+    let (mut files, mut slots) = (Vec::new(), BTreeSet::new());
+    for (_, row) in &worst {
+        let file = page_file(&a.out, row)?;
+        match fleet_slot::html(context, source, row) {
+            Ok(Some(page)) => {
+                write_text(&file, &page)?;
+                files.push(file);
+                slots.insert(row.id());
+            }
+            Ok(None) => {}
+            Err(e) => screen.say(&format!("note: no page of {}: {e}", row.id())),
+        }
+    }
+    clear_pages(&a.out, &files)?;
+    Ok((files, slots))
+}
+
+/// The shared tables in words.
+fn shared_words(s: &fleet::Shared) -> String {
+    let share = |n: usize| format!("{n} ({:.1} %)", 100.0 * n as f64 / s.slots.max(1) as f64);
+    let served = s.curve.get(s.chosen.saturating_sub(1)).map_or(0, |c| c.served);
+    format!(
+        "of {} slots to be served: today's gains prove {}, a table of their own {}, {} shared tables {}\n",
+        s.slots,
+        share(s.today),
+        share(s.own),
+        s.chosen,
+        share(served)
+    )
+}
+
+/// Slots above which no folder of gains is written for each: the tables have them all.
+const MOST_GAIN_FILES: usize = 20_000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn days_become_dates() {
+        // 2000-02-29 is day 11016 and 2026-11-21 day 20778 since 1970-01-01.
+        assert_eq!(civil(0), (1970, 1, 1));
+        assert_eq!(civil(11_016), (2000, 2, 29));
+        assert_eq!(civil(20_778), (2026, 11, 21));
+    }
+}

@@ -1,0 +1,71 @@
+//! The full report of one slot of a fleet: what the fleet's page leads to.
+
+use super::Failure;
+use super::slot::{self, Slot};
+use super::tune::provenance;
+use servotune::frf::Sweep;
+use servotune::lti::Plant;
+use servotune::tune::{Machine, Outcome, Reached, Route, Tuned, Work, judge, ranges};
+use servotune_fleet::{Context, OwnTable, SlotRow, SlotSource, gain_table_of};
+
+/// Where the page of a slot lies beside the fleet's page.
+pub(super) fn file(row: &SlotRow) -> String {
+    format!("slots/{}_{}.html", row.tester, row.slot)
+}
+
+/// The page of a slot; none where it could not be identified or judged.
+pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) -> Result<Option<String>, Failure> {
+    let loaded = source.load(row.index);
+    let (Some(frf), Some(model), Some(current)) = (loaded.machine.response, &row.model, &row.current) else {
+        return Ok(None);
+    };
+    let plant = Plant::try_from(model.plant.clone())?;
+    let start = row.own_gains.as_ref().unwrap_or(&context.base);
+    // The best table there is; where none was sought, the gains in the slot.
+    let found = row.table.as_ref().or(row.nearest.as_ref());
+    let gains = found.map_or(start, |t| &t.gains);
+    let proved = found.map_or(current, |t: &OwnTable| &t.proved);
+    let machine = Machine::Response { frf: &frf, hold: context.hold, continuation: Some(&plant) };
+    let work = Work { route: Route::Response, starts: 0, evaluations: 0, feasible_starts: 0, back_offs: 0 };
+    let outcome = Outcome::Tuned(Tuned {
+        controller: gains.clone(),
+        before: Some(vec![judge(&machine, start, &context.spec)?]),
+        after: vec![judge(&machine, gains, &context.spec)?],
+        objective: Reached { name: context.spec.objective.minimise, value: f64::NAN, starts: 0, starts_at_best: 0 },
+        at_bounds: Vec::new(),
+        ranges: ranges(&[machine], &context.spec, context.base.sample_time_s),
+        work,
+    });
+    let table = gain_table_of(context, row, gains, proved)?;
+    let digest = loaded.digest;
+    let sweep =
+        Sweep { coherence: None, notes: Vec::new(), rows_read: frf.len(), source_digest: digest, frf: frf.clone() };
+    let name = row.id();
+    let page = slot::page(&Slot {
+        name: &name,
+        plant: &plant,
+        units: slot::units(&plant),
+        sweep: Some((&sweep, context.hold)),
+        identified: None,
+        spec: &context.spec,
+        start: Some(start),
+        outcome: &outcome,
+        over_model: None,
+        table: &table,
+        certificate: None,
+        provenance: provenance(&table),
+        physics: None,
+    })?;
+    let mut text = page.html();
+    if !proved.passes {
+        // The page's verdict is that of the response as measured; the fleet asks for more.
+        let says = format!(
+            "In the worst case ({}) {} is missed by {:.1} %.",
+            if proved.case.is_empty() { "as measured" } else { &proved.case },
+            proved.limit,
+            100.0 * proved.worst
+        );
+        text = text.replacen("Every limit is met.", &says, 1);
+    }
+    Ok(Some(text))
+}

@@ -1,0 +1,95 @@
+//! The certificate that `tune` writes beside a gain table.
+//!
+//! In: a tuned table with its certificate, or a sweep to tune on. Out: `gains.toml`, `gains.certificate.json`, and what it says, or why there can be none.
+//! Spec: `specs/certificate.md`.
+
+use super::{Failure, Screen, verify};
+use serde::Serialize;
+use servotune::controller::Controller;
+use servotune::document::FileSet;
+use servotune::frf::Sweep;
+use servotune::lti::Plant;
+use servotune::tune::{GainTable, Hold, InputDigest, Machine, Spec, TuneError, TuneSettings};
+use servotune::verify::{
+    Assurance, Assured, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, tune_assured,
+};
+use servotune_report::certificate::certificate_sentence;
+use std::path::{Path, PathBuf};
+
+/// What the proof of a table came to.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Proof {
+    /// The certificate; absent where nothing could be proved or refused.
+    pub file: Option<PathBuf>,
+    /// Every limit is proved on every machine given.
+    pub proved: bool,
+    /// The same in a sentence: what is not proved, and by how much.
+    pub says: String,
+}
+
+/// Adds a table and its certificate to the files of one result; what is proved, none without a certificate asked for.
+pub(super) fn add(
+    gains: &Path,
+    table: &GainTable,
+    certificate: Option<&Result<Certificate, String>>,
+    files: &mut FileSet,
+) -> Result<Option<Proof>, Failure> {
+    files.write(gains, table.text()?);
+    let file = verify::beside(gains);
+    Ok(match certificate {
+        Some(Ok(c)) => {
+            files.write(&file, c.text()?);
+            Some(Proof { file: Some(file), proved: c.proved, says: certificate_sentence(c) })
+        }
+        other => {
+            // One of an earlier table would speak of this one.
+            files.remove(&file);
+            let reason = other.and_then(|o| o.as_ref().err());
+            reason.map(|reason| Proof { file: None, proved: false, says: format!("No certificate: {reason}.") })
+        }
+    })
+}
+
+/// Writes all files of one result, or none, and says which.
+pub(super) fn commit(files: FileSet, screen: &mut Screen) -> Result<(), Failure> {
+    let names: Vec<String> = files.files().map(|f| f.display().to_string()).collect();
+    files.commit()?;
+    names.iter().for_each(|name| screen.say(&format!("wrote {name}")));
+    Ok(())
+}
+
+/// A sweep that is tuned on, with the files that a certificate names.
+pub(super) struct OnSweep<'a> {
+    pub sweep: &'a Sweep,
+    pub hold: Hold,
+    /// The model that continues it.
+    pub plant: &'a Plant,
+    pub spec: &'a Spec,
+    pub spec_file: &'a Path,
+    pub start: Option<&'a Controller>,
+    pub inputs: &'a [InputDigest],
+    pub gains: &'a Path,
+}
+
+impl OnSweep<'_> {
+    /// Tunes on the sweep, with as much room as its intervals ask for.
+    pub fn tune(&self, settings: &TuneSettings, screen: &mut Screen) -> Result<Assured, Failure> {
+        let spec_source = Source::read(self.spec_file)?;
+        let profile = Spec::profile_path(self.spec_file).map_err(TuneError::from)?;
+        let profile = profile.map(|p| Source::read(&p)).transpose()?;
+        let assumption = SweepAssumption { least_damping: LEAST_DAMPING, hold_included: self.hold == Hold::Included };
+        let machine = Machine::Response { frf: &self.sweep.frf, hold: self.hold, continuation: Some(self.plant) };
+        let job = Assurance {
+            ground: Ground::Sweep { sweep: self.sweep, machine, assumption },
+            spec: self.spec,
+            spec_source: &spec_source,
+            profile: profile.as_ref(),
+            uncertainty: Uncertainty::default(),
+            start: self.start,
+            units: (&self.plant.position_unit, &self.plant.command_unit),
+            inputs: self.inputs,
+            gains: self.gains,
+        };
+        Ok(tune_assured(&job, settings, &mut |words| screen.say(words))?)
+    }
+}

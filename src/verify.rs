@@ -1,0 +1,69 @@
+//! `servotune verify`: a gain table proved again.
+
+use super::verify_arguments::VerifyArguments;
+use super::{Ending, Failure, Screen, load};
+use servotune::document::{check_target, read_text, write_text};
+use servotune::frf::Sweep;
+use servotune::tune::Spec;
+use servotune::verify::{Inputs, Source, SweepAssumption, VerifyError, VerifySettings, certify, choices};
+use servotune_report::certificate::certificate_text;
+use std::path::{Path, PathBuf};
+
+/// The certificate that `tune` writes beside a table.
+pub(super) fn beside(gains: &Path) -> PathBuf {
+    gains.with_extension("certificate.json")
+}
+
+pub(super) fn run(a: &VerifyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    a.out.as_deref().map_or(Ok(()), check_target)?;
+    let old = match &a.certificate {
+        Some(file) => Some(file.clone()),
+        None => Some(beside(&a.gains)).filter(|f| f.exists() && a.out.as_ref() != Some(f)),
+    };
+    let old = old.map(|file| read_text(&file).map(|text| (file, text))).transpose()?;
+    let (word, uncertainty) = match &old {
+        Some((file, text)) => choices(file, text)?,
+        None => Default::default(),
+    };
+    let plants = a.plant.iter().map(|p| Source::read(p)).collect::<Result<Vec<Source>, VerifyError>>()?;
+    let taken = load::Taken {
+        how: &a.taken,
+        unstable_poles: a.unstable_poles,
+        hold_included: a.hold_included,
+        controller: a.controller.as_deref(),
+    };
+    if a.frf.is_empty() && a.taken.any() {
+        return Err(Failure::MeasuredWithout);
+    }
+    let sweeps =
+        a.frf.iter().map(|f| load::sweep(f, &a.reading, &taken, screen)).collect::<Result<Vec<Sweep>, Failure>>()?;
+    let profile = Spec::profile_path(&a.spec).map_err(VerifyError::from)?;
+    let profile = profile.map(|p| Source::read(&p)).transpose()?;
+    let inputs = Inputs {
+        gains: &Source::read(&a.gains)?,
+        plants: &plants,
+        sweeps: &sweeps,
+        assumption: SweepAssumption { least_damping: a.min_damping, hold_included: a.hold_included },
+        spec: &Source::read(&a.spec)?,
+        profile: profile.as_ref(),
+        word: a.word().unwrap_or(word),
+        uncertainty: a.uncertainty.unwrap_or(uncertainty),
+    };
+    let mut c = certify(&inputs, &VerifySettings::default())?;
+    if let Some(file) = &a.out {
+        write_text(file, &c.text()?)?;
+        screen.say(&format!("wrote {}", file.display()));
+    }
+    // A certificate is compared as it was made; asked for other words or boxes, it does not speak of them.
+    if let Some((file, text)) = &old
+        && a.word().is_none_or(|w| w == word)
+        && a.uncertainty.is_none_or(|u| u == uncertainty)
+    {
+        screen.say(&format!("checked against {}", file.display()));
+        let unfit = c.compare(file, text)?;
+        c.proved &= unfit.is_empty();
+        c.findings.extend(unfit);
+    }
+    screen.result(&c, &certificate_text(&c)?)?;
+    Ok(if c.proved { Ending::Accepted } else { Ending::Rejected })
+}
