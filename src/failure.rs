@@ -77,8 +77,6 @@ pub enum Failure {
     NoMachine,
     #[error("--override {id}: no such machine in {}; found {found}", folder.display())]
     NoSuchMachine { folder: PathBuf, id: String, found: String },
-    #[error("{}: an old certificate cannot be removed: {source}", file.display())]
-    Remove { file: PathBuf, source: std::io::Error },
     #[error("--override {id}: given twice; give each machine one reason")]
     TwiceOverridden { id: String },
     #[error("{}: already there; give a new folder, so that old gains are not taken for new ones", file.display())]

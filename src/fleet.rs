@@ -7,8 +7,8 @@ use super::{Ending, Failure, Screen, fleet_page, fleet_progress, fleet_slot, fle
 use serde::Serialize;
 use servotune::document::write_text;
 use servotune_fleet::{
-    self as fleet, Action, Asked, Context, Effort, FileSource, Fleet, Job, SlotRow, SlotSource, Stamp, Store, TwinSource,
-    Verdict, Worker, clear_pages, page_file, write_tables,
+    self as fleet, Action, Asked, Context, Effort, FileSource, Fleet, Job, SlotRow, SlotSource, Stamp, Store,
+    TwinSource, Verdict, Worker, clear_pages, page_file, write_tables,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

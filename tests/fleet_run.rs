@@ -4,11 +4,11 @@
 mod fleet_common;
 
 use fleet_common::{Quiet, fleet, folder, one, stamp};
+use servotune_fleet::TwinSource;
 use servotune_fleet::{
     Action, Asked, Context, Effort, Fleet, FleetError, Inputs, Job, Loaded, SlotName, SlotSource, Store, TwinInput,
     Verdict, Worker, run, write_tables,
 };
-use servotune_fleet::TwinSource;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -1,11 +1,11 @@
 //! A small floor worked on once, and stores made from its rows.
 #![allow(clippy::unwrap_used, dead_code, reason = "each test file uses a part of it")]
 
+use servotune_fleet::TwinSource;
 use servotune_fleet::{
     Action, Carried, Context, Effort, Fleet, FleetError, Inputs, Job, Order, SlotRow, Stage, Stamp, Store, TwinInput,
     Verdict, Watch, Which, Worker, run,
 };
-use servotune_fleet::TwinSource;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 

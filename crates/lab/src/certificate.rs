@@ -36,7 +36,7 @@ pub fn certificate(data: &Path, say: &mut dyn FnMut(&str)) -> Result<Study, Stud
     let mut study = Study::default();
     let mut text = format!(
         "# Certificate\n\n\
-         Made by `servotune study certificate --data DATA --out results`, DATA being the folder with `hdd_benchmark_model/`; spec: `specs/certificate.md`. Peers on the same loops: \
+         Made by `lab certificate --data DATA --out results`, DATA being the folder with `hdd_benchmark_model/`; spec: `specs/certificate.md`. Peers on the same loops: \
          [certificate_peers.md](certificate_peers.md).\n\n\
          ## {LOOPS} random loops of known truth\n\n\
          Body, 2 to 9 resonance pairs, every second loop one or two more of damping 1e-4 to 3e-3 (a mode at 2 kHz is then 0.4 to 12 Hz wide; a 300-point sweep has \

@@ -171,7 +171,7 @@ fn page(rows: &str, tally: &Tally) -> String {
     let within = sorted.iter().filter(|r| **r <= 1.3).count();
     format!(
         "# The write over a box\n\n\
-         Made by `servotune study certificate-write --data DATA --out results`, DATA being the folder with `hdd_benchmark_model/`; spec: `specs/certificate.md`.\n\n\
+         Made by `lab certificate-write --data DATA --out results`, DATA being the folder with `hdd_benchmark_model/`; spec: `specs/certificate.md`.\n\n\
          Gain, every frequency, every damping ratio and the dead time move by the same share, each on its own. The four machines have the tables tuned to \
          `specs/limits/paper.toml` and their own noise; the nine cases of the HDD benchmark plant (source: `hdd_benchmark.md`) are the models identified from their responses, under the one \
          table tuned jointly. *Drawn*: the worst of {DRAWS} members, every second one a corner, simulated by partial fractions. *Seen*: the worst that the proof came across, simulated by \

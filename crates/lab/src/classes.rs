@@ -155,7 +155,7 @@ fn page(judged: &[Judged]) -> Result<String, StudyError> {
     }
     Ok(format!(
         "# The four machine classes under one controller\n\n\
-         Made by `servotune study classes --out results`. Machines: `specs/machines/`; controller: `specs/controllers/nominal.toml`;\n\
+         Made by `lab classes --out results`. Machines: `specs/machines/`; controller: `specs/controllers/nominal.toml`;\n\
          write: `specs/profiles/` (a sensor fault has three times the encoder noise). Simulated, one draw of the noise (seed 1).\n\n\
          ```text\n{}```\n\n```text\n{}```\n\n\
          What the paper says of figures 16 to 22, and what is seen here: the sensor fault raises gain and crossover and shows\n\

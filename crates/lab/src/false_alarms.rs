@@ -19,7 +19,7 @@ pub fn false_alarms(folder: &Path) -> Result<Study, StudyError> {
     let limit = settings.select.false_alarm;
     let mut text = format!(
         "# False alarms of the search\n\n\
-         Made by `servotune study false-alarms --data CASES --out results`, CASES being a folder of cases without physics. For each case {DRAWS} sets of records are \
+         Made by `lab false-alarms --data CASES --out results`, CASES being a folder of cases without physics. For each case {DRAWS} sets of records are \
          made from its own linear refit and its own noise, and the whole first search runs on each: refit, smoothed motion, every law at every point of its grid. The \
          statistic is the closed-form bound of the strongest candidate; below {limit:e} the search would go on towards a finding.\n\n\
          | case | verdict | strongest candidate, log10 of its bound | the same of the draws: median | smallest | chance among the draws | draws below {limit:e} |\n\

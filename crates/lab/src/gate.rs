@@ -186,7 +186,7 @@ fn page(table: &Table, wide: &TrainReport, searched: &TrainReport) -> Result<Str
     let paper = [5, 200, 384, 200, 4];
     Ok(format!(
         "# The gate on the production line\n\n\
-         Made by `servotune study gate --out results`. Simulated machines (`specs/gate_twin.md`), seed {}: {} drives, {} columns; split\n\
+         Made by `lab gate --out results`. Simulated machines (`specs/gate_twin.md`), seed {}: {} drives, {} columns; split\n\
          {} / {} / {} (training, validation, test). What the paper found on its own 486 drives stands in its sections 2.8 to 3.2 and is not repeated\n\
          as ours.\n\n\
          Parameters: {} for 10-200-500-200-4 (the paper's 203 704); {} for {}, what the search chose here; {} for the paper's\n\

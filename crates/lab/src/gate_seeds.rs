@@ -174,7 +174,7 @@ fn page(found: &[Seed]) -> Result<String, StudyError> {
     let strangers = |f: fn(&Stranger) -> usize| found.iter().flat_map(|s| s.strangers.values()).map(f).sum::<usize>();
     Ok(format!(
         "# The gate over {} seeds\n\n\
-         Made by `servotune study gate-seeds --out results`; every number of every seed: [gate_seeds.json](gate_seeds.json). Simulated machines\n\
+         Made by `lab gate-seeds --out results`; every number of every seed: [gate_seeds.json](gate_seeds.json). Simulated machines\n\
          (`specs/gate_twin.md`). Seed s trains with the default settings on the line of seed s (486 drives) and judges the line of seed {FRESH} + s\n\
          (486 others) and {STRANGERS} machines of each of five kinds that no class knows.\n\n\
          Counts over all seeds: {} machines of known classes, {} of them broken; {} broken sent to tuning, {} broken left alone, {} wrong decisions,\n\

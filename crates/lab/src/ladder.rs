@@ -26,7 +26,7 @@ pub fn ladder() -> Result<Study, StudyError> {
     let mut study = Study::default();
     let mut text = format!(
         "# The ladder of Table 1\n\n\
-         Made by `servotune study ladder --out results`. Machine: `specs/machines/healthy.toml`, 400 points from 40 to 5000 Hz, \
+         Made by `lab ladder --out results`. Machine: `specs/machines/healthy.toml`, 400 points from 40 to 5000 Hz, \
          {} % relative complex noise, seed {SEED}.\n\n{}\n",
         100.0 * NOISE,
         identified_sentences(&id).join(" ")

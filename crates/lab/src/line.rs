@@ -98,7 +98,7 @@ fn page(table: &FeatureTable, settings: &LineSettings) -> Result<String, StudyEr
         .collect();
     Ok(format!(
         "# The production line in features\n\n\
-         Made by `servotune study line --out results`. Simulated machines (`specs/gate_twin.md`), seed {}.\n\n\
+         Made by `lab line --out results`. Simulated machines (`specs/gate_twin.md`), seed {}.\n\n\
          Classes: {a} healthy, {b} sensor fault, {c} loose pushpin, {d} tunable; {} in all, as in section 2.9. {} features each, logs\n\
          included; {missing} of {} fields empty.\n\n```text\n{}```\n\n\
          The text of section 2.9 names Harmonic 15 where the caption of figure 31 names Harmonic 24; both are shown.\n\n\

@@ -126,7 +126,7 @@ fn page(axes: &[Axis], tuned: &[Tuned]) -> Result<String, StudyError> {
     let loops = super::measured::tuned_table(tuned)?;
     Ok(format!(
         "# Fast steering mirror: measured responses\n\n\
-         Made by `servotune study mirror --data DATA --out results`, DATA being the folder with `fsm_100mV/`. Source: M. Floren, L. Peri, J. De Maeyer, \
+         Made by `lab mirror --data DATA --out results`, DATA being the folder with `fsm_100mV/`. Source: M. Floren, L. Peri, J. De Maeyer, \
          W. De Munter, D. Vandepitte, J.-P. Noel, CubeSpec fine steering mirror, ISMA-USD 2024, data CC BY 4.0 (K. U. Leuven); responses computed \
          from its multisine records, deviations from two realisations.\n\n\
          Fitted from {} to {} Hz, hold at {RATE_HZ} Hz divided out, zeros in either half-plane.\n\n\

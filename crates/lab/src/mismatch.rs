@@ -123,7 +123,7 @@ fn page(rows: &[Row]) -> String {
     let known = rows.iter().filter(|r| r.right.is_some()).count();
     let right = rows.iter().filter(|r| r.right == Some(true)).count();
     let mut text = format!(
-        "# Diagnoses beside their answers\n\nMade by `servotune study mismatch --data CASES --out results`, CASES being a folder of case folders with `answers/`. \
+        "# Diagnoses beside their answers\n\nMade by `lab mismatch --data CASES --out results`, CASES being a folder of case folders with `answers/`. \
          Answers are read after every diagnosis is made. Right: {right} of {known} cases with an answer.\n\n\
          Hold-out errors are of the simulation (closed loop where a controller is given) over the noise floor that repeats show, 1 being noise alone.\n\n\
          | case | answer | verdict | findings | right | parameters | before | refit | after |\n|---|---|---|---|---|---|---|---|---|\n"

@@ -52,7 +52,7 @@ pub fn motor(data: &Path) -> Result<Study, StudyError> {
     let blocks = [parameter_table(id)?, order_table(&freely)?].map(|t| format!("```text\n{}```\n", t.text()));
     let text = format!(
         "# Motor bench with flexible coupling: measured response\n\n\
-         Made by `servotune study motor --data DATA --out results`, DATA being the folder with `motor_bench/`. Source: FdiTools, Hori-Fujimoto Lab \
+         Made by `lab motor --data DATA --out results`, DATA being the folder with `motor_bench/`. Source: FdiTools, Hori-Fujimoto Lab \
          (T. Beauduin, W. Ohnishi), MIT licence.\n\n\
          Response of the motor angle to the measured current, {} periods of 1 s averaged after {DISCARD} left out, lines 11 to 250 Hz; its \
          deviation comes from the scatter between periods. {}\n\nMedian error {:.2} %. Anti-resonance {dip:.2} Hz and resonance {peak:.2} Hz; the \

@@ -124,7 +124,7 @@ fn page(cases: &[Case]) -> Result<String, StudyError> {
     let covered = |i: usize| cases.iter().filter(|c| c.figures.covered[i]).count();
     Ok(format!(
         "# Random plants of order 22\n\n\
-         Made by `servotune study plants --out results`. {n} plants (body and {MODES} resonance pairs), {POINTS} points from 40 to 5000 Hz, \
+         Made by `lab plants --out results`. {n} plants (body and {MODES} resonance pairs), {POINTS} points from 40 to 5000 Hz, \
          {} % relative complex noise, seeds 1 to {PLANTS}; order chosen by the program. Errors are against the noise-free response on a grid ten \
          times finer. A mode is visible when its mark on the sweep is five deviations above what noise makes; one without a counterpart within \
          3 % counts as 100 %. Margins are those of the nominal controller scaled to {CROSSOVER_HZ} Hz on the true plant; where a mode touches |L| = 1 elsewhere, the \

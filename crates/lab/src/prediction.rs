@@ -72,7 +72,7 @@ pub fn prediction() -> Result<Study, StudyError> {
         "prediction.md",
         format!(
             "# The DFT under gains never run\n\n\
-             Made by `servotune study prediction --out results`. {MACHINES} machines, a quarter of each class of `specs/machines/`, every number of the plant moved by up to 5 %. \
+             Made by `lab prediction --out results`. {MACHINES} machines, a quarter of each class of `specs/machines/`, every number of the plant moved by up to 5 %. \
              Each is swept ({POINTS} points, 40 to 5000 Hz, {:.0} % deviation) and identified. {CONTROLLERS} controllers a machine, gains 0.6 to 1.5 times the nominal ones, are then predicted with the \
              identified plant and run once on the true one, with a draw of the noise that no prediction used; loops with Ms above 3 are left out. The error is that of one record's norm, in both bands, \
              against the predicted median.\n\n\

@@ -225,7 +225,7 @@ fn mirror(data: &Path) -> Result<String, StudyError> {
 /// Makes the page from the folder of measured records.
 pub fn recordings(data: &Path) -> Result<Study, StudyError> {
     let mut text = String::from(
-        "# Real recordings\n\nMade by `servotune study recordings --data DATA --out results`, DATA being the folder with `emps/`, `silverbox/`, `motor_bench/` and `fsm_100mV/`. Each \
+        "# Real recordings\n\nMade by `lab recordings --data DATA --out results`, DATA being the folder with `emps/`, `silverbox/`, `motor_bench/` and `fsm_100mV/`. Each \
          diagnosis is given a linear model and nothing else. Errors are of the open-loop simulation driven by the recorded command; position, velocity and a constant \
          torque at the start of the held-out rows are fitted to them, which the published figures do not do. No noise level is given: it comes from laps of one drive where there are any, and \
          otherwise from what the best model leaves.\n\nSources: EMPS, A. Janot, M. Gautier, M. Brunot, 2019 Workshop on Nonlinear System Identification Benchmarks. Silverbox, T. Wigren, J. Schoukens, \
@@ -236,7 +236,7 @@ pub fn recordings(data: &Path) -> Result<Study, StudyError> {
         let made = made(&r, data)?;
         let page = format!("{}.html", r.name.to_lowercase().replace(' ', "_"));
         text.push_str(&section(&r, &made));
-        let _ = writeln!(text, "Report with pictures: [{page}]({page}).\n");
+        let _ = writeln!(text, "Report with pictures, written beside this page by the command: `{page}`.\n");
         let source = [
             ("Records".to_owned(), r.file.to_owned()),
             ("Rows fitted".to_owned(), format!("{} to {}", r.fit[0], r.fit[1])),
