@@ -8,7 +8,7 @@ pub(super) use super::performance_arguments::{BudgetArguments, NextSweepArgument
 pub(super) use super::sweep_arguments::{MeasuredArguments, ModelArguments, ReadingArguments};
 pub(super) use super::verify_arguments::VerifyArguments;
 use super::verify_arguments::uncertainty;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use servotune::twin::line::UnknownKind;
 use servotune::verify::Uncertainty;
 use std::path::PathBuf;
@@ -43,7 +43,6 @@ pub(super) enum Command {
     Tune(Box<TuneArguments>),
     Train(Box<TrainArguments>),
     Classify(ClassifyArguments),
-    Study(StudyArguments),
     Verify(Box<VerifyArguments>),
     #[command(hide = true)]
     Twin(TwinArguments),
@@ -290,78 +289,4 @@ fn counts(text: &str) -> Result<Counts, String> {
 fn unknown_kind(word: &str) -> Result<UnknownKind, String> {
     let known = || UnknownKind::ALL.map(UnknownKind::name).join(", ");
     UnknownKind::named(word).ok_or_else(|| format!("found `{word}`; expected one of: {}", known()))
-}
-
-/// Makes a table or picture of results/ again
-#[derive(Debug, Args)]
-#[command(after_help = "Example:\n  servotune study classes --out results")]
-pub(super) struct StudyArguments {
-    /// Which study
-    #[arg(value_enum)]
-    pub study: StudyName,
-    /// Folder to write to
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
-    /// Sizes of the floor (study `fleet-scale`)
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [1_000, 10_000, 100_000])]
-    pub sizes: Vec<usize>,
-    /// Kills (studies `fleet-kills`, 500 unless told, and `reliability-fleet`, 300)
-    #[arg(long, value_name = "N")]
-    pub kills: Option<usize>,
-    /// Changed bytes (study `reliability-fleet`)
-    #[arg(long, value_name = "N", default_value_t = 1000)]
-    pub changes: usize,
-    /// Changed files (study `reliability-readers`)
-    #[arg(long, value_name = "N", default_value_t = 12_000)]
-    pub runs: usize,
-    /// Folder with the measured records (studies `mirror`, `motor`, `hdd`)
-    #[arg(long, value_name = "DIR", default_value = "../shared/data")]
-    pub data: PathBuf,
-}
-
-/// The studies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum StudyName {
-    /// The four machine classes under one controller (figures 16-22)
-    Classes,
-    /// The gate on the production line (Table 3, figures 24, 35-39)
-    Gate,
-    /// The gate over 20 seeds, on fresh lines and on unknown kinds
-    GateSeeds,
-    /// 100 000 random loops of known truth against the certificate; mutated tables; the four machines
-    Certificate,
-    /// The write over boxes of parameters: proved bounds against members drawn from the box
-    CertificateWrite,
-    /// The ladder of Table 1 and figures 6, 9, 12-14
-    Ladder,
-    /// The production line in features (figures 24-34)
-    Line,
-    /// The DFT under gains never run, predicted and recorded
-    Prediction,
-    /// 200 random plants of order 22: response, frequency and margin errors
-    Plants,
-    /// The nine measured responses of a fast steering mirror
-    Mirror,
-    /// 64 testers of 16 slots from raw files, three times
-    Fleet,
-    /// A run killed 500 times
-    FleetKills,
-    /// Kills of run, approve, apply and rollback, and changed bytes of the store
-    ReliabilityFleet,
-    /// Slots per second and memory over the size of the floor
-    FleetScale,
-    /// Coverage over the number of shared tables for 1000 slots
-    FleetShared,
-    /// The search for physics on records without any, for the cases in the folder --data
-    FalseAlarms,
-    /// Changed files through every reader; memory and time of the largest inputs
-    ReliabilityReaders,
-    /// Diagnoses of the cases in the folder --data, beside their answers
-    Mismatch,
-    /// Real recordings: EMPS, Silverbox, motor bench, mirror, diagnosed from a linear model
-    Recordings,
-    /// The motor bench with flexible coupling, measured
-    Motor,
-    /// The nine cases of the public HDD benchmark plant
-    Hdd,
 }

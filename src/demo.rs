@@ -90,7 +90,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     };
     let Assured { outcome, table, certificate, .. } = job.tune(&settings, screen)?;
     let mut files = FileSet::default();
-    let certificate = proof::add(&gain_table, &table, certificate.as_ref(), &mut files)?;
+    let certificate = proof::add(&gain_table, &table, Some(&certificate), &mut files)?;
     proof::commit(files, screen)?;
     let says = certificate.as_ref().map(|c| c.says.clone()).unwrap_or_default();
 

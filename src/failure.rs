@@ -1,6 +1,5 @@
 //! Why a command could not be done: one message, exit code 2.
 
-use crate::study::StudyError;
 use servotune::controller::ControllerError;
 use servotune::diagnose::DiagnoseError;
 use servotune::document::DocumentError;
@@ -10,8 +9,7 @@ use servotune::gate::GateError;
 use servotune::gate::features::FeatureError;
 use servotune::identify::IdentifyError;
 use servotune::lti::LtiError;
-use servotune::pes::{PesError, ProfileError};
-use servotune::physics::PhysicsError;
+use servotune::pes::PesError;
 use servotune::recording::RecordingError;
 use servotune::tune::{GainTableError, TuneError};
 use servotune::twin::TwinError;
@@ -31,13 +29,7 @@ pub enum Failure {
     #[error(transparent)]
     Document(#[from] DocumentError),
     #[error("{}: {source}", file.display())]
-    Plant { file: PathBuf, source: LtiError },
-    #[error("{}: {source}", file.display())]
     Controller { file: PathBuf, source: ControllerError },
-    #[error("{}: {source}", file.display())]
-    Profile { file: PathBuf, source: ProfileError },
-    #[error("{}: [[plant.physics]] {source}", file.display())]
-    Physics { file: PathBuf, source: PhysicsError },
     #[error(transparent)]
     Frf(#[from] FrfError),
     #[error(transparent)]
@@ -81,8 +73,6 @@ pub enum Failure {
     NoMachine,
     #[error("--override {id}: no such machine in {}; found {found}", folder.display())]
     NoSuchMachine { folder: PathBuf, id: String, found: String },
-    #[error("{}: an old certificate cannot be removed: {source}", file.display())]
-    Remove { file: PathBuf, source: std::io::Error },
     #[error("--override {id}: given twice; give each machine one reason")]
     TwiceOverridden { id: String },
     #[error("{}: already there; give a new folder, so that old gains are not taken for new ones", file.display())]
@@ -101,10 +91,6 @@ pub enum Failure {
     Gate(#[from] GateError),
     #[error(transparent)]
     Fleet(#[from] FleetError),
-    #[error("cannot {what}: {source}")]
-    Child { what: String, source: std::io::Error },
-    #[error(transparent)]
-    Study(#[from] StudyError),
     #[error("the result cannot be written as JSON: {source}")]
     Json { source: serde_json::Error },
     #[error("cannot write to stdout: {source}")]

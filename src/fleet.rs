@@ -7,7 +7,8 @@ use super::{Ending, Failure, Screen, fleet_progress, fleet_store};
 use serde::Serialize;
 use servotune_answer::{FloorFiles, floor_files};
 use servotune_fleet::{
-    self, Action, Context, Effort, FileSource, Fleet, Job, SlotSource, Stamp, Store, Verdict, Worker,
+    self as fleet, Action, Context, Effort, FileSource, Fleet, Job, SlotSource, Stamp, Store, TwinSource, Verdict,
+    Worker,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -202,7 +202,7 @@ fn tuned(job: &Job<'_>, row: &mut Row, screen: &mut Screen) -> Result<(), Failur
                 gains: &gains,
             };
             let done = on.tune(&job.tuning, screen)?;
-            (done.outcome, done.table, done.certificate)
+            (done.outcome, done.table, Some(done.certificate))
         }
         None => {
             let machine = Machine::Response { frf: &sweep.frf, hold: job.hold, continuation: Some(&identified.plant) };

@@ -7,7 +7,7 @@ use servotune::document::read_text;
 use servotune::frf::{Measured, Sweep, read_file};
 use servotune::lti::Plant;
 use servotune::pes::Profile;
-use servotune_answer::{self, Ran, adjusted, opened};
+use servotune_answer::{self as answer, Ran, adjusted, opened};
 use std::path::Path;
 
 /// A plant, its physics entries not looked at yet.

@@ -1,4 +1,4 @@
-//! The command line: the only place with arguments, files, stdout and exit codes.
+//! The `servotune` program: the only place with arguments, files, stdout and exit codes.
 //!
 //! In: words typed by a person. Out: text or one JSON document on stdout, messages on stderr, and 0 (done, all accepted),
 //! 1 (done, something was rejected) or 2 (could not do it). Commands: `specs/files.md` and `servotune --help`.
@@ -17,11 +17,8 @@ mod features;
 mod fleet;
 mod fleet_arguments;
 mod fleet_clock;
-mod fleet_kills;
 mod fleet_progress;
-mod fleet_reliability;
 mod fleet_store;
-mod fleet_study;
 mod fleet_twin;
 mod gate_arguments;
 mod gated;
@@ -33,11 +30,9 @@ mod next_sweep;
 mod pareto;
 mod performance_arguments;
 mod proof;
-mod reliability_readers;
 mod response;
 mod screen;
 mod simulate;
-mod study;
 mod sweep_arguments;
 mod train;
 mod tune;
@@ -49,7 +44,7 @@ mod verify_arguments;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
-pub use failure::Failure;
+use failure::Failure;
 use screen::Screen;
 use std::process::ExitCode;
 
@@ -62,8 +57,7 @@ enum Ending {
     Rejected,
 }
 
-/// Runs the program on the process's own arguments.
-pub fn main() -> ExitCode {
+fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(a) => a,
         Err(e) => {
@@ -88,7 +82,6 @@ pub fn main() -> ExitCode {
         Command::Tune(a) => tune::run(&a, &mut screen),
         Command::Train(a) => train::run(&a, &mut screen),
         Command::Classify(a) => classify::run(&a, &mut screen),
-        Command::Study(a) => study::run(&a, &mut screen),
         Command::Twin(a) => twin::run(&a, &mut screen),
         Command::Verify(a) => verify::run(&a, &mut screen),
     };

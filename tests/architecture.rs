@@ -3,8 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// Rooms by rank; a room uses lower ranks only (`specs/decisions/rooms.md`).
-const RANKS: [&[&str]; 12] = [
+/// Rooms of the library by rank; a room uses lower ranks only (`specs/decisions/rooms.md`). Between crates the manifests hold the direction.
+const RANKS: [&[&str]; 7] = [
     &["units", "document", "numeric"],
     &["frf", "recording", "lti"],
     &["controller", "physics"],
@@ -12,38 +12,54 @@ const RANKS: [&[&str]; 12] = [
     &["pes"],
     &["tune", "gate", "diagnose"],
     &["twin", "verify"],
-    &["fleet"],
-    &["report"],
-    &["answer"],
-    &["study"],
-    &["cli"],
 ];
+
+/// What each crate of the house may name of the others; the library stands alone, the lab is named by tests only.
+const ARROWS: [(&str, &[&str]); 6] = [
+    ("crates/servotune", &[]),
+    ("crates/report", &["servotune"]),
+    ("crates/fleet", &["servotune"]),
+    ("crates/answer", &["servotune", "servotune-fleet", "servotune-report"]),
+    ("crates/lab", &["servotune", "servotune-fleet", "servotune-report"]),
+    (".", &["servotune", "servotune-answer", "servotune-fleet", "servotune-report"]),
+];
+
+const LIBRARY: &str = "crates/servotune/src/";
 
 /// Outside crates and the places where they may be named.
 const HOMES: [(&str, &[&str]); 12] = [
-    ("clarabel", &["src/tune/feedforward.rs"]),
-    ("argmin", &["src/tune/search.rs"]),
-    ("rustfft", &["src/numeric/spectrum.rs"]),
+    ("clarabel", &["crates/servotune/src/tune/feedforward.rs"]),
+    ("argmin", &["crates/servotune/src/tune/search.rs"]),
+    ("rustfft", &["crates/servotune/src/numeric/spectrum.rs"]),
     (
         "rayon",
         &[
-            "src/tune/search.rs",
-            "src/tune/neighbours.rs",
-            "src/gate/",
-            "src/twin/",
-            "src/study/",
-            "src/diagnose/",
-            "src/fleet/",
+            "crates/servotune/src/tune/search.rs",
+            "crates/servotune/src/tune/neighbours.rs",
+            "crates/servotune/src/gate/",
+            "crates/servotune/src/twin/",
+            "crates/servotune/src/diagnose/",
+            "crates/fleet/src/",
+            "crates/lab/src/",
         ],
     ),
-    ("rusqlite", &["src/fleet/"]),
-    ("parquet", &["src/fleet/parquet.rs"]),
-    ("pulp", &["src/numeric/wide.rs"]),
-    ("clap", &["src/cli/"]),
-    ("maud", &["src/report/"]),
-    ("sha2", &["src/document/digest.rs", "src/frf/"]),
-    ("csv", &["src/frf/", "src/recording/", "src/gate/table.rs", "src/gate/error.rs", "src/fleet/"]),
-    ("flate2", &["src/frf/", "src/recording/"]),
+    ("rusqlite", &["crates/fleet/src/"]),
+    ("parquet", &["crates/fleet/src/parquet.rs"]),
+    ("pulp", &["crates/servotune/src/numeric/wide.rs"]),
+    ("clap", &["src/", "crates/lab/src/main.rs"]),
+    ("maud", &["crates/report/src/"]),
+    ("sha2", &["crates/servotune/src/document/digest.rs", "crates/servotune/src/frf/"]),
+    (
+        "csv",
+        &[
+            "crates/servotune/src/frf/",
+            "crates/servotune/src/recording/",
+            "crates/servotune/src/gate/table.rs",
+            "crates/servotune/src/gate/error.rs",
+            "crates/fleet/src/",
+        ],
+    ),
+    ("flate2", &["crates/servotune/src/frf/", "crates/servotune/src/recording/"]),
 ];
 
 /// Longest file (lines).
@@ -65,6 +81,9 @@ fn each_source(mut look: impl FnMut(&str, &str)) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut files = Vec::new();
     sources(&root.join("src"), &mut files);
+    for (krate, _) in ARROWS.iter().filter(|(k, _)| *k != ".") {
+        sources(&root.join(krate).join("src"), &mut files);
+    }
     assert!(files.len() > 50, "the sources were not found");
     for file in files {
         let name = file.strip_prefix(root).unwrap().to_string_lossy().replace('\\', "/");
@@ -80,7 +99,7 @@ fn rank(room: &str) -> Option<usize> {
 fn a_room_uses_lower_ranks_only() {
     let mut wrong = Vec::new();
     each_source(|name, text| {
-        let Some(room) = name.strip_prefix("src/").and_then(|n| n.split_once('/')).map(|(r, _)| r) else { return };
+        let Some(room) = name.strip_prefix(LIBRARY).and_then(|n| n.split_once('/')).map(|(r, _)| r) else { return };
         let own = rank(room).unwrap_or_else(|| panic!("{name}: the room `{room}` has no rank"));
         // What stands in a comment or in a test module names no arrow of the house.
         let code = text.split("#[cfg(test)]").next().unwrap_or_default();
@@ -94,6 +113,23 @@ fn a_room_uses_lower_ranks_only() {
         }
     });
     assert!(wrong.is_empty(), "arrows upward or sideways:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_crate_names_what_stands_below_it() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for (krate, below) in ARROWS {
+        let manifest = std::fs::read_to_string(root.join(krate).join("Cargo.toml")).unwrap();
+        let manifest: toml::Table = manifest.parse().unwrap();
+        let named: Vec<&str> = manifest["dependencies"]
+            .as_table()
+            .unwrap()
+            .keys()
+            .map(String::as_str)
+            .filter(|k| k.starts_with("servotune"))
+            .collect();
+        assert_eq!(named, below, "{krate}");
+    }
 }
 
 #[test]

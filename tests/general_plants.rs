@@ -4,7 +4,7 @@
 use nalgebra::{Complex, DMatrix, DVector};
 use servotune::controller::{Controller, Lowpass, Pid};
 use servotune::feedback::{
-    LoopOnGrid, MeasuredLoop, ModelLoop, SampledPlant, closed_loop_poles, margins, measured_margins,
+    LoopOnGrid, LoopVerdict, MeasuredLoop, ModelLoop, SampledPlant, closed_loop_poles, margins, measured_margins,
 };
 use servotune::frf::Frf;
 use servotune::lti::{Body, DiscretePlant, FrequencyResponse, Mode, Plant, PlantFile, PlantState, Rational};
@@ -279,7 +279,7 @@ fn unstable_plants_are_counted_as_the_eigenvalues_say() {
 #[test]
 fn a_sweep_of_an_unstable_plant_needs_its_number_of_unstable_poles() {
     let mut r = Random::new(14);
-    let (mut told, mut stable, mut pairs) = (0, 0, 0);
+    let (mut told, mut stable, mut pairs, mut unknown) = (0, 0, 0, 0);
     for i in 0..200 {
         let (mut plant, controller) = unstable_loop(&mut r);
         // As the page of margins says: a plant that is positive but for its unstable poles.
@@ -306,7 +306,12 @@ fn a_sweep_of_an_unstable_plant_needs_its_number_of_unstable_poles() {
         }
         let value = w.iter().map(|&w| sampled.at(w)).collect();
         let frf = Frf::new(w, value, None).unwrap().with_unstable_poles(count);
-        let found = measured_margins(&MeasuredLoop::new(&frf, &sections, true).unwrap()).unwrap().margins;
+        let measured = measured_margins(&MeasuredLoop::new(&frf, &sections, true).unwrap()).unwrap();
+        if measured.verdict == LoopVerdict::NotKnown {
+            unknown += 1;
+            continue;
+        }
+        let found = measured.margins;
         assert_eq!(found.unstable_poles, truth.unstable_poles, "{i} {plant:?} {controller:?}");
         told += 1;
         stable += usize::from(truth.stable);
@@ -317,7 +322,7 @@ fn a_sweep_of_an_unstable_plant_needs_its_number_of_unstable_poles() {
             pairs += 1;
         }
     }
-    assert!(told > 40 && stable > 15 && pairs > 5, "{told} {stable} {pairs}");
+    assert!(told > 40 && stable > 15 && pairs > 5 && unknown < told / 4, "{told} {stable} {pairs} {unknown}");
 }
 
 fn plant_rests(p: &Plant) -> bool {
@@ -485,7 +490,7 @@ fn a_bearing_goes_through_the_commands_from_its_file_and_from_its_sweeps() {
     assert!(code == 2 && said.contains("--frf"), "{said}");
     std::fs::write(
         file("two.toml"),
-        "position_unit = \"um\"\ncommand_unit = \"A\"\n[plant]\ngain = 1.0\npoles_hz = [-1]\nnumerator = [1]\n",
+        "position_unit = \"um\"\ncommand_unit = \"A\"\n[plant]\ndelay_s = 0\ngain = 1.0\npoles_hz = [-1]\nnumerator = [1]\n",
     )
     .unwrap();
     let (code, _, said) = servotune(&["margins", "--plant", &path("two.toml"), "--controller", &controller]);

@@ -1,4 +1,4 @@
-"""Margins of python-control on the loops of `servotune study certificate`, beside their truth.
+"""Margins of python-control on the loops of `lab certificate`, beside their truth.
 
     python benches/peers/certificate.py --loops results/certificate_loops.json --out results/certificate_peers.md
 

@@ -106,7 +106,7 @@ def paper() -> list[Machine]:
 
 
 def benchmark(data: Path) -> list[Machine]:
-    """The published main actuator with the second one's loop closed by the fixed lag of `servotune study hdd`, here in continuous time:
+    """The published main actuator with the second one's loop closed by the fixed lag of `lab hdd`, here in continuous time:
     P = M/(1 + g F lag); its poles are M's and the roots of 1 + g F lag, its residues follow in closed form."""
 
     def rows(name: str) -> list[tuple[float, float, float]]:

@@ -3,7 +3,7 @@
 use crate::refusal::{raise, unwritable};
 use pyo3::prelude::*;
 use serde::Serialize;
-use servotune::report::ReportError;
+use servotune_report::ReportError;
 
 /// Draws the picture of a result as SVG.
 pub type Draw = Box<dyn Fn() -> Result<String, ReportError> + Send + Sync>;

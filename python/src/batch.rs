@@ -13,7 +13,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
-use servotune::answer::{self, IdentifiedDocument, Named, Proof, TunedDocument, adjusted, model_margins};
+use servotune_answer::{self, IdentifiedDocument, Named, Proof, TunedDocument, adjusted, model_margins};
 use servotune::feedback::{Amplitudes, Margins, MeasuredLoop, measured_margins};
 use servotune::frf::{Sweep, read_bytes};
 use servotune::identify::{IdentifySettings, identify};

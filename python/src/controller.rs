@@ -5,7 +5,7 @@ use crate::refusal::{raise, unwritable};
 use crate::settings::named;
 use numpy::{Complex64, IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use servotune::answer::AnswerError;
+use servotune_answer::AnswerError;
 use servotune::controller;
 use servotune::lti::FrequencyResponse;
 use std::f64::consts::TAU;
@@ -42,7 +42,7 @@ impl Controller {
     #[pyo3(signature = (text, name = "controller"))]
     fn parse(text: String, name: &str) -> PyResult<Controller> {
         let file = PathBuf::from(name);
-        let controller = servotune::answer::controller(&file, &text).map_err(raise)?;
+        let controller = servotune_answer::controller(&file, &text).map_err(raise)?;
         Ok(Controller { file, text, controller })
     }
 

@@ -8,12 +8,12 @@ use crate::refusal::{raise, unwritable};
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use servotune::answer::{self, case_provenance, conclude, sure};
+use servotune_answer::{self, case_provenance, conclude, sure};
 use servotune::diagnose::{DiagnoseSettings, diagnose};
 use servotune::document::read_text;
 use servotune::recording::{Case, Record, RecordColumns, RecordEntry, RecordSettings, Role};
-use servotune::report::diagnosis::diagnosis_page;
-use servotune::report::page::{Block, Page};
+use servotune_report::diagnosis::diagnosis_page;
+use servotune_report::page::{Block, Page};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -141,7 +141,7 @@ fn made(
 }
 
 /// The figure that the page shows first: the records beside the models.
-fn first_figure(page: &Page) -> Option<&servotune::report::Figure> {
+fn first_figure(page: &Page) -> Option<&servotune_report::Figure> {
     page.sections.iter().flat_map(|s| &s.blocks).find_map(|b| match b {
         Block::Figure(f) | Block::Pair(f, _) => Some(f),
         _ => None,

@@ -2,12 +2,12 @@
 
 use crate::refusal::{ServotuneError, raise};
 use pyo3::prelude::*;
-use servotune::answer::{AnswerError, FloorFiles, floor_files};
-use servotune::fleet::{
+use servotune_answer::{AnswerError, FloorFiles, floor_files};
+use servotune_fleet::{
     Context, Effort, FileSource, Fleet, FleetError, Hand, Job, SlotSource, Spread, Stage, Stamp, Store, Verdict, Watch,
     Worker,
 };
-use servotune::study::TwinSource;
+use servotune_fleet::TwinSource;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -166,7 +166,7 @@ impl Floor {
         py.detach(|| {
             let worker = Floor::worker(&self.store)?;
             let run = self.name.clone().unwrap_or(run);
-            servotune::fleet::run(&self.job(&worker, Some(&run), threads), &Silent)?;
+            servotune_fleet::run(&self.job(&worker, Some(&run), threads), &Silent)?;
             let mut store = Store::open(&self.store)?;
             let mut verdicts: BTreeMap<&'static str, usize> = Verdict::ALL.iter().map(|v| (v.word(), 0)).collect();
             store.each_row(&run, None, |row| {

@@ -8,7 +8,7 @@ use numpy::{Complex64, IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use servotune::answer::{Ran, adjusted, opened};
+use servotune_answer::{Ran, adjusted, opened};
 use servotune::document::sha256_hex;
 use servotune::frf::{self, Measured, Sweep, write_bod};
 use std::f64::consts::TAU;

@@ -7,9 +7,9 @@ use crate::settings::named;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use servotune::answer::classified;
+use servotune_answer::classified;
 use servotune::gate::{self, Table, TrainSettings};
-use servotune::report::confusion::{Part, confusion};
+use servotune_report::confusion::{Part, confusion};
 use std::path::{Path, PathBuf};
 
 /// A trained gate: what stands in a gate.json.

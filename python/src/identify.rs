@@ -7,8 +7,8 @@ use crate::refusal::raise;
 use crate::{picture, settings};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use servotune::answer::{AnswerError, IdentifiedDocument};
-use servotune::report::identified::identified_figure;
+use servotune_answer::{AnswerError, IdentifiedDocument};
+use servotune_report::identified::identified_figure;
 use std::sync::Arc;
 
 /// The model of a sweep, and the document of `identify --json`.

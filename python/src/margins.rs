@@ -7,7 +7,7 @@ use crate::picture;
 use crate::plant::Plant;
 use crate::refusal::raise;
 use pyo3::prelude::*;
-use servotune::answer::{AnswerError, ModelMargins, Named, model_margins};
+use servotune_answer::{AnswerError, ModelMargins, Named, model_margins};
 use servotune::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
 use std::sync::Arc;
 

@@ -5,11 +5,11 @@ use servotune::controller::Controller;
 use servotune::feedback::{Margins, MeasuredLoop, ModelLoop, OpenLoop};
 use servotune::frf::Frf;
 use servotune::lti::{DiscretePlant, FrequencyResponse, Plant};
-use servotune::report::bode::{BodeCurve, BodeMarks, bode};
-use servotune::report::figure::Ink;
-use servotune::report::svg::{Size, standalone};
-use servotune::report::time::{CurveKind, TimeCurve, TimePanel, time};
-use servotune::report::{Figure, ReportError};
+use servotune_report::bode::{BodeCurve, BodeMarks, bode};
+use servotune_report::figure::Ink;
+use servotune_report::svg::{Size, standalone};
+use servotune_report::time::{CurveKind, TimeCurve, TimePanel, time};
+use servotune_report::{Figure, ReportError};
 use std::f64::consts::TAU;
 
 /// Points of a drawn curve for each decade.

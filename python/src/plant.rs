@@ -35,7 +35,7 @@ impl Plant {
     #[pyo3(signature = (text, name = "plant"))]
     fn parse(text: String, name: &str) -> PyResult<Plant> {
         let file = PathBuf::from(name);
-        let plant = servotune::answer::plant(&file, &text).map_err(raise)?;
+        let plant = servotune_answer::plant(&file, &text).map_err(raise)?;
         Ok(Plant { file, text, plant })
     }
 
@@ -93,7 +93,7 @@ impl Plant {
     #[allow(clippy::type_complexity)]
     fn discretise(&self, sample_time_s: f64) -> PyResult<(Vec<Vec<f64>>, Vec<f64>, Vec<f64>, Vec<f64>, usize)> {
         let sampled = DiscretePlant::of(&self.plant, sample_time_s)
-            .map_err(|source| raise(servotune::answer::AnswerError::Plant { file: self.file.clone(), source }))?;
+            .map_err(|source| raise(servotune_answer::AnswerError::Plant { file: self.file.clone(), source }))?;
         let f = sampled.real_form();
         let state = f.state.row_iter().map(|row| row.iter().copied().collect()).collect();
         Ok((state, f.now, f.before, f.output, sampled.whole_delay_samples()))

@@ -6,7 +6,7 @@ use crate::picture;
 use crate::plant::Plant;
 use crate::refusal::raise;
 use pyo3::prelude::*;
-use servotune::answer::{Named, profile, simulated};
+use servotune_answer::{Named, profile, simulated};
 use std::path::Path;
 
 /// The PES of the write in the text of a profile.toml; `name` stands in messages.

@@ -10,7 +10,7 @@ use crate::settings::{model, uncertainty};
 use crate::spec::Spec;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use servotune::answer::{
+use servotune_answer::{
     AnswerError, Asked, Given, Named, Proof, Reached, TunedDocument, given_model, given_sweep, tuned,
 };
 use servotune::document::sha256_hex;
@@ -18,7 +18,7 @@ use servotune::feedback::{Margins, MeasuredLoop, ModelLoop, confirmed_margins, m
 use servotune::frf::Sweep;
 use servotune::identify::IdentifySettings;
 use servotune::lti::DiscretePlant;
-use servotune::report::ReportError;
+use servotune_report::ReportError;
 use servotune::tune::{Hold, InputDigest, TuneSettings, sample_time_s};
 use servotune::verify::Uncertainty;
 use std::path::Path;

@@ -24,6 +24,7 @@ use std::f64::consts::TAU;
 
 /// A slot with everything that is known of it.
 pub struct Slot<'a> {
+    /// The slot.
     pub name: &'a str,
     /// The model: given, or identified from the sweep.
     pub plant: &'a Plant,
@@ -31,16 +32,21 @@ pub struct Slot<'a> {
     pub units: Units<'a>,
     /// The sweep with the hold it contains, where there is one.
     pub sweep: Option<(&'a Sweep, Hold)>,
+    /// What identification said of it, with intervals.
     pub identified: Option<&'a Identified>,
+    /// The limits.
     pub spec: &'a Spec,
+    /// The gains that it came with.
     pub start: Option<&'a Controller>,
     /// The outcome that the gain table holds.
     pub outcome: &'a Outcome,
     /// The outcome of the other way, over the model, where the first one went straight on the response.
     pub over_model: Option<&'a Outcome>,
+    /// The gain table.
     pub table: &'a GainTable,
     /// What the certificate says of the table; none without one.
     pub certificate: Option<&'a str>,
+    /// What was read, with digests: name and value.
     pub provenance: Vec<(String, String)>,
     /// The physics and the tuning with it, where the plant has any.
     pub physics: Option<(&'a Restored, &'a PhysicalTuning)>,

@@ -247,7 +247,7 @@ fn reach(given: &Given, asked: &Asked<'_>, say: Say<'_>) -> Result<Reached, Answ
     };
     let done = tune_assured(&job, settings, say)?;
     let tuned = done.outcome.tuned().is_some();
-    Ok(Reached { outcome: done.outcome, table: done.table, tuned, certificate: done.certificate, physics: None })
+    Ok(Reached { outcome: done.outcome, table: done.table, tuned, certificate: Some(done.certificate), physics: None })
 }
 
 impl<'a> TunedDocument<'a> {

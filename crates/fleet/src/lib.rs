@@ -41,6 +41,7 @@ mod spread;
 mod store;
 mod store_run;
 mod table_source;
+mod twin_source;
 mod work_list;
 
 pub use certified::{Certified, certified};
@@ -70,4 +71,5 @@ pub use source::{FileSource, Loaded, SlotName, SlotSource};
 pub use spread::{Hand, Spread};
 pub use store::Store;
 pub use store_run::{Inputs, Run, Stamp};
+pub use twin_source::TwinSource;
 pub use work_list::{WorkItem, work_list};

@@ -1,6 +1,6 @@
 //! The made-up floor as a source of slots: each is drawn when it is asked for, and nothing is kept.
 
-use crate::{Loaded, SlotName, SlotSource, TwinInput};
+use super::{Loaded, SlotName, SlotSource, TwinInput};
 use servotune::document::sha256_hex;
 use servotune::twin::fleet::FleetSettings;
 

@@ -60,4 +60,10 @@ pub enum StudyError {
     /// A measured record that this study rests on is not there.
     #[error("{}: the measured record that this study rests on is not there; give its folder with --data", file.display())]
     Absent { file: PathBuf },
+    #[error("cannot {what}: {source}")]
+    Child { what: String, source: std::io::Error },
+    #[error("{}: not there; this study runs the program itself: build both, `cargo build --release`", file.display())]
+    NoProgram { file: PathBuf },
+    #[error(transparent)]
+    Fleet(#[from] servotune_fleet::FleetError),
 }

@@ -2,8 +2,8 @@
 //!
 //! In: the folder for results, how many kills. Out: `fleet_kills.md`.
 
+use super::StudyError;
 use super::fleet_study::{Place, machine, number, program, run, text, twin};
-use super::{Failure, Screen};
 use servotune::document::{read_text, write_text};
 use servotune::numeric::random::Random;
 use std::path::{Path, PathBuf};
@@ -17,15 +17,15 @@ const KILLED_SLOTS: &str = "96";
 const COMPARED: [&str; 6] =
     ["slots.csv", "slots.jsonl", "coverage.csv", "shared.json", "work_list.csv", "untunable.json"];
 
-fn bytes(folder: &Path) -> Result<Vec<Vec<u8>>, Failure> {
+fn bytes(folder: &Path) -> Result<Vec<Vec<u8>>, StudyError> {
     let read = |name: &&str| {
-        std::fs::read(folder.join(name)).map_err(|source| Failure::Child { what: format!("read {name}"), source })
+        std::fs::read(folder.join(name)).map_err(|source| StudyError::Child { what: format!("read {name}"), source })
     };
     COMPARED.iter().map(read).collect()
 }
 
 /// Kills a run at random instants until it has been killed `kills` times; every finished run is compared with an undisturbed one.
-pub(super) fn kills(out: &Path, kills: usize, screen: &mut Screen) -> Result<Vec<PathBuf>, Failure> {
+pub fn kills(out: &Path, kills: usize, say: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>, StudyError> {
     let place = Place::new("kills")?;
     let floor = place.at("floor");
     twin(&floor, &["--slots", KILLED_SLOTS])?;
@@ -42,7 +42,7 @@ pub(super) fn kills(out: &Path, kills: usize, screen: &mut Screen) -> Result<Vec
         let words = [text(&fleet), text(&result)];
         let mut most = 0usize;
         loop {
-            let fail = |source| Failure::Child { what: "start a run".into(), source };
+            let fail = |source| StudyError::Child { what: "start a run".into(), source };
             let mut child = program(&[
                 "fleet", "run", &words[0], "--out", &words[1], "--chunk", "8", "--run", "one", "--pages", "0",
             ])?
@@ -81,7 +81,7 @@ pub(super) fn kills(out: &Path, kills: usize, screen: &mut Screen) -> Result<Vec
                 before += usize::from(rows > 0);
             }
             if done % 50 == 0 {
-                screen.say(&format!("kills: {done} of {kills}"));
+                say(&format!("kills: {done} of {kills}"));
             }
         }
         let store = servotune_fleet::Store::open(&result.join("fleet.db"))?;

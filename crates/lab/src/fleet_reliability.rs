@@ -3,8 +3,8 @@
 //! In: the folder for results, how many kills, how many changed bytes. Out: `reliability_fleet.md`. What is right is known from commands that nobody
 //! disturbed: the bytes of every installed file before and after; the study compares with them and asks the program for the store's last action only.
 
+use super::StudyError;
 use super::fleet_study::{Place, machine, program, run, text, twin};
-use super::{Failure, Screen};
 use serde_json::Value;
 use servotune::document::{read_text, write_text};
 use servotune::numeric::random::Random;
@@ -21,9 +21,9 @@ const COMPARED: [&str; 5] = ["slots.csv", "slots.jsonl", "coverage.csv", "shared
 /// Commands after a kill, in turn.
 const NEXT: [&str; 3] = ["runs", "history", "approve"];
 
-fn fail(what: &str) -> impl Fn(std::io::Error) -> Failure {
+fn fail(what: &str) -> impl Fn(std::io::Error) -> StudyError {
     let what = what.to_owned();
-    move |source| Failure::Child { what: what.clone(), source }
+    move |source| StudyError::Child { what: what.clone(), source }
 }
 
 /// Copies a folder of files and folders.
@@ -41,18 +41,18 @@ fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-fn done(words: &[&str]) -> Result<Output, Failure> {
+fn done(words: &[&str]) -> Result<Output, StudyError> {
     program(words)?.stderr(Stdio::piped()).output().map_err(fail(&words.join(" ")))
 }
 
 /// A command that nobody disturbs; one that is refused ends the study.
-fn undisturbed(words: &[&str]) -> Result<(), Failure> {
+fn undisturbed(words: &[&str]) -> Result<(), StudyError> {
     let out = done(words)?;
     if out.status.success() {
         return Ok(());
     }
     let said = String::from_utf8_lossy(&out.stderr).into_owned();
-    Err(Failure::Child { what: words.join(" "), source: std::io::Error::other(said) })
+    Err(StudyError::Child { what: words.join(" "), source: std::io::Error::other(said) })
 }
 
 /// `approve`, `apply` or `rollback` of all slots of the store in a folder.
@@ -71,11 +71,11 @@ fn installed(place: &Path, slots: &[String]) -> Vec<Option<Vec<u8>>> {
 }
 
 /// The last action of every slot, as the program tells it.
-fn last_actions(place: &Path, slots: &[String]) -> Result<Vec<String>, Failure> {
+fn last_actions(place: &Path, slots: &[String]) -> Result<Vec<String>, StudyError> {
     let store = text(&place.join("fleet.db"));
     let one = |slot: &String| {
         let out = done(&["fleet", "history", slot, "--store", &store, "--json"])?;
-        let all: Value = serde_json::from_slice(&out.stdout).map_err(|source| Failure::Json { source })?;
+        let all: Value = serde_json::from_slice(&out.stdout)?;
         let last = all.as_array().and_then(|a| a.last()).and_then(|r| r["action"].as_str());
         Ok(last.unwrap_or("none").to_owned())
     };
@@ -111,7 +111,7 @@ fn kill(
     wait: f64,
     next: &str,
     count: &mut Count,
-) -> Result<(), Failure> {
+) -> Result<(), StudyError> {
     let _ = std::fs::remove_dir_all(place);
     copy(&stage.place, place).map_err(fail("copy a store"))?;
     let all = act(stage.action, place);
@@ -146,7 +146,7 @@ fn kill(
 }
 
 /// Kills runs until they have been killed so many times; gives kills, runs that ended, and those whose files differ or whose store is not whole.
-fn kill_runs(fleet: &Path, place: &Place, calm: &Path, kills: usize, whole: f64) -> Result<[usize; 3], Failure> {
+fn kill_runs(fleet: &Path, place: &Place, calm: &Path, kills: usize, whole: f64) -> Result<[usize; 3], StudyError> {
     let (mut random, mut count) = (Random::new(2), [0; 3]);
     while count[0] < kills {
         let out = place.at(&format!("run{}", count[1]));
@@ -180,7 +180,7 @@ fn kill_runs(fleet: &Path, place: &Place, calm: &Path, kills: usize, whole: f64)
     Ok(count)
 }
 
-fn files(out: &Path) -> Result<Vec<Vec<u8>>, Failure> {
+fn files(out: &Path) -> Result<Vec<Vec<u8>>, StudyError> {
     COMPARED.iter().map(|n| std::fs::read(out.join(n)).map_err(fail(&format!("read {n}")))).collect()
 }
 
@@ -207,8 +207,8 @@ fn changed(
     place: &Place,
     run: (&Path, &Path),
     count: usize,
-    screen: &mut Screen,
-) -> Result<Changed, Failure> {
+    say: &mut dyn FnMut(&str),
+) -> Result<Changed, StudyError> {
     let (fleet, calm) = run;
     let bytes = std::fs::read(stage.place.join("fleet.db")).map_err(fail("read a store"))?;
     let (mut random, mut found, wanted) = (Random::new(3), Changed::default(), files(calm)?);
@@ -242,19 +242,19 @@ fn changed(
             found.unsaid_files += usize::from(code != Some(2) && files(&out)? != wanted);
         }
         if (i + 1) % 200 == 0 {
-            screen.say(&format!("changed bytes: {} of {count}", i + 1));
+            say(&format!("changed bytes: {} of {count}", i + 1));
         }
     }
     Ok(found)
 }
 
 /// Runs the study and writes its page.
-pub(super) fn reliability(
+pub fn reliability(
     out: &Path,
     kills: usize,
     changes: usize,
-    screen: &mut Screen,
-) -> Result<Vec<PathBuf>, Failure> {
+    say: &mut dyn FnMut(&str),
+) -> Result<Vec<PathBuf>, StudyError> {
     let place = Place::new("reliability")?;
     let floor = place.at("floor");
     twin(&floor, &["--slots", SLOTS])?;
@@ -286,7 +286,7 @@ pub(super) fn reliability(
         let files = [installed(&now, &slots), installed(&next, &slots)];
         if last_actions(&next, &slots)?.iter().any(|a| a != action) || (action != "approve" && files[0] == files[1]) {
             let source = std::io::Error::other("it changed nothing");
-            return Err(Failure::Child { what: action.to_owned(), source });
+            return Err(StudyError::Child { what: action.to_owned(), source });
         }
         stages.push(Stage { place: now, action, from, files, seconds });
         now = next;
@@ -304,11 +304,11 @@ pub(super) fn reliability(
             "| {} | {} | {} | {} | {} | {} |\n",
             stage.action, count.kills, count.before, count.after, count.healed, count.disagree
         );
-        screen.say(&format!("kills of {}: {}", stage.action, count.kills));
+        say(&format!("kills of {}: {}", stage.action, count.kills));
     }
     let runs = kill_runs(&fleet, &place, &calm, kills - 3 * (kills / 4), whole)?;
-    screen.say(&format!("kills of run: {}", runs[0]));
-    let bytes = changed(&stages[1], &slots, &place, (&fleet, &calm), changes, screen)?;
+    say(&format!("kills of run: {}", runs[0]));
+    let bytes = changed(&stages[1], &slots, &place, (&fleet, &calm), changes, say)?;
     let page = format!(
         "# What a fleet's store stands\n\n\
          Made by `lab reliability-fleet --out results`. A floor of {SLOTS} made-up slots, {} of them tuned. {}\n\n\

@@ -1,8 +1,8 @@
-//! Studies of the fleet: they run this very program as other processes, so that time, memory and kills are those of a real run.
+//! Studies of the fleet: they run the program `servotune` as other processes, so that time, memory and kills are those of a real run.
 //!
 //! In: the folder for results. Out: `fleet.md`, `fleet_shared.md`, `fleet_scale.md`. Work is done in a temporary folder.
 
-use super::{Failure, Screen};
+use super::StudyError;
 use serde_json::Value;
 use servotune::document::{read_text, write_text};
 use std::path::{Path, PathBuf};
@@ -12,9 +12,10 @@ use std::process::{Command, Stdio};
 pub(super) struct Place(PathBuf);
 
 impl Place {
-    pub(super) fn new(name: &str) -> Result<Place, Failure> {
+    pub(super) fn new(name: &str) -> Result<Place, StudyError> {
         let folder = std::env::temp_dir().join(format!("servotune-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).map_err(|source| Failure::Child { what: "make a folder".into(), source })?;
+        std::fs::create_dir_all(&folder)
+            .map_err(|source| StudyError::Child { what: "make a folder".into(), source })?;
         Ok(Place(folder))
     }
 
@@ -29,19 +30,23 @@ impl Drop for Place {
     }
 }
 
-/// This program with these words.
-pub(super) fn program(words: &[&str]) -> Result<Command, Failure> {
-    let fail = |source| Failure::Child { what: "find this program".into(), source };
-    let mut c = Command::new(std::env::current_exe().map_err(fail)?);
+/// The program `servotune` of the same build, with these words.
+pub(super) fn program(words: &[&str]) -> Result<Command, StudyError> {
+    let fail = |source| StudyError::Child { what: "find this program".into(), source };
+    let file = std::env::current_exe().map_err(fail)?.with_file_name("servotune");
+    if !file.exists() {
+        return Err(StudyError::NoProgram { file });
+    }
+    let mut c = Command::new(file);
     c.args(words).stdin(Stdio::null()).stderr(Stdio::null());
     Ok(c)
 }
 
-/// Runs this program with `--json` and gives its document; a run that could not be done is an error.
-fn json(words: &[&str]) -> Result<Value, Failure> {
-    let fail = |source| Failure::Child { what: words.join(" "), source };
+/// Runs the program with `--json` and gives its document; a run that could not be done is an error.
+fn json(words: &[&str]) -> Result<Value, StudyError> {
+    let fail = |source| StudyError::Child { what: words.join(" "), source };
     let out = program(words)?.arg("--json").output().map_err(fail)?;
-    serde_json::from_slice(&out.stdout).map_err(|source| Failure::Json { source })
+    Ok(serde_json::from_slice(&out.stdout)?)
 }
 
 pub(super) fn text(path: &Path) -> String {
@@ -53,14 +58,14 @@ pub(super) fn number(v: &Value, key: &str) -> f64 {
 }
 
 /// One run of FLEET.toml.
-pub(super) fn run(fleet: &Path, out: &Path, more: &[&str]) -> Result<Value, Failure> {
+pub(super) fn run(fleet: &Path, out: &Path, more: &[&str]) -> Result<Value, StudyError> {
     let (fleet, out) = (text(fleet), text(out));
     let mut words = vec!["fleet", "run", &fleet, "--out", &out];
     words.extend(more);
     json(&words)
 }
 
-pub(super) fn twin(out: &Path, more: &[&str]) -> Result<(), Failure> {
+pub(super) fn twin(out: &Path, more: &[&str]) -> Result<(), StudyError> {
     let out = text(out);
     let mut words = vec!["twin", "fleet", "--out", &out];
     words.extend(more);
@@ -123,14 +128,14 @@ fn coverage(v: &Value) -> String {
 const REPORTS: usize = 4;
 
 /// 64 testers of 16 slots from raw files, three runs of the same floor.
-pub(super) fn floor(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Failure> {
+pub fn floor(out: &Path, say: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>, StudyError> {
     let place = Place::new("floor")?;
     let result = place.at("out");
     let store = text(&place.at("fleet.db"));
     let mut runs = Vec::new();
     for age in ["0", "6", "12"] {
         let floor = place.at(&format!("floor{age}"));
-        screen.say(&format!("floor: measurement {age}"));
+        say(&format!("floor: measurement {age}"));
         twin(&floor, &["--testers", "64", "--run", age])?;
         // One store for all three, beside their folders.
         let file = floor.join("FLEET.toml");
@@ -139,7 +144,7 @@ pub(super) fn floor(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Fai
         runs.push(run(&file, &result, &["--run", &format!("age-{age}"), "--pages", &pages])?);
     }
     let last = &runs[runs.len() - 1];
-    let lines = |name: &str, n: usize| -> Result<String, Failure> {
+    let lines = |name: &str, n: usize| -> Result<String, StudyError> {
         Ok(read_text(&result.join(name))?.lines().take(n).collect::<Vec<_>>().join("\n"))
     };
     let threads = std::thread::available_parallelism().map_or(1, usize::from) as f64;
@@ -166,7 +171,7 @@ pub(super) fn floor(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Fai
          | age | slots | wall (s) | processor (s) | slots/s of the run | slots/s of every slot alone | peak MiB | verdicts |\n|---|---|---|---|---|---|---|---|\n{rows}\n\
          Slots/s of the run counts all: pilots, the library, every slot, explanations of untunable slots, shared tables. \"Every slot alone\" is the stage from a slot's files to its\n\
          proven and certified table, per processor time: what {threads} cores without other work do.\n\n\
-         The page of the last run, with the reports of its {REPORTS} worst slots: [fleet.html](fleet.html).\n\n\
+         The page of the last run, with the reports of its {REPORTS} worst slots: `fleet.html`, written beside this page by the command.\n\n\
          Second opinion, last run: of {tuned} tables of tuned slots the prover of `specs/certificate.md` certifies {certified} ({:.1} %): on the identified plant, the\n\
          drawn plants and at each temperature every limit of a margin is kept at every frequency. The others keep them on the measured curve, and miss one on a\n\
          model by what the model leaves over; `slots.csv` says which.\n\n## Shared tables, last run\n\n{}\n\
@@ -192,10 +197,10 @@ pub(super) fn floor(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Fai
 }
 
 /// Coverage over K for a thousand slots.
-pub(super) fn shared(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Failure> {
+pub fn shared(out: &Path, say: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>, StudyError> {
     let place = Place::new("shared")?;
     let floor = place.at("floor");
-    screen.say("shared: 1000 slots");
+    say("shared: 1000 slots");
     twin(&floor, &["--slots", "1000"])?;
     let v = run(&floor.join("FLEET.toml"), &place.at("out"), &[])?;
     let s = &v["shared"];
@@ -227,13 +232,13 @@ pub(super) fn shared(out: &Path, screen: &mut Screen) -> Result<Vec<PathBuf>, Fa
 }
 
 /// Slots per second and memory over the size of the floor. The page is written again after each size.
-pub(super) fn scale(out: &Path, sizes: &[usize], screen: &mut Screen) -> Result<Vec<PathBuf>, Failure> {
+pub fn scale(out: &Path, sizes: &[usize], say: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>, StudyError> {
     let place = Place::new("scale")?;
     let page = out.join("fleet_scale.md");
     let threads = std::thread::available_parallelism().map_or(1, usize::from) as f64;
     let (mut runs, mut slots) = (String::new(), String::new());
     for &size in sizes {
-        screen.say(&format!("scale: {size} slots"));
+        say(&format!("scale: {size} slots"));
         let floor = place.at(&format!("floor{size}"));
         twin(&floor, &["--slots", &size.to_string()])?;
         let result = place.at(&format!("out{size}"));

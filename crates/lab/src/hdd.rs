@@ -136,7 +136,7 @@ fn page(cases: &[Case], alone: &Outcome, jointly: &Outcome) -> Result<String, St
          (MATLAB File Exchange 111515; IEEE TIE 67(11), 2020), parameters from its Python port, MIT licence. Published parameters, not a recording.\n\n\
          Three temperatures (main actuator's frequencies 0, +4, -4 %, damping x1, x0.8, x1.2; second actuator's +-6 %) times three gains of the second \
          actuator (0, +5, -5 %). Both actuators are sampled exactly at {RATE_HZ} Hz. The loop is cut at the main actuator's input; the second actuator's own loop is \
-         closed by a fixed lag (gain {} at rest, corner {} Hz), which is ours, so its gain matters and the nine cases differ. Limits: `src/study/specs/hdd.toml`.\n\n\
+         closed by a fixed lag (gain {} at rest, corner {} Hz), which is ours, so its gain matters and the nine cases differ. Limits: `crates/lab/src/specs/hdd.toml`.\n\n\
          Tuned on the first case alone: {}; on all nine, {first_missed} of {n} miss a margin limit. Tuned jointly: {}; {second_missed} of {n} miss one.\n\n\
          ```text\n{}```\n\n```text\n{}```\n\n```text\n{}```\n\nPicture: [responses](figures/hdd_benchmark.svg).\n",
         LAG.0,

@@ -1,7 +1,7 @@
-//! Studies: every table and picture in `results/`, made again by `lab NAME`.
+//! Studies: every table and picture in `results/`, made again by `lab NAME --out results`.
 //!
 //! In: built-in machines, seeds, and where a study needs them measured records. Out: a [`Study`], pages and pictures as text.
-//! Nothing is written here; the command line does that.
+//! Nothing is written here but by the studies that run the program as other processes; `main` does it for the rest.
 
 mod certificate;
 mod certificate_loops;
@@ -11,7 +11,9 @@ mod certificate_write;
 mod classes;
 mod error;
 mod false_alarms;
-mod fleet_source;
+mod fleet_kills;
+mod fleet_reliability;
+mod fleet_study;
 mod gate;
 mod gate_seeds;
 mod hdd;
@@ -27,13 +29,17 @@ mod prediction;
 mod reader_mutations;
 mod readers;
 mod recordings;
+mod reliability_readers;
+pub mod study_identify;
 
 pub use certificate::certificate;
 pub use certificate_write::certificate_write;
 pub use classes::classes;
 pub use error::StudyError;
 pub use false_alarms::false_alarms;
-pub use fleet_source::TwinSource;
+pub use fleet_kills::kills;
+pub use fleet_reliability::reliability;
+pub use fleet_study::{floor, scale, shared};
 pub use gate::gate;
 pub use gate_seeds::gate_seeds;
 pub use hdd::hdd;
@@ -46,6 +52,7 @@ pub use plants::plants;
 pub use prediction::prediction;
 pub use reader_mutations::{Reached, Tally, reader_mutations};
 pub use recordings::recordings;
+pub use reliability_readers::readers;
 
 /// What a study hands over: files by name, relative to the results' folder.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -236,7 +236,7 @@ pub fn recordings(data: &Path) -> Result<Study, StudyError> {
         let made = made(&r, data)?;
         let page = format!("{}.html", r.name.to_lowercase().replace(' ', "_"));
         text.push_str(&section(&r, &made));
-        let _ = writeln!(text, "Report with pictures: [{page}]({page}).\n");
+        let _ = writeln!(text, "Report with pictures, written beside this page by the command: `{page}`.\n");
         let source = [
             ("Records".to_owned(), r.file.to_owned()),
             ("Rows fitted".to_owned(), format!("{} to {}", r.fit[0], r.fit[1])),

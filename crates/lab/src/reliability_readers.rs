@@ -3,8 +3,8 @@
 //! In: the folder for results, how many changed files. Out: `reliability_readers.md`. The largest inputs go to this very program as another process, so that time and
 //! memory are those of a real run; memory is the peak that the system reports while the process lives (Linux; elsewhere 0).
 
+use super::StudyError;
 use super::fleet_study::{Place, machine, program, text};
-use super::{Failure, Screen};
 use crate::reader_mutations;
 use nalgebra::Complex;
 use servotune::document::write_text;
@@ -34,12 +34,12 @@ struct Measured {
 }
 
 /// The first trial found the figures called before (issue of 22 November 2026).
-pub(super) fn readers(out: &Path, runs: usize, screen: &mut Screen) -> Result<Vec<PathBuf>, Failure> {
+pub fn readers(out: &Path, runs: usize, say: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>, StudyError> {
     let place = Place::new("readers")?;
     let begun = Instant::now();
-    let tallies = reader_mutations(runs, SEED, &place.at("trials"), TRIAL, &mut |words| screen.say(words))?;
+    let tallies = reader_mutations(runs, SEED, &place.at("trials"), TRIAL, say)?;
     let seconds = begun.elapsed().as_secs_f64();
-    let large = large(&place, screen)?;
+    let large = large(&place, say)?;
     let mut page = format!(
         "# Readers under changed files and large ones\n\n\
          Made by `lab reliability-readers --out results` (seed {SEED}, {} changed files, {seconds:.0} s). {}\n\n\
@@ -82,8 +82,8 @@ pub(super) fn readers(out: &Path, runs: usize, screen: &mut Screen) -> Result<Ve
 }
 
 /// A sweep of the healthy machine, `points` even in the logarithm, 0.3 % noise, as `.bod`.
-fn sweep(points: usize) -> Result<String, Failure> {
-    let plant = paper_machine(MachineClass::Healthy).map_err(crate::StudyError::from)?;
+fn sweep(points: usize) -> Result<String, StudyError> {
+    let plant = paper_machine(MachineClass::Healthy)?;
     let mut random = Random::new(points as u64);
     let mut out = "Frequency (Hz)\tMagnitude (dB)\tPhase (deg)\n".to_owned();
     for k in 0..points {
@@ -95,8 +95,8 @@ fn sweep(points: usize) -> Result<String, Failure> {
     Ok(out)
 }
 
-fn large(place: &Place, screen: &mut Screen) -> Result<Vec<Measured>, Failure> {
-    let fail = |source| Failure::Child { what: "make a large input".into(), source };
+fn large(place: &Place, say: &mut dyn FnMut(&str)) -> Result<Vec<Measured>, StudyError> {
+    let fail = |source| StudyError::Child { what: "make a large input".into(), source };
     let at = |name: &str| text(&place.at(name));
     let put = |name: &str, content: &str| write_text(&place.at(name), content);
     put("plant.toml", include_str!("../../../specs/machines/healthy.toml"))?;
@@ -106,7 +106,7 @@ fn large(place: &Place, screen: &mut Screen) -> Result<Vec<Measured>, Failure> {
         "spec.toml",
         &include_str!("../../../specs/limits/paper.toml").replace("../profiles/spiral.toml", "profile.toml"),
     )?;
-    let controller = nominal_controller().map_err(crate::StudyError::from)?;
+    let controller = nominal_controller()?;
     for points in [401, 5000, 50_000, 200_000] {
         put(&format!("s{points}.bod"), &sweep(points)?)?;
     }
@@ -178,7 +178,7 @@ fn large(place: &Place, screen: &mut Screen) -> Result<Vec<Measured>, Failure> {
     ];
     let mut all = Vec::new();
     for (what, words, before) in work {
-        screen.say(what);
+        say(what);
         let (code, seconds, peak_mb) = measure(&words.iter().map(String::as_str).collect::<Vec<_>>())?;
         all.push(Measured { what, code, seconds, peak_mb, before });
     }
@@ -208,8 +208,8 @@ impl Read for Rows {
 }
 
 /// Exit code, time (s) and peak memory (MB) of this program with these words; killed at the limit, with code -1.
-fn measure(words: &[&str]) -> Result<(i32, f64, f64), Failure> {
-    let fail = |source| Failure::Child { what: words.join(" "), source };
+fn measure(words: &[&str]) -> Result<(i32, f64, f64), StudyError> {
+    let fail = |source| StudyError::Child { what: words.join(" "), source };
     let begun = Instant::now();
     let mut child = program(words)?.stdout(Stdio::null()).spawn().map_err(fail)?;
     let status = format!("/proc/{}/status", child.id());

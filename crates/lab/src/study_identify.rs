@@ -2,11 +2,11 @@
 //!
 //! In: number of plants and conditions. Out: a table of figures that `servotune results` writes.
 
-use super::plants::{log_grid, measure, random_plant};
 use serde::Serialize;
 use servotune::identify::{Identified, IdentifyError, IdentifySettings, identify};
 use servotune::lti::{Body, FrequencyResponse, Mode, Plant};
 use servotune::numeric::random::Random;
+use servotune::twin::plants::{log_grid, measure, random_plant};
 use thiserror::Error;
 
 /// Conditions of the study.

@@ -19,7 +19,7 @@ impl NumberFormat {
     /// The number as text, ASCII only except for [`MISSING`].
     ///
     /// ```
-    /// use servotune::report::number::NumberFormat;
+    /// use servotune_report::number::NumberFormat;
     /// assert_eq!(NumberFormat::Significant(3).text(1234.4), "1234");
     /// assert_eq!(NumberFormat::Significant(3).text(0.0123449), "0.0123");
     /// assert_eq!(NumberFormat::Decimals(1).text(-0.04), "0.0");

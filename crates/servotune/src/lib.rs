@@ -55,14 +55,5 @@ pub mod pes;
 pub mod diagnose;
 pub mod tune;
 
-pub mod fleet;
 pub mod twin;
 pub mod verify;
-
-pub mod report;
-
-pub mod answer;
-
-pub mod study;
-
-pub mod cli;

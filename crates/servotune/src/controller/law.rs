@@ -6,6 +6,7 @@
 
 use super::{Controller, ControllerError};
 use crate::lti::{Section, step_chain};
+use crate::numeric::dense::least_squares;
 use nalgebra::{DMatrix, DVector};
 
 /// Samples from which the memory is found.
@@ -69,9 +70,7 @@ impl<'a> Law<'a> {
         if !columns.iter().chain(right.iter()).all(|x| x.is_finite()) {
             return memory;
         }
-        let svd = columns.svd(true, true);
-        let least = SEEN * svd.singular_values.max();
-        if let Ok(found) = svd.solve(&right, least) {
+        if let Some(found) = least_squares(&columns, &right, SEEN) {
             memory.iter_mut().flatten().zip(found.iter()).for_each(|(m, v)| *m = *v);
         }
         memory

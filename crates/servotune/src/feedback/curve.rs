@@ -20,6 +20,8 @@ pub struct ResponseCurve {
     ln_p: Vec<Complex<f64>>,
     /// Poles of the plant at rest: the model's, or from the slope of the first points, |P| then going on as w^-integrators.
     integrators: usize,
+    /// Slope of |P| over the first octave (ln over ln).
+    first_slope: f64,
     /// Poles of the plant outside the unit circle, as stated.
     outside: usize,
     /// What goes on outside the sweep, with the factors that join it to the first and to the last point.
@@ -60,6 +62,7 @@ impl ResponseCurve {
             ln_w,
             ln_p,
             integrators,
+            first_slope: slope,
             outside: frf.unstable_poles(),
             continuation: None,
         })
@@ -98,6 +101,13 @@ impl ResponseCurve {
     /// Poles at rest that the slope of the first points says.
     pub fn integrators(&self) -> usize {
         self.integrators
+    }
+
+    /// How much larger |P| can be at rest than at the first point: two real poles whose slopes add up to that of the first octave; without
+    /// bound where the slope is that of an integrator.
+    pub fn most_rise(&self) -> f64 {
+        let steep = (-self.first_slope).max(0.0);
+        if steep < 1.0 { 1.0 / (1.0 - steep).sqrt() } else { f64::INFINITY }
     }
 
     /// The curve on its own points.

@@ -24,6 +24,8 @@ pub struct MeasuredLoop<'a> {
     start_phase: f64,
     /// Poles of the plant outside the unit circle, as stated.
     outside: usize,
+    /// |L| at rest at most, as a share of |L| at the first point.
+    rest_share: f64,
 }
 
 /// A range.
@@ -78,6 +80,9 @@ pub struct MeasuredMargins {
     pub end_gain: f64,
 }
 
+/// Share of the first frequency at which sections without a pole at rest have their value at rest.
+const NEAR_REST: f64 = 1e-6;
+
 /// Two-sided 95 % of a normal, on one part of a complex value whose deviation is given for both parts together.
 const REACH: f64 = 1.96 * std::f64::consts::FRAC_1_SQRT_2;
 
@@ -105,13 +110,25 @@ impl<'a> MeasuredLoop<'a> {
             .collect();
         let outside = frf.unstable_poles();
         let start_phase = from_rest(phase[0] + PI * outside as f64);
-        Ok(MeasuredLoop { sections, curve, slack, start_phase, outside })
+        let first = ln_w[0].exp();
+        let rest_share = if section_poles(sections).0 == 0 {
+            curve.most_rise() * sections.at(NEAR_REST * first).norm() / sections.at(first).norm()
+        } else {
+            f64::INFINITY
+        };
+        Ok(MeasuredLoop { sections, curve, slack, start_phase, outside, rest_share })
     }
 
     /// Half width (95 %) of ln|L| and of arg L (rad) at a frequency of the band.
     fn slack_at(&self, w: f64) -> f64 {
         let i = self.curve.ln_w().partition_point(|k| *k <= w.ln());
         self.slack[i.saturating_sub(1).min(self.slack.len() - 1)]
+    }
+
+    /// Whether |L| at rest lies on a known side of 1: only then does the value at rest of an unstable plant, which is negative, tell its turn.
+    fn rest_known(&self) -> bool {
+        let first = self.at(self.ends().0).norm();
+        self.outside == 0 || first >= 1.0 || first * self.rest_share < 1.0
     }
 
     fn ends(&self) -> (f64, f64) {
@@ -194,6 +211,10 @@ impl OpenLoop for MeasuredLoop<'_> {
     }
 
     fn start_angle(&self, w: f64, value: Complex<f64>) -> f64 {
+        // Below 1 from rest on: 1 + L stays in the right half-plane up to here.
+        if value.norm().max(value.norm() * self.rest_share) < 1.0 {
+            return (1.0 + value).arg();
+        }
         // The plant's phase is known as far as its branch; each section's is followed from z = 1 on its own.
         let step = Complex::new(1.0, 0.0) - Complex::from_polar(1.0, -w * self.sections.sample_time_s);
         let back = Complex::from_polar(1.0, -w * self.sections.sample_time_s);
@@ -239,7 +260,7 @@ pub fn measured_margins(l: &MeasuredLoop<'_>) -> Result<MeasuredMargins, Feedbac
         closest = closest.min((distance - radius).max(0.0));
         farthest = farthest.min(distance + radius);
     }
-    let verdict = match (closest > 0.0, m.stable) {
+    let verdict = match (closest > 0.0 && l.rest_known(), m.stable) {
         (false, _) => LoopVerdict::NotKnown,
         (true, true) => LoopVerdict::Stable,
         (true, false) => LoopVerdict::Unstable,

@@ -30,8 +30,8 @@ pub enum FeedbackError {
     #[error("the plant is sampled at {plant_s} s and the controller runs at {controller_s} s: one clock is expected")]
     SampleTime { plant_s: f64, controller_s: f64 },
     /// The eigenvalue iteration did not end.
-    #[error("the poles of the closed loop, order {order}, were not found within {limit} iterations")]
-    Poles { order: usize, limit: usize },
+    #[error("the poles of the closed loop, order {order}, were not found: the eigenvalue iteration did not end")]
+    Poles { order: usize },
     /// The sweep and half the sample rate leave no band to judge.
     #[error("the sweep starts at {from_hz} Hz, at or above half the sample rate, {half_rate_hz} Hz")]
     Band { from_hz: f64, half_rate_hz: f64 },

@@ -2,16 +2,14 @@
 
 use super::{FeedbackError, Margins, ModelLoop, margins};
 use crate::lti::{DiscretePlant, Section};
-use nalgebra::{Complex, DMatrix, linalg::Schur};
-
-const ITERATIONS: usize = 10_000;
+use crate::numeric::dense::eigenvalues;
+use nalgebra::{Complex, DMatrix};
 
 /// The poles in z of plant, delay line and sections under negative feedback, by decreasing size.
 pub fn closed_loop_poles(l: &ModelLoop<'_>) -> Result<Vec<Complex<f64>>, FeedbackError> {
     let a = closed_loop_matrix(l.plant(), &l.sections().chain);
     let order = a.nrows();
-    let schur = Schur::try_new(a, f64::EPSILON, ITERATIONS).ok_or(FeedbackError::Poles { order, limit: ITERATIONS })?;
-    let mut poles: Vec<Complex<f64>> = schur.complex_eigenvalues().iter().copied().collect();
+    let mut poles = eigenvalues(&a).ok_or(FeedbackError::Poles { order })?;
     poles.sort_by(|a, b| b.norm().total_cmp(&a.norm()).then(b.im.total_cmp(&a.im)));
     Ok(poles)
 }

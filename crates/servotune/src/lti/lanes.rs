@@ -18,7 +18,7 @@ pub struct LaneChunk {
     pub input: [[f64; CHUNK]; 2],
 }
 
-/// A plant from rest: y[k] = Σ re over all rows + `direct` u[k-D-1].
+/// A plant from rest: `y[k] = Σ re over all rows + direct u[k-D-1]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantLanes {
     /// The rows.

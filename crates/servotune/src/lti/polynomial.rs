@@ -6,13 +6,13 @@
 
 use super::rational::{conjugate, worst_on_grid};
 use super::{LtiError, Rational};
-use nalgebra::linalg::{Schur, balancing};
+use crate::numeric::dense;
+use nalgebra::linalg::balancing;
 use nalgebra::{Complex, DMatrix};
 
 /// Largest relative error of the response that a change of form may make.
 pub(super) const SAME: f64 = 1e-6;
-/// Iterations of the eigenvalues and of Aberth's method.
-pub(super) const ITERATIONS: usize = 10_000;
+/// Iterations of Aberth's method.
 const ROUNDS: usize = 50;
 
 impl Rational {
@@ -105,13 +105,12 @@ pub(super) fn eigenvalues(mut m: DMatrix<f64>) -> Result<Vec<Complex<f64>>, LtiE
     }
     m /= scale;
     balancing::balance_parlett_reinsch(&mut m);
-    let schur = Schur::try_new(m, f64::EPSILON, ITERATIONS);
     let none = || LtiError::Range {
         key: "plant: order of the eigenvalue problem".into(),
         found: order as f64,
         expected: "one whose iteration ends",
     };
-    Ok(schur.ok_or_else(none)?.complex_eigenvalues().iter().map(|x| x * scale).collect())
+    Ok(dense::eigenvalues(&m).ok_or_else(none)?.into_iter().map(|x| x * scale).collect())
 }
 
 /// Aberth's simultaneous Newton steps, kept to those that rounding does not drown.

@@ -4,6 +4,7 @@
 //! Columns are scaled to length 1 before the factorisation, so that the condition number does not depend on units
 //! (van der Sluis, Numer. Math. 14, 1969). Sources: Golub & Van Loan, Matrix Computations, ch. 5.
 
+use super::dense::singular_values;
 use super::wide::wide;
 use nalgebra::DMatrix;
 
@@ -146,8 +147,12 @@ impl Qr {
         let kept: Vec<usize> = (0..self.cols).filter(|&j| self.diagonal[j] != 0.0).collect();
         let (rows, n) = (self.cols, kept.len());
         let r = DMatrix::from_fn(rows, n, |i, j| if i <= kept[j] { self.r(i, kept[j]) } else { 0.0 });
-        let s = r.singular_values();
-        if n == 0 { 1.0 } else { s.max() / s.min() }
+        match singular_values(&r).as_deref() {
+            Some([largest, .., smallest]) => largest / smallest,
+            // One column, of length 1, or none.
+            Some(_) => 1.0,
+            None => f64::INFINITY,
+        }
     }
 
     /// The least-squares solution of A x = b for the factorised A; b becomes Qᵀ b.

@@ -5,6 +5,7 @@
 //! (Forsythe, J. SIAM 5, 1957; Brubeck, Nakatsukasa & Trefethen, SIAM Review 63, 2021); roots are eigenvalues of the
 //! confederate matrix of that process.
 
+use super::dense::eigenvalues;
 use nalgebra::{Complex, DMatrix};
 
 /// Polynomials φ0..φn with real coefficients, orthonormal under Re Σ v² conj(p) q over s = j w.
@@ -79,7 +80,7 @@ impl AxisBasis {
         for i in 0..n {
             m[(i, n - 1)] -= factor * c[i];
         }
-        m.complex_eigenvalues().iter().copied().collect()
+        eigenvalues(&m).unwrap_or_default()
     }
 }
 

@@ -150,7 +150,7 @@ mod tests {
     use std::path::Path;
 
     fn file(name: &str) -> String {
-        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("specs").join(name)).unwrap()
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs").join(name)).unwrap()
     }
 
     fn plant() -> Plant {

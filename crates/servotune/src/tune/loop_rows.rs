@@ -47,6 +47,8 @@ impl Row {
 const FAR: f64 = 0.5;
 /// Violation of a crossover that does not exist.
 const NOTHING: f64 = 1.0;
+/// Weight of a crossing far from the range: where nothing meets every limit, the edge of the range may give, a crossing decades away may not.
+const FAR_CROSSING: f64 = 10.0;
 /// Phase margins this close (deg) may change places between the grid and the exact judgement.
 const TIE_DEG: f64 = 0.5;
 
@@ -240,7 +242,7 @@ fn crossover_rows(
         // The first point of the loop is an end of its own; the edge of the range stands among the places.
         if g >= a && g >= b && before != i {
             let ln = 0.5 * refined([a.ln(), g.ln(), b.ln()]);
-            put(grid[i], ln + GRAZE, real(sign));
+            put(grid[i], FAR_CROSSING * (ln + GRAZE), real(FAR_CROSSING * sign));
         }
     }
     if w.side == Side::AtMost && on.quick.gain_crossings.is_empty() {

@@ -7,6 +7,5 @@ pub mod line;
 mod machines;
 pub mod plants;
 pub mod recording;
-pub mod study_identify;
 
 pub use machines::{MachineClass, TwinError, nominal_controller, paper_machine, paper_profile};

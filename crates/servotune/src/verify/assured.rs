@@ -65,8 +65,8 @@ pub struct Assured {
     pub outcome: Outcome,
     /// The table.
     pub table: GainTable,
-    /// Its certificate; none where the limits are missed, and the reason where nothing can be proved.
-    pub certificate: Option<Result<Certificate, String>>,
+    /// Its certificate, that of a compromise included; the reason where nothing can be proved.
+    pub certificate: Result<Certificate, String>,
     /// Tunings.
     pub rounds: usize,
 }
@@ -109,11 +109,10 @@ pub fn tune_assured(
         let table = GainTable::of_first(&outcome, spec.search.seed, sha256, inputs)?.in_units(job.units.0, job.units.1);
         if outcome.tuned().is_none() || (best.is_some() && !matches!(outcome, Outcome::Tuned(_))) {
             // That much room is not to be had: the table before stands, with what is proved of it.
-            return Ok(best.unwrap_or(Assured { outcome, table, certificate: None, rounds: round }));
+            return Ok(best.unwrap_or_else(|| assured(job, outcome, table, round)));
         }
-        let certificate = prove(job, &table);
-        let now = Assured { outcome, table, certificate: Some(certificate.map_err(|e| e.to_string())), rounds: round };
-        let Some(Ok(c)) = &now.certificate else { return Ok(now) };
+        let now = assured(job, outcome, table, round);
+        let Ok(c) = &now.certificate else { return Ok(now) };
         let (lacking, grown) = room(c, &wanted, spec.guard, &mut spec.further_room);
         if c.proved || !grown {
             return Ok(if c.proved { now } else { better(best, now) });
@@ -131,13 +130,18 @@ pub fn tune_assured(
 /// The table with fewer limits left open; of equals the later one.
 fn better(before: Option<Assured>, now: Assured) -> Assured {
     let open = |a: &Assured| match &a.certificate {
-        Some(Ok(c)) => c.cases.iter().flat_map(|c| &c.limits).filter(|l| l.verdict != Verdict::Proved).count(),
-        _ => usize::MAX,
+        Ok(c) => c.cases.iter().flat_map(|c| &c.limits).filter(|l| l.verdict != Verdict::Proved).count(),
+        Err(_) => usize::MAX,
     };
     match before {
         Some(b) if open(&b) < open(&now) => b,
         _ => now,
     }
+}
+
+fn assured(job: &Assurance<'_>, outcome: Outcome, table: GainTable, rounds: usize) -> Assured {
+    let certificate = prove(job, &table).map_err(|e| e.to_string());
+    Assured { outcome, table, certificate, rounds }
 }
 
 /// The certificate of a table that lies in no file yet.
