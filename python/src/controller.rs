@@ -5,9 +5,9 @@ use crate::refusal::{raise, unwritable};
 use crate::settings::named;
 use numpy::{Complex64, IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use servotune_answer::AnswerError;
 use servotune::controller;
 use servotune::lti::FrequencyResponse;
+use servotune_answer::AnswerError;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 

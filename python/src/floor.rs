@@ -3,11 +3,11 @@
 use crate::refusal::{ServotuneError, raise};
 use pyo3::prelude::*;
 use servotune_answer::{AnswerError, FloorFiles, floor_files};
+use servotune_fleet::TwinSource;
 use servotune_fleet::{
     Context, Effort, FileSource, Fleet, FleetError, Hand, Job, SlotSource, Spread, Stage, Stamp, Store, Verdict, Watch,
     Worker,
 };
-use servotune_fleet::TwinSource;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;

@@ -7,8 +7,8 @@ use crate::settings::named;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use servotune_answer::classified;
 use servotune::gate::{self, Table, TrainSettings};
+use servotune_answer::classified;
 use servotune_report::confusion::{Part, confusion};
 use std::path::{Path, PathBuf};
 

@@ -7,8 +7,8 @@ use crate::picture;
 use crate::plant::Plant;
 use crate::refusal::raise;
 use pyo3::prelude::*;
-use servotune_answer::{AnswerError, ModelMargins, Named, model_margins};
 use servotune::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
+use servotune_answer::{AnswerError, ModelMargins, Named, model_margins};
 use std::sync::Arc;
 
 /// Margins of a plant model's loop; amplitudes (position_unit) matter to physics only.

@@ -5,12 +5,10 @@
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
-use servotune_answer::AnswerError;
 use servotune::controller::ControllerError;
 use servotune::diagnose::DiagnoseError;
 use servotune::document::DocumentError;
 use servotune::feedback::FeedbackError;
-use servotune_fleet::FleetError;
 use servotune::frf::{FrfError, FrfShapeError};
 use servotune::gate::GateError;
 use servotune::identify::IdentifyError;
@@ -18,9 +16,11 @@ use servotune::lti::LtiError;
 use servotune::pes::PesError;
 use servotune::physics::PhysicsError;
 use servotune::recording::RecordingError;
-use servotune_report::ReportError;
 use servotune::tune::{GainTableError, SpecError, TuneError};
 use servotune::verify::VerifyError;
+use servotune_answer::AnswerError;
+use servotune_fleet::FleetError;
+use servotune_report::ReportError;
 use std::error::Error;
 
 create_exception!(servotune, ServotuneError, PyException, "What servotune refuses; a subclass for each part of it.");

@@ -10,17 +10,17 @@ use crate::settings::{model, uncertainty};
 use crate::spec::Spec;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use servotune_answer::{
-    AnswerError, Asked, Given, Named, Proof, Reached, TunedDocument, given_model, given_sweep, tuned,
-};
 use servotune::document::sha256_hex;
 use servotune::feedback::{Margins, MeasuredLoop, ModelLoop, confirmed_margins, margins};
 use servotune::frf::Sweep;
 use servotune::identify::IdentifySettings;
 use servotune::lti::DiscretePlant;
-use servotune_report::ReportError;
 use servotune::tune::{Hold, InputDigest, TuneSettings, sample_time_s};
 use servotune::verify::Uncertainty;
+use servotune_answer::{
+    AnswerError, Asked, Given, Named, Proof, Reached, TunedDocument, given_model, given_sweep, tuned,
+};
+use servotune_report::ReportError;
 use std::path::Path;
 
 /// What a tuning came to, beside its document.

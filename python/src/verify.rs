@@ -9,8 +9,8 @@ use crate::spec::Spec;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use servotune::frf::Sweep;
-use servotune_report::certificate::certificate_text;
 use servotune::verify::{Inputs, Source, SweepAssumption, VerifySettings, Word, certify};
+use servotune_report::certificate::certificate_text;
 
 /// The certificate of the gain table in a text, on plants and sweeps that must all pass, and what it says in words.
 #[pyfunction]
