@@ -21,7 +21,7 @@ def read(path: Path) -> str:
     from servotune._core import DocumentRefused
 
     try:
-        return path.read_text(encoding="utf-8", newline="")
+        return path.read_bytes().decode("utf-8")
     except OSError as e:
         raise DocumentRefused(f"{path}: cannot read: {e.strerror}; expected a text file") from e
     except UnicodeDecodeError as e:
