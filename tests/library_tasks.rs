@@ -1,0 +1,17 @@
+//! The library's examples run from top to bottom; each ends with an error where its own check fails.
+#![allow(missing_docs)]
+
+#[path = "../crates/servotune/examples/sweep_to_margins.rs"]
+mod sweep_to_margins;
+#[path = "../crates/servotune/examples/tune_and_verify.rs"]
+mod tune_and_verify;
+
+#[test]
+fn a_sweep_to_margins() {
+    sweep_to_margins::main().unwrap_or_else(|e| panic!("{e}"));
+}
+
+#[test]
+fn a_table_tuned_and_verified() {
+    tune_and_verify::main().unwrap_or_else(|e| panic!("{e}"));
+}
