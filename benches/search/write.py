@@ -145,6 +145,21 @@ class Scene:
             cov = a @ cov @ a.T + q
         return total / (self.count - self.first)
 
+    def noisy_peak(self, law: Law) -> float:
+        """Least peak of the command that its noise alone can be expected to reach: four fifths of sqrt(2 ln n) standard deviations at the end."""
+        p, c = self.profile, close(self.s, law.rows())
+        n, keep = len(c.a), np.exp(-2 * np.pi * p.corner_hz * self.s.t)
+        a, b = np.zeros((n + 1, n + 1)), np.append(p.encoder * c.b_r, 0.0)
+        a[:n, :n], a[:n, n], a[n, n] = c.a, p.windage * c.b_w, keep
+        q = np.outer(b, b)
+        q[n, n] = 1 - keep**2
+        cov = np.zeros((n + 1, n + 1))
+        cov[n, n] = 1.0
+        for _ in range(self.steps):
+            cov = a @ cov @ a.T + q
+        deviation = np.sqrt(c.k @ cov[:n, :n] @ c.k + (c.d * p.encoder) ** 2)
+        return float(0.8 * np.sqrt(2 * np.log(max(len(self.r), 2))) * deviation)
+
     def noise_power(self, law: Law, bins: np.ndarray) -> np.ndarray:
         """Expected |X_k|^2/N^2 of the noise for these k: one backward recursion gives every draw's share."""
         p, c, n = self.profile, close(self.s, law.rows()), self.count - self.first

@@ -20,6 +20,9 @@ pub struct Crossing {
 /// Relative width in frequency to which a crossing is refined; the value then errs by less than 1e-10 of the slope.
 const TOLERANCE: f64 = 1e-13;
 
+/// Step in frequency (relative) for the side to which a level goes.
+const NEXT: f64 = 1e-6;
+
 /// All frequencies (rad/s) at which `level(L)` changes its sign, pairs between two points included: a dip of the level is looked into where
 /// it is no higher than `reach(L)`, what the level can change by between two points of a trace.
 pub(super) fn sign_changes(
@@ -34,21 +37,20 @@ pub(super) fn sign_changes(
     let root = |a: f64, fa: f64, b: f64, fb: f64| bracketed_root(f, a, fa, b, fb, TOLERANCE * b);
     let mut found = Vec::new();
     for i in 1..g.len() {
-        if g[i - 1] == 0.0 {
-            found.push(w[i - 1]);
-        } else if g[i - 1] * g[i] < 0.0 {
-            found.push(root(w[i - 1], g[i - 1], w[i], g[i]));
-        }
-        // A bump of the same sign that may reach through zero between the points.
-        if i + 1 < g.len() && g[i - 1] * g[i] > 0.0 && g[i] * g[i + 1] > 0.0 {
-            let s = g[i].signum();
-            let (a, m, b) = (s * g[i - 1], s * g[i], s * g[i + 1]);
-            if m <= a && m <= b && m < reach(trace.value[i]) {
-                let dip = golden_section(|x| s * f(x), w[i - 1], w[i + 1], 1e-12 * w[i]);
-                let (x, y) = (dip.x, dip.value);
-                if y < 0.0 {
-                    found.push(root(w[i - 1], g[i - 1], x, s * y));
-                    found.push(root(x, s * y, w[i + 1], g[i + 1]));
+        let ([a, b], [from, to]) = ([g[i - 1], g[i]], [w[i - 1], w[i]]);
+        if a == 0.0 {
+            found.push(from);
+        } else if a * b < 0.0 {
+            found.push(root(from, a, to, b));
+        } else if a.abs().min(b.abs()) < reach(trace.value[i - 1]).max(reach(trace.value[i])) {
+            // The level may reach through zero and back between the points: where it goes towards zero at the one and away from it at the other.
+            let s = b.signum();
+            let (falls, rises) = (s * (f(from * (1.0 + NEXT)) - a) < 0.0, s * (b - f(to * (1.0 - NEXT))) > 0.0);
+            if falls && rises {
+                let dip = golden_section(|x| s * f(x), from, to, 1e-12 * from);
+                if dip.value < 0.0 {
+                    found.push(root(from, a, dip.x, s * dip.value));
+                    found.push(root(dip.x, s * dip.value, to, b));
                 }
             }
         }

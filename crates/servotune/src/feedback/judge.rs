@@ -55,8 +55,13 @@ impl SampledPlant {
             }
         }
         // Only crossings that may be the worst, or nearly, are worth their refinement; likewise dips.
-        let least = passes.iter().map(|(_, g)| g.abs()).fold(f64::INFINITY, f64::min);
-        for (i, _) in passes.iter().filter(|(_, g)| g.abs() <= least + NEARLY) {
+        let smallest = |which: &dyn Fn(f64) -> bool| {
+            passes.iter().map(|(_, g)| *g).filter(|g| which(*g)).fold(f64::INFINITY, |least, g| g.abs().min(least))
+        };
+        // Positive margins (|L| < 1) on their own as well: a search weighs the others against the smallest of them.
+        let (least, positive) = (smallest(&|_| true), smallest(&|g| g < 0.0));
+        let worth = |g: f64| g.abs() <= least + NEARLY || g < 0.0 && -g <= positive + NEARLY;
+        for (i, _) in passes.iter().filter(|(_, g)| worth(*g)) {
             quick.phase_crossings.extend(self.phase_event(chain, on, *i));
         }
         let ends = [on.distance[0], on.distance[n - 1]];

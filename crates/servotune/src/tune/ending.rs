@@ -8,10 +8,13 @@ use super::outcome::{AtBound, Infeasible, Reached, RelaxedLimit, Work};
 use super::requirements::{Found, MET, Requirement};
 use super::search::refine;
 use super::tuning::judged;
-use super::{Judged, JudgedLimit, Machine, Proof, Side, Spec, TuneError, TuningProblem};
+use super::{Judged, JudgedLimit, Machine, Minimise, Proof, Side, Spec, TuneError, TuningProblem};
+use std::f64::consts::TAU;
 
 /// Rounds of back-off: each removes the whole difference between quick and exact figures, to second order.
-const BACK_OFFS: usize = 5;
+const BACK_OFFS: usize = 8;
+/// Miss of an aim (share of the limit) from which on the limits are in conflict there.
+const CONFLICT: f64 = 1e-3;
 /// How far beyond a miss the next polish aims.
 const BEYOND: f64 = 1.2;
 /// Violations within this share of the largest belong to the same conflict.
@@ -34,7 +37,7 @@ pub(super) struct Ending<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct Settled {
     pub x: Vec<f64>,
-    /// ln of the objective, as the search scores it.
+    /// ln of the objective, as the search scores it; of the bandwidth by the exact judgement.
     pub objective: f64,
     /// Largest violation of a limit with its guard, by the exact judgement.
     pub worst: f64,
@@ -57,9 +60,14 @@ impl<'a> Ending<'a> {
         loop {
             let controller = problem.parameters.controller(&x);
             let score = problem.score(&x, &mut work);
-            let (mut worst, mut moved) = (f64::NEG_INFINITY, false);
+            let (mut worst, mut moved, mut objective) = (f64::NEG_INFINITY, false, score.objective);
             for (i, (machine, inside)) in self.machines.iter().zip(&mut inside).enumerate() {
-                let (_, exact) = judge_loop(machine, &controller, self.spec)?;
+                let (margins, exact) = judge_loop(machine, &controller, self.spec)?;
+                if problem.minimise == Minimise::Bandwidth {
+                    // |L| may dip to 1 between two points of the grid, below what that takes for the lowest crossing.
+                    let lowest = margins.gain_crossings.iter().map(|c| c.hz).fold(f64::INFINITY, f64::min);
+                    objective = objective.max(-(TAU * lowest).ln());
+                }
                 if exact.unstable_poles != 0 {
                     worst = f64::INFINITY;
                     continue;
@@ -88,16 +96,16 @@ impl<'a> Ending<'a> {
             let passes = worst <= MET;
             if passes || !moved || round > BACK_OFFS {
                 self.evaluations += work.evaluations;
-                return Ok(Settled { x, objective: score.objective, worst, passes });
+                return Ok(Settled { x, objective, worst, passes });
             }
             self.back_offs += 1;
             problem.aim(&inside);
             match refine(problem, &x, self.steps, &mut work) {
-                // A miss that the search cannot undo is a conflict, not an error of the grid.
-                Some(p) if p.score.violation <= 0.0 => x = p.x,
+                // What a polish leaves missing of its aim, the next aim lies further inside by; a large miss is a conflict, not an error of the grid.
+                Some(p) if p.score.violation < CONFLICT => x = p.x,
                 _ => {
                     self.evaluations += work.evaluations;
-                    return Ok(Settled { x, objective: score.objective, worst, passes: false });
+                    return Ok(Settled { x, objective, worst, passes: false });
                 }
             }
         }

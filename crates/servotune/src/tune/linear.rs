@@ -78,12 +78,17 @@ pub(super) fn linearise(problem: &TuningProblem, x: &[f64], work: &mut TuningWor
             })
             .collect();
         m.record_slopes(controller, chain, &slopes, &problem.asked, &problem.aimed[number].wanted, &wanted, b);
+        let pulled = |by: Complex<f64>, w_rad_s: f64| -> Vec<f64> {
+            let back = Complex::from_polar(1.0, -w_rad_s * m.sampled.sample_time_s());
+            slopes.iter().map(|s| (by * s.pull(&chain[s.section], back)).re).collect()
+        };
         for r in linear_rows.iter_mut().filter(|r| r.row.machine == number) {
             r.gradient = match r.row.moves {
                 Moves::Record { figure, share } => b.slopes[figure].iter().map(|d| share * d).collect(),
-                Moves::Loop(by) => {
-                    let back = Complex::from_polar(1.0, -r.row.w_rad_s * m.sampled.sample_time_s());
-                    slopes.iter().map(|s| (by * s.pull(&chain[s.section], back)).re).collect()
+                Moves::Loop(by) => pulled(by, r.row.w_rad_s),
+                Moves::Pair { own, other_rad_s, other } => {
+                    let pairs = pulled(own, r.row.w_rad_s).into_iter().zip(pulled(other, other_rad_s));
+                    pairs.map(|(a, b)| a + b).collect()
                 }
             };
         }

@@ -4,10 +4,9 @@
 //! d violation = Re(pull_by d ln C): margins are analytic in the gains. Limits on where |L| may cross 1 are read as limits on |L| itself
 //! (at least 1 below the range, at most 1 above it), which moves steadily where crossings appear and vanish. Spec: `specs/tuning.md`.
 
+use super::margin_rows::margin_rows;
 use super::requirements::{Requirement, Side, What};
-use crate::feedback::{
-    BANDWIDTH_LEVEL, CurveLimit, CurveSide, Event, GRAZE, Graze, LoopOnGrid, Magnitude, QuickMargins, SampledPlant,
-};
+use crate::feedback::{BANDWIDTH_LEVEL, CurveLimit, CurveSide, GRAZE, LoopOnGrid, Magnitude, SampledPlant};
 use crate::lti::Section;
 use nalgebra::Complex;
 use std::f64::consts::{LOG10_E, TAU};
@@ -30,6 +29,8 @@ pub(super) struct Row {
 pub(super) enum Moves {
     /// d value = Re(this d ln C) at the row's frequency.
     Loop(Complex<f64>),
+    /// The same, and as much again by another place of the curve (rad/s).
+    Pair { own: Complex<f64>, other_rad_s: f64, other: Complex<f64> },
     /// This share of the slope of a figure of a record.
     Record { figure: usize, share: f64 },
 }
@@ -44,13 +45,11 @@ impl Row {
 }
 
 /// Rows this far inside their limit (share) cannot decide a step of the search and are left out.
-const FAR: f64 = 0.5;
+pub(super) const FAR: f64 = 0.5;
 /// Violation of a crossover that does not exist.
 const NOTHING: f64 = 1.0;
 /// Weight of a crossing far from the range: where nothing meets every limit, the edge of the range may give, a crossing decades away may not.
 const FAR_CROSSING: f64 = 10.0;
-/// Phase margins this close (deg) may change places between the grid and the exact judgement.
-const TIE_DEG: f64 = 0.5;
 
 /// A frequency at which a limit begins or ends, with the plant there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,24 +119,17 @@ pub(super) fn loop_rows(
     rows: &mut Vec<Row>,
 ) {
     for (wanted, w) in l.aimed.iter().enumerate() {
+        let q = &on.quick;
+        if matches!(w.what, What::PhaseMargin | What::GainMargin) {
+            margin_rows(l.machine, wanted, w, q, rows);
+            continue;
+        }
         let mut put = |w_rad_s: f64, value: f64, pull_by: Complex<f64>| {
             if value > -FAR {
                 rows.push(Row { machine: l.machine, wanted, w_rad_s, value, moves: Moves::Loop(pull_by) });
             }
         };
-        let q = &on.quick;
         match w.what {
-            What::PhaseMargin => {
-                let named = q.worst_gain_crossing().map(|e| e.value);
-                q.gain_crossings.iter().for_each(|e| put_margin(w, e, named, &mut put));
-                for g in harmful_grazes(q, w) {
-                    put(g.event.w_rad_s, graze_violation(g), real(if g.minimum { -1.0 } else { 1.0 }));
-                }
-            }
-            What::GainMargin => {
-                let named = q.worst_phase_crossing().map(|e| e.value);
-                q.phase_crossings.iter().for_each(|e| put_margin(w, e, named, &mut put));
-            }
             What::MaxSensitivity => {
                 for e in &q.dips {
                     let one_plus = 1.0 + e.l;
@@ -178,40 +170,13 @@ pub(super) fn loop_rows(
     }
 }
 
-fn real(x: f64) -> Complex<f64> {
+pub(super) fn real(x: f64) -> Complex<f64> {
     Complex::new(x, 0.0)
 }
 
 /// 1 where |L| begins above 1, as with every integrator; -1 where it begins below.
 fn begins_above(on: &LoopOnGrid) -> f64 {
     if on.re[0] * on.re[0] + on.im[0] * on.im[0] >= 1.0 { 1.0 } else { -1.0 }
-}
-
-/// A phase or gain margin at one crossing. One on the other side of -1 keeps its distance by its absolute value, unless it is the one named.
-fn put_margin(w: &Requirement, e: &Event, named: Option<f64>, put: &mut impl FnMut(f64, f64, Complex<f64>)) {
-    // Near a slope of 0 the event has no speed of its own worth following.
-    let ratio = |a: f64, b: f64| if b.abs() > 1e-6 { a / b } else { 0.0 };
-    let (re, im) = (e.slope.re, e.slope.im);
-    let change = match w.what {
-        What::PhaseMargin => Complex::new(-ratio(im, re), -1.0) * 1f64.to_degrees(),
-        _ => Complex::new(1.0, ratio(re, im)) * (-20.0 * LOG10_E),
-    };
-    let signed = named == Some(e.value);
-    let value = if signed { e.value } else { e.value.abs() };
-    let sign = if !signed && e.value < 0.0 { -1.0 } else { 1.0 };
-    put(e.w_rad_s, w.violation(value), change * (-sign / w.limit));
-}
-
-/// Grazes that would be named, and would miss this limit, if they were crossings.
-fn harmful_grazes<'a>(q: &'a QuickMargins, w: &'a Requirement) -> impl Iterator<Item = &'a Graze> {
-    let least = q.gain_crossings.iter().map(|e| e.value.abs()).fold(f64::INFINITY, f64::min);
-    q.grazes.iter().filter(move |g| w.violation(g.event.value.abs()) > 0.0 && g.event.value.abs() <= least + TIE_DEG)
-}
-
-/// How far |L| has come into the forbidden zone around 1 (ln).
-fn graze_violation(g: &Graze) -> f64 {
-    let away = g.event.l.norm().ln();
-    GRAZE - if g.minimum { away } else { -away }
 }
 
 /// Dips of |L| to 1 below the range, humps above it.

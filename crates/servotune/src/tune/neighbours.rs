@@ -4,26 +4,27 @@
 //! end, or shakes every number; its polish ends in the next optimum. Each neighbour has random numbers of its own, and the best are taken by merit
 //! and then by index, so the result has the same bytes for any number of threads.
 
+use super::placement::{notches, placed, refine_placed};
 use super::polish::Polished;
-use super::search::{DRAWN, Effort, Found, best_of, fresh, order, refine, simplex, walk_back};
+use super::search::{DRAWN, Effort, Found, best_of, fresh, order, simplex, walk_back};
 use super::starts::further;
-use super::{Parameter, TuningProblem};
+use super::{Parameter, TuningProblem, TuningWork};
 use crate::numeric::random::Random;
 use rayon::prelude::*;
 
 /// The error of the search's figures for a candidate and its objective, as a share.
 pub(super) type Exact<'a> = dyn Fn(&[f64], f64) -> f64 + 'a;
 
-/// Neighbours a round, and a further one for each notch.
+/// Tries a round, and further ones for each notch.
 const TRIES: usize = 12;
+const TRIES_A_NOTCH: usize = 4;
 /// Rounds without a better end after which it is over, where the best has repeated and where it has not.
-const PATIENCE: usize = 2;
+const PATIENCE: usize = 4;
 const LONG_PATIENCE: usize = 6;
 /// The same while no end meets the limits.
-const HOPELESS_PATIENCE: usize = 3;
-/// Polishes that must have ended at the best before it counts as repeated, and the share of the first round's that may end the search at once.
+const HOPELESS_PATIENCE: usize = 2;
+/// Polishes that must have ended at the best before it counts as repeated.
 const REPEATS: usize = 4;
-const SHARE: f64 = 0.3;
 /// Ends whose neighbours are tried.
 const PARENTS: usize = 8;
 /// Ends whose marks are closer than this (ln of a parameter) count as one.
@@ -43,14 +44,13 @@ pub(super) fn improve(problem: &TuningProblem, found: &mut Found, effort: &Effor
     let mut waited = 0;
     let mut judged = Judged::default();
     judged.parents(problem, &mut found.ends, exact);
-    let tries = TRIES + TRIES * problem.parameters().free().iter().filter_map(notch).fold(0, |n, f| n.max(f + 1));
+    let tries = TRIES + TRIES_A_NOTCH * notches(problem).len();
     for round in 0..effort.rounds {
         let parents = judged.parents(problem, &mut found.ends, exact);
         let Some(best) = parents.first().map(|p| p.score) else { break };
         let repeated = found.at_best(BETTER);
-        let settled = repeated >= REPEATS && repeated as f64 >= SHARE * found.starts as f64;
-        let patience = if best.violation > 0.0 { HOPELESS_PATIENCE } else { LONG_PATIENCE };
-        if round == 0 && settled || waited >= patience || repeated >= REPEATS && waited >= PATIENCE {
+        let patience = if !best.meets() { HOPELESS_PATIENCE } else { LONG_PATIENCE };
+        if waited >= patience || repeated >= REPEATS && waited >= PATIENCE {
             break;
         }
         let ends: Vec<(Option<Polished>, usize)> = (0..tries)
@@ -63,16 +63,19 @@ pub(super) fn improve(problem: &TuningProblem, found: &mut Found, effort: &Effor
                     let drawn = (0..DRAWN).map(|_| further(problem, &mut random)).collect();
                     let x = best_of(problem, drawn, &mut work).unwrap_or_else(|| parents[0].x.clone());
                     let x = simplex(problem, x, effort.simplex_steps, &mut work);
-                    return (fresh(refine(problem, &x, effort.polish_steps, &mut work)), work.evaluations);
+                    let end = refine_placed(problem, &x, effort.polish_steps, Some(&best), &mut random, &mut work);
+                    return (fresh(end), work.evaluations);
                 }
-                let x = walk_back(problem, neighbour(problem, &parents, i / 2, &mut random), &mut work);
-                (refine(problem, &x, effort.polish_steps, &mut work), work.evaluations)
+                let x = neighbour(problem, &parents, i / 2, &mut random, &mut work);
+                let x = walk_back(problem, x, &mut work);
+                let end = refine_placed(problem, &x, effort.polish_steps, Some(&best), &mut random, &mut work);
+                (end, work.evaluations)
             })
             .collect();
         ends.into_iter().for_each(|end| found.take(end));
         found.ends.sort_by(|a, b| order(&a.score, &b.score));
         let now = judged.parents(problem, &mut found.ends, exact).first().map(|p| p.score);
-        let better = now.is_some_and(|now| match (best.violation > 0.0, now.violation > 0.0) {
+        let better = now.is_some_and(|now| match (!best.meets(), !now.meets()) {
             (true, true) => best.violation - now.violation > BETTER,
             (true, false) => true,
             _ => best.objective - now.objective > BETTER,
@@ -106,7 +109,7 @@ impl Judged {
             }
             if !self.sound.contains(&end.x) {
                 // An end that misses limits on the grid as well is no error of the grid.
-                if end.score.violation <= 0.0 && exact(&end.x, end.score.objective) > FALSE {
+                if end.score.meets() && exact(&end.x, end.score.objective) > FALSE {
                     self.refused.push(ends.remove(i));
                     continue;
                 }
@@ -144,28 +147,25 @@ fn mark(problem: &TuningProblem, x: &[f64]) -> Vec<f64> {
 }
 
 /// A neighbour of one of the parents; the better ones have more of them.
-fn neighbour(problem: &TuningProblem, parents: &[Polished], i: usize, random: &mut Random) -> Vec<f64> {
+fn neighbour(
+    problem: &TuningProblem,
+    parents: &[Polished],
+    i: usize,
+    random: &mut Random,
+    work: &mut TuningWork,
+) -> Vec<f64> {
     let p = problem.parameters();
     let share = random.uniform();
     let parent = ((share * share) * parents.len() as f64) as usize;
     let mut x = parents[parent.min(parents.len() - 1)].x.clone();
     let other = &parents[((random.uniform() * parents.len() as f64) as usize).min(parents.len() - 1)].x;
-    let filters: Vec<usize> = p.free().iter().filter_map(notch).fold(Vec::new(), |mut all, f| {
-        if !all.contains(&f) {
-            all.push(f);
-        }
-        all
-    });
+    let filters = notches(problem);
     let pick = |random: &mut Random| filters.get((random.uniform() * filters.len() as f64) as usize).copied();
     match i % 4 {
-        // One notch anywhere.
+        // One notch where it pays.
         0 => {
-            let chosen = pick(random);
-            for (j, [from, to]) in p.bounds().iter().enumerate() {
-                if chosen.is_some() && notch(&p.free()[j]) == chosen {
-                    x[j] = from + (to - from) * random.uniform();
-                }
-            }
+            let laid = pick(random).and_then(|filter| placed(problem, &x, filter, random, work));
+            x = laid.unwrap_or(x);
         }
         // One notch from another end.
         1 => {

@@ -5,7 +5,7 @@
 
 use super::linear::{Linear, linearise};
 use super::loop_rows::Row;
-use super::problem::UNSTABLE;
+use super::problem::{INSIDE, UNSTABLE};
 use super::quadratic::Quadratic;
 use super::{Score, TuningProblem, TuningWork};
 
@@ -71,11 +71,15 @@ pub(super) fn polish(
         Goal::Reach => s.violation.max(0.0),
         Goal::Room => s.violation,
     };
-    let worthless = if goal == Goal::Room { ROOM_WORTHLESS } else { WORTHLESS };
+    let worthless = match goal {
+        Goal::Best => WORTHLESS,
+        Goal::Reach => 0.1 * INSIDE,
+        Goal::Room => ROOM_WORTHLESS,
+    };
     let mut taken = 0;
     let mut refused = 0;
     while taken + refused < steps && radius > LAST_RADIUS {
-        if goal == Goal::Reach && here.score.violation <= 0.0 {
+        if goal == Goal::Reach && here.score.meets() {
             break;
         }
         let mut step = plan(problem, &x, &here, &hessian, radius, price, goal, None);
@@ -124,6 +128,20 @@ pub(super) fn polish(
         }
     }
     Some(Polished { x, score: here.score, fresh: false })
+}
+
+/// The merit that one step from `x` promises; none where the loop is unstable.
+pub(super) fn promise(
+    problem: &TuningProblem,
+    x: &[f64],
+    goal: Goal,
+    price: f64,
+    work: &mut TuningWork,
+) -> Option<f64> {
+    let here = linearise(problem, x, work)?;
+    let step = plan(problem, x, &here, &identity(x.len()), FIRST_RADIUS, price, goal, None);
+    let now = if goal == Goal::Best { here.score.merit(price) } else { here.score.violation };
+    Some(now - step.promised)
 }
 
 fn identity(n: usize) -> Vec<f64> {

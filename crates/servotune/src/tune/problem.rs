@@ -68,10 +68,16 @@ pub struct Score {
 /// Violation of an unstable loop, so far above any limit's that stability always comes first.
 pub(super) const UNSTABLE: f64 = 100.0;
 
-/// How far inside its limit the search aims: rounding between two ways to one figure is far below it.
-const INSIDE: f64 = 1e-7;
+/// How far inside its limit the search aims: rounding between two ways to one figure is far below it. A polish ends with as much missing of the
+/// aim, so that is no miss of the limit.
+pub(super) const INSIDE: f64 = 1e-7;
 
 impl Score {
+    /// Every limit is met: the aim within what it lies inside.
+    pub fn meets(&self) -> bool {
+        self.violation <= INSIDE
+    }
+
     /// Exact penalty: the objective, and `price` for the largest violation.
     pub fn merit(&self, price: f64) -> f64 {
         if self.violation >= UNSTABLE {

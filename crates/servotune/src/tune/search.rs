@@ -5,10 +5,12 @@
 //! any number of threads. Spec: `specs/tuning.md`.
 
 use super::neighbours::{Exact, improve};
+use super::placement::refine_placed;
 use super::polish::{Goal, Polished, polish};
 use super::problem::UNSTABLE;
 use super::starts::starts;
 use super::{Score, TuningProblem, TuningWork};
+use crate::numeric::random::Random;
 use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::neldermead::NelderMead;
 use rayon::prelude::*;
@@ -40,16 +42,15 @@ impl Found {
     pub fn take(&mut self, (end, evaluations): (Option<Polished>, usize)) {
         self.evaluations += evaluations;
         self.starts += 1;
-        self.feasible_starts += usize::from(end.as_ref().is_some_and(|p| p.score.violation <= 0.0));
+        self.feasible_starts += usize::from(end.as_ref().is_some_and(|p| p.score.meets()));
         self.ends.extend(end);
     }
 
     /// How many polishes from starts of their own ended within `share` of the best; 0 where none meets the limits. A neighbour of the best that
     /// falls back to it says nothing.
     pub fn at_best(&self, share: f64) -> usize {
-        let Some(best) = self.ends.first().filter(|e| e.score.violation <= 0.0) else { return 0 };
-        let near =
-            |e: &&Polished| e.fresh && e.score.violation <= 0.0 && e.score.objective <= best.score.objective + share;
+        let Some(best) = self.ends.first().filter(|e| e.score.meets()) else { return 0 };
+        let near = |e: &&Polished| e.fresh && e.score.meets() && e.score.objective <= best.score.objective + share;
         self.ends.iter().filter(near).count()
     }
 }
@@ -73,6 +74,9 @@ const EDGE: f64 = 0.25;
 const SPREAD: f64 = 1e-3;
 /// Price of a violation for the simplex: a limit missed by a hundredth weighs a tenth of the objective.
 const PRICE: f64 = 10.0;
+
+/// Streams of random numbers from here on belong to the starts' placings; neighbours have theirs below.
+const PLACING_STREAM: u64 = 1 << 32;
 
 /// Starts drawn for each one that is polished; scoring one costs a hundredth of polishing it.
 const SCREENED: usize = 6;
@@ -119,10 +123,13 @@ pub(super) fn search(
     let from = screened(problem, from, given.len() + BY_RULE, effort.starts);
     let ends: Vec<(Option<Polished>, usize)> = from
         .into_par_iter()
-        .map(|x| {
+        .enumerate()
+        .map(|(i, x)| {
             let mut work = problem.work();
+            let mut random = Random::stream(seed, PLACING_STREAM + i as u64);
             let x = simplex(problem, x, effort.simplex_steps, &mut work);
-            (fresh(refine(problem, &x, effort.polish_steps, &mut work)), work.evaluations)
+            let end = refine_placed(problem, &x, effort.polish_steps, None, &mut random, &mut work);
+            (fresh(end), work.evaluations)
         })
         .collect();
     let mut found = Found { ends: Vec::new(), evaluations: 0, starts: 0, feasible_starts: 0 };
@@ -140,7 +147,7 @@ pub(super) fn fresh(end: Option<Polished>) -> Option<Polished> {
 
 /// Feasible before infeasible, then by objective or by violation.
 pub(super) fn order(a: &Score, b: &Score) -> Ordering {
-    match (a.violation <= 0.0, b.violation <= 0.0) {
+    match (a.meets(), b.meets()) {
         (true, true) => a.objective.total_cmp(&b.objective),
         (false, false) => a.violation.total_cmp(&b.violation),
         (true, false) => Ordering::Less,
@@ -154,11 +161,11 @@ pub(super) fn refine(problem: &TuningProblem, x: &[f64], steps: usize, work: &mu
         return polish(problem, x, Goal::Room, steps, work);
     }
     let first = polish(problem, x, Goal::Best, steps, work)?;
-    if first.score.violation <= 0.0 {
+    if first.score.meets() {
         return Some(first);
     }
     let reached = polish(problem, &first.x, Goal::Reach, steps, work)?;
-    if reached.score.violation > 0.0 {
+    if !reached.score.meets() {
         return Some(reached);
     }
     let again = polish(problem, &reached.x, Goal::Best, steps, work)?;

@@ -82,8 +82,9 @@ impl Shape {
         let between = |c: usize, from: f64, to: f64| from + (to - from) * share[c];
         Shape {
             crossover_hz: low * (high / low).powf(share[0]),
-            lead: 10f64.powf(between(1, -0.7, 1.5)),
-            integral: 10f64.powf(between(2, 0.3, 2.2)),
+            // Some loops lead by notches alone, or rise by the integral alone.
+            lead: 10f64.powf(if share[1] < 0.2 { -2.7 + 10.0 * share[1] } else { between(1, -1.2, 1.7) }),
+            integral: 10f64.powf(between(2, -0.3, 2.4)),
             lowpass: share[3],
             notch_depth: 10f64.powf(between(4, -1.5, -0.05)),
             notch_damping: 10f64.powf(between(5, -1.3, -0.1)),

@@ -183,8 +183,7 @@ fn tune_feedback(
             _ => score.objective.exp(),
         };
         // Ends of this objective or better ones; those of another guard count where they are as good.
-        let near =
-            |e: &&super::polish::Polished| e.score.violation <= 0.0 && e.score.objective <= score.objective + BETTER;
+        let near = |e: &&super::polish::Polished| e.score.meets() && e.score.objective <= score.objective + BETTER;
         let starts_at_best = found.ends.iter().filter(near).count().max(1);
         Reached { name: problem.minimise, value, starts: found.starts, starts_at_best }
     };
