@@ -4,9 +4,10 @@ use super::diagnose_arguments::DiagnoseArguments;
 use super::{Ending, Failure, Screen, load};
 use servotune::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
 use servotune::document::{FileSet, check_target};
-use servotune::recording::{Case, Record, RecordEntry, Role};
+use servotune::recording::{Case, NominalNoise, Record, RecordEntry, Role};
 use servotune_answer::{case_provenance, conclude, sure};
-use servotune_report::diagnosis::diagnosis_page;
+use servotune_report::diagnosis::{diagnosis_page, diagnosis_sentence};
+use servotune_report::number::NumberFormat;
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -14,6 +15,11 @@ use std::path::PathBuf;
 const CORRECTED: &str = "plant_corrected.toml";
 /// The page for people, beside it.
 pub(super) const REPORT: &str = "report.html";
+
+/// Three digits.
+fn three(value: f64) -> String {
+    NumberFormat::Significant(3).text(value)
+}
 
 fn case(a: &DiagnoseArguments) -> Result<Case, Failure> {
     if let Some(folder) = &a.case {
@@ -63,6 +69,9 @@ pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagno
     let controller = case.controller.as_ref().map(|f| load::controller(f)).transpose()?;
     let mut settings = DiagnoseSettings::default();
     settings.select.bootstrap = a.bootstrap as usize;
+    if let Some(folder) = &a.case {
+        settings.noise = NominalNoise::read(folder)?;
+    }
     let mut made =
         diagnose(&case, &plant, controller.as_ref(), &settings, |m| screen.say(&format!("{}: {m}", case.id)))?;
     // Model, page and findings belong together: all of them appear or none.
@@ -73,16 +82,14 @@ pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagno
     }
     screen.say(&format!("{}: drawing the report", case.id));
     let page = diagnosis_page(&made, case_provenance(&case))?;
+    let sentence = diagnosis_sentence(&made);
     files.write(&a.out.join(REPORT), page.html());
     let diagnosis = made.diagnosis;
     let json = serde_json::to_string_pretty(&diagnosis).map_err(|source| Failure::Json { source })?;
     files.write(&a.out.join("diagnosis.json"), format!("{json}\n"));
     files.commit()?;
-    let mut text = format!(
-        "{}: {}\n",
-        diagnosis.id,
-        serde_json::to_string(&diagnosis.verdict).unwrap_or_default().trim_matches('"')
-    );
+    let verdict = serde_json::to_string(&diagnosis.verdict).unwrap_or_default();
+    let mut text = format!("{}: {}\n{sentence}\n", diagnosis.id, verdict.trim_matches('"'));
     // Writing to a String cannot fail.
     for f in &diagnosis.findings {
         let _ = writeln!(text, "  {}: {}", f.effect, f.says);
@@ -90,15 +97,19 @@ pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagno
             let _ = writeln!(text, "    these records do not tell apart: {}", f.family.join(", "));
         }
         for (name, e) in &f.parameters {
-            let _ = writeln!(text, "    {name} = {:.6} ({:.6} to {:.6}) {}", e.value, e.low, e.high, e.unit);
+            let _ =
+                writeln!(text, "    {name} = {} ({} to {}) {}", three(e.value), three(e.low), three(e.high), e.unit);
         }
     }
     let unit = &plant.position_unit;
     let mut figures = |name: &str, f: &servotune::diagnose::FitFigures| {
         let _ = writeln!(
             text,
-            "  {name}: rms {:.6} before, {:.6} after a linear refit, {:.6} with the findings; noise floor {:.6} {unit}",
-            f.rms_before, f.rms_refit_linear, f.rms_after, f.noise_floor
+            "  {name}: rms {} before, {} after a linear refit, {} with the findings; noise floor {} {unit}",
+            three(f.rms_before),
+            three(f.rms_refit_linear),
+            three(f.rms_after),
+            three(f.noise_floor)
         );
     };
     if let Some(h) = &diagnosis.fit.holdout {

@@ -3,6 +3,8 @@
 //! In: built-in machines, seeds, and where a study needs them measured records. Out: a [`Study`], pages and pictures as text.
 //! Nothing is written here but by the studies that run the program as other processes; `main` does it for the rest.
 
+mod abroad;
+mod abroad_records;
 mod certificate;
 mod certificate_loops;
 mod certificate_mutations;
@@ -14,6 +16,8 @@ mod false_alarms;
 mod fleet_kills;
 mod fleet_reliability;
 mod fleet_study;
+mod foreign;
+mod foreign_case;
 mod gate;
 mod gate_seeds;
 mod hdd;
@@ -32,6 +36,7 @@ mod recordings;
 mod reliability_readers;
 pub mod study_identify;
 
+pub use abroad::abroad;
 pub use certificate::certificate;
 pub use certificate_write::certificate_write;
 pub use classes::classes;

@@ -39,6 +39,8 @@ struct StudyArguments {
 /// The studies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum StudyName {
+    /// Diagnoses of machines of another make and of real recordings in the folder --data, before and after
+    Abroad,
     /// The four machine classes under one controller (figures 16-22)
     Classes,
     /// The gate on the production line (Table 3, figures 24, 35-39)
@@ -124,6 +126,7 @@ fn run(a: &StudyArguments, say: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>, St
             files.push(both_halves(&a.out)?);
             Files(files)
         }
+        StudyName::Abroad => Pages(study::abroad(&a.data, say)?),
         StudyName::Classes => Pages(study::classes()?),
         StudyName::Gate => Pages(study::gate()?),
         StudyName::GateSeeds => Pages(study::gate_seeds()?),

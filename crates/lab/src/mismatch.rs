@@ -9,7 +9,7 @@ use servotune::controller::Controller;
 use servotune::diagnose::{DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use servotune::document::{read_text, read_toml};
 use servotune::lti::{Plant, PlantFile};
-use servotune::recording::{Case, RecordSettings};
+use servotune::recording::{Case, NominalNoise, RecordSettings};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -77,7 +77,8 @@ pub(super) fn diagnosed(path: &Path, settings: &DiagnoseSettings) -> Result<Diag
     let file: PlantFile = read_toml(&case.plant)?;
     let plant = Plant::try_from(file)?;
     let controller: Option<Controller> = case.controller.as_ref().map(|f| read_toml(f)).transpose()?;
-    Ok(diagnose(&case, &plant, controller.as_ref(), settings, |_| {})?.diagnosis)
+    let settings = DiagnoseSettings { noise: NominalNoise::read(path)?, ..settings.clone() };
+    Ok(diagnose(&case, &plant, controller.as_ref(), &settings, |_| {})?.diagnosis)
 }
 
 /// Diagnoses every case of a folder.

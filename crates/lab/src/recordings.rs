@@ -14,7 +14,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// One recording and how it is split.
-struct Recording {
+pub(super) struct Recording {
     name: &'static str,
     file: &'static str,
     names: ColumnNames,
@@ -25,11 +25,11 @@ struct Recording {
     skip: usize,
     /// Factor and unit of the benchmark's metric.
     metric: (f64, &'static str),
-    plant: Plant,
+    pub plant: Plant,
     words: &'static str,
 }
 
-fn rigid(position: &str, command: &str, body: Body) -> Plant {
+pub(super) fn rigid(position: &str, command: &str, body: Body) -> Plant {
     Plant {
         position_unit: position.into(),
         command_unit: command.into(),
@@ -72,7 +72,7 @@ fn emps() -> Recording {
 }
 
 /// The electronic Duffing oscillator; the plant is a rough linear guess, the refit does the rest.
-fn silverbox() -> Recording {
+pub(super) fn silverbox() -> Recording {
     let body = Body::SecondOrder { dc_gain: 0.25, natural_frequency_rad_s: 440.0, damping_ratio: 0.05 };
     Recording {
         name: "Silverbox",
@@ -90,7 +90,7 @@ fn silverbox() -> Recording {
 }
 
 /// Two masses and a shaft, identified from the record's own first periods.
-fn motor(data: &Path) -> Result<Recording, StudyError> {
+pub(super) fn motor(data: &Path) -> Result<Recording, StudyError> {
     let file = data.join("motor_bench/motor_bench_multisineA.csv.gz");
     let record = read_columns(&file, &["t_s", "iq_meas_A", "theta_motor_rad"])?;
     let sample_time_s = record.sample_time_s("t_s", &file)?;
@@ -123,7 +123,8 @@ fn motor(data: &Path) -> Result<Recording, StudyError> {
     })
 }
 
-fn made(r: &Recording, data: &Path) -> Result<Diagnosed, StudyError> {
+/// The case of a recording: rows to fit, rows held out.
+pub(super) fn case(r: &Recording, data: &Path) -> Result<Case, StudyError> {
     let file = data.join(r.file);
     if !file.exists() {
         return Err(StudyError::Absent { file });
@@ -133,14 +134,17 @@ fn made(r: &Recording, data: &Path) -> Result<Diagnosed, StudyError> {
         Record::read(&file, &settings)
     };
     let entry = |name: &str, role| RecordEntry { file: PathBuf::from(name), role, repeat_group: None };
-    let case = Case {
+    Ok(Case {
         id: r.name.into(),
         plant: PathBuf::new(),
         controller: None,
         spindle_hz: None,
         records: vec![(entry("fit", Role::Fit), read(r.fit)?), (entry("holdout", Role::Holdout), read(r.holdout)?)],
-    };
-    Ok(diagnose(&case, &r.plant, None, &DiagnoseSettings::default(), |_| {})?)
+    })
+}
+
+fn made(r: &Recording, data: &Path) -> Result<Diagnosed, StudyError> {
+    Ok(diagnose(&case(r, data)?, &r.plant, None, &DiagnoseSettings::default(), |_| {})?)
 }
 
 /// What a diagnosis of one recording says, as lines of the page.

@@ -59,9 +59,9 @@ pub(super) fn words(effect: &str) -> String {
     effect.replace('_', " ")
 }
 
-/// Four digits, for sentences.
+/// Three digits, for sentences.
 pub(super) fn short(value: f64) -> String {
-    NumberFormat::Significant(4).page(value)
+    NumberFormat::Significant(3).page(value)
 }
 
 /// The record to draw: the hold-out record that the given model misses most, else the fit record.
@@ -111,6 +111,11 @@ pub fn diagnosis_page(made: &Diagnosed, provenance: Vec<(String, String)>) -> Re
     })
 }
 
+/// The verdict in words, for a terminal.
+pub fn diagnosis_sentence(made: &Diagnosed) -> String {
+    verdict(made, &made.refitted.position_unit).1.replace('\u{2212}', "-")
+}
+
 /// The verdict for a person at the machine, and whether one can go on with it.
 fn verdict(made: &Diagnosed, unit: &str) -> (Badge, String) {
     let d = &made.diagnosis;
@@ -125,7 +130,7 @@ fn verdict(made: &Diagnosed, unit: &str) -> (Badge, String) {
             (Badge::Ok, "The model agrees with the machine down to the noise: nothing is missing.".into())
         }
         Verdict::Refit => (
-            Badge::Ok,
+            Badge::Warn,
             format!("Numbers of the linear model were off and have been refitted; no physics is missing. {falls}"),
         ),
         Verdict::DataFault => (
@@ -133,7 +138,7 @@ fn verdict(made: &Diagnosed, unit: &str) -> (Badge, String) {
             "The log is wrong, not the machine: repair the log and record again before the model is blamed.".into(),
         ),
         Verdict::Named => {
-            (Badge::Ok, format!("The machine does something that the model lacks: {}. {falls}", names.join(" and ")))
+            (Badge::Warn, format!("The machine does something that the model lacks: {}. {falls}", names.join(" and ")))
         }
         Verdict::Family => {
             let family = d.findings.first().map_or(Vec::new(), |f| f.family.iter().map(|n| words(n)).collect());

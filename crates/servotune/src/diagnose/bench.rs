@@ -1,6 +1,7 @@
 //! Everything that a diagnosis works on, made in order: given plant, noise, filter, refit, motion.
 
 use super::columns::{Drive, drive, raw_columns};
+use super::hygiene::{Grid, quantum};
 use super::linear::{Carrier, LinearForm, Sampled, body_numbers, free_motions, free_scales};
 use super::lines::{Line, take_lines};
 use super::refit::{Chosen, Fit, simulation_error};
@@ -41,6 +42,17 @@ pub struct Bench {
     pub scene: Scene,
     /// What repeats differ by, whitened, with the run it belongs to; empty without repeats.
     pub repeats: Vec<(usize, Vec<f64>)>,
+    /// The encoder's count, where every fitted position lies on one.
+    pub grid: Option<Grid>,
+}
+
+/// Rounding over the noise of repeats from which repeats round alike and their mean does not take it away.
+pub(super) const ALIKE: f64 = 0.5;
+
+/// The finest count of some runs, where all of them lie on one.
+fn count(runs: &[Run], which: &[usize]) -> Option<Grid> {
+    let grids: Vec<Grid> = which.iter().map_while(|&r| quantum(&runs[r].position)).collect();
+    grids.iter().copied().min_by(|a, b| a.step.total_cmp(&b.step)).filter(|_| grids.len() == which.len())
 }
 
 /// Series that hold noise only: each repeat less the mean of its group, scaled back to the noise of one record.
@@ -70,7 +82,7 @@ pub(super) fn noise_series(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<(u
     out
 }
 
-fn values(series: &[(usize, Vec<f64>)]) -> Vec<Vec<f64>> {
+pub(super) fn values(series: &[(usize, Vec<f64>)]) -> Vec<Vec<f64>> {
     series.iter().map(|s| s.1.clone()).collect()
 }
 
@@ -203,6 +215,16 @@ impl Bench {
         let (levels, whitener, filtered) = noise_of(series, &free, body, sample_time_s, from_repeats);
         let repeats = if from_repeats { filtered } else { Vec::new() };
         weigh(&mut stack, &repeats);
+        let grid = count(&runs, &fit_runs);
+        let (levels, whitener) = match grid.map(|g| g.step / 12f64.sqrt()).filter(|r| *r > ALIKE * levels.sensor_rms) {
+            Some(rounding) => {
+                // Repeats that round alike show less noise than there is, and their mean holds as much as each of them.
+                stack.segments.iter_mut().for_each(|s| s.weight = 1.0);
+                let levels = NoiseLevels { sensor_rms: levels.sensor_rms.hypot(rounding), ..levels };
+                (levels, Whitener::new(&levels, &given.body, sample_time_s))
+            }
+            None => (levels, whitener),
+        };
         let mut bench = Bench {
             form,
             runs,
@@ -215,6 +237,7 @@ impl Bench {
             stack,
             scene,
             repeats,
+            grid,
         };
         bench.scene.noise = bench.levels.sensor_rms;
         bench.smooth(&carrier, &sampled, &bench.means.clone(), &vec![Vec::new(); bench.means.len()]);

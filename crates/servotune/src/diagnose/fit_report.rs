@@ -1,38 +1,26 @@
 //! The figures of a diagnosis: error of the given model, of the linear refit and of the corrected model, by role and by record.
 
 use super::bench::Bench;
-use super::corrected::Corrected;
 use super::finding::{FitFigures, FitReport, RecordFigures};
-use super::judge::{Judged, Simulation, errors, floor, rms};
+use super::judge::{Simulation, floor, rms};
+use super::reported::{Offer, Reported, Reporting};
 use super::run::Run;
-use super::select::Selection;
 use crate::controller::Law;
 use crate::lti::Plant;
-use crate::physics::{Effect, Scene, Setting};
 use crate::recording::Role;
 
 /// Errors of all runs under a model, as the report shows them.
 pub(super) fn fit_report(
     bench: &Bench,
-    selection: &Selection,
     given: &Plant,
-    refitted: &Corrected,
-    fixed: &Corrected,
-    closed: Option<&Law>,
+    reporting: &Reporting,
+    reported: &Reported,
 ) -> (FitReport, [Vec<Vec<f64>>; 3]) {
-    let every: Vec<&Run> = bench.runs.iter().collect();
-    let scene = Scene { plant: given.clone(), ..bench.scene.clone() };
-    let none: Vec<(&'static dyn Effect, Setting)> = Vec::new();
-    let under = |plant: &Plant, effects: &[(&'static dyn Effect, Setting)], closed: Option<&Law>| {
-        let effects = effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
-        errors(&Judged { plant, effects, own: Vec::new(), lines: &[], fit: None, scene: &scene }, &every, closed)
-    };
+    let every: Vec<&Run> = reporting.runs.iter().collect();
+    let closed = reporting.closed;
+    let given = Offer::of(given);
     let three = |closed: Option<&Law>| {
-        [
-            under(given, &none, closed),
-            under(&refitted.plant, &refitted.effects, closed),
-            errors(&fixed.judged(bench, selection), &every, closed),
-        ]
+        [&given, &reported.refitted, &reported.fixed].map(|offer| reporting.errors(offer, &every, closed))
     };
     let open = three(None);
     let chosen = if closed.is_some() { three(closed) } else { open.clone() };
@@ -44,7 +32,9 @@ pub(super) fn fit_report(
         let pick = |m: usize| -> Vec<Vec<f64>> { which.iter().map(|&i| e[m][i].clone()).collect() };
         let [before, refit, after] = [rms(&pick(0)), rms(&pick(1)), rms(&pick(2))];
         // The floor from repeats of the fit records, under the model that fits best; it is the same for every record.
-        let noise = floor(&e[2], &every).unwrap_or_else(|| fallback_floor(bench, after));
+        let least = if after <= before || before.is_nan() { &e[2] } else { &e[0] };
+        let rounding = bench.grid.map_or(0.0, |g| g.step / 12f64.sqrt());
+        let noise = floor(least, &every).unwrap_or_else(|| fallback_floor(bench, after)).max(rounding.min(after));
         let room = before * before - noise * noise;
         let explained_share =
             if room > 0.0 { (1.0 - (after * after - noise * noise).max(0.0) / room).clamp(-1.0, 1.0) } else { 1.0 };

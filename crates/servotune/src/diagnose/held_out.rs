@@ -142,7 +142,8 @@ pub(super) fn unseen(bench: &Bench, selection: &Selection, h: &HeldOut) -> Optio
     let t = bench.scene.sample_time_s;
     let speed = |k: usize| (run.position[(k + 1).min(run.len() - 1)] - run.position[k.saturating_sub(1)]) / (2.0 * t);
     let motion = (0..run.len()).map(|k| [run.position[k], speed(k)]).collect();
-    let place = place_of(&[Part { records: vec![h.record.clone()], signal: &error, motion }], t);
+    let part = Part { records: vec![h.record.clone()], signal: &error, from_s: run.from_s, motion };
+    let place = place_of(&[part], t);
     let n = h.samples as f64;
     Some(Finding {
         effect: "unexplained".into(),

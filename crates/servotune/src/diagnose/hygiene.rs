@@ -182,8 +182,12 @@ fn factors(law: &Law, with: &[(&Run, &[f64])]) -> (f64, f64, f64) {
     (a, b, ((uu - a * ru + b * pu).max(0.0) / f64::max(all, 1e-300)).sqrt())
 }
 
-/// Samples that the clock says are missing, and stretches where the position did not move although its noise says it must.
-pub fn sample_faults(run: &Run, gaps: &[ClockGap], sample_time_s: f64) -> Vec<SampleFault> {
+/// Steps of an encoder's count that the model must move over while the position stands still.
+const MOVED: f64 = 3.0;
+
+/// Samples that the clock says are missing, and stretches where the position did not move although its noise says it must, or, where it lies on
+/// a coarse count, although the model (`expected`) moves over several steps of it.
+pub fn sample_faults(run: &Run, gaps: &[ClockGap], sample_time_s: f64, expected: &[f64]) -> Vec<SampleFault> {
     let mut all: Vec<SampleFault> = gaps
         .iter()
         .map(|g| SampleFault {
@@ -207,9 +211,15 @@ pub fn sample_faults(run: &Run, gaps: &[ClockGap], sample_time_s: f64) -> Vec<Sa
     sorted.sort_unstable();
     let usual = sorted.get(sorted.len() * 99 / 100).copied().unwrap_or(1);
     let longest = (8 * usual).max(6);
+    let grid = quantum(y).map_or(0.0, |g| g.step);
+    let moves = |from: usize, to: usize| {
+        let part = &expected[from..to];
+        let [low, high] = part.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
+        high - low > MOVED * grid
+    };
     let mut at = 0;
     for length in lengths {
-        if length >= longest && at > 0 {
+        if length >= longest && at > 0 && moves(at, at + length) {
             let time_s = at as f64 * sample_time_s;
             all.push(SampleFault { record: run.name.clone(), time_s, samples: length as f64, stuck: true });
         }

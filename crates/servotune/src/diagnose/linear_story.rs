@@ -9,6 +9,7 @@ use super::refit::{Chosen, Fit};
 use super::scan::log_tail;
 use super::select::{Model, Selection};
 use super::simulated::simulated_with;
+use crate::lti::Plant;
 use crate::physics::{Parameter, Setting, effect};
 use std::collections::BTreeMap;
 
@@ -140,11 +141,29 @@ impl Lag {
     }
 }
 
-/// What happened to the linear parameters: nothing, the delay alone, one mode alone, or a refit.
-pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
+/// What happened to the linear parameters of the `given` plant: nothing, the delay alone, one mode alone, or a refit.
+pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection, given: &Plant) {
     if d.verdict == Verdict::LocatedUnexplained || d.verdict == Verdict::DataFault {
         return;
     }
+    // Around another plant the given one was far off already.
+    if bench.form.given == *given && simple_story(d, bench, selection) {
+        return;
+    }
+    if d.verdict == Verdict::NoMismatch {
+        d.verdict = Verdict::Refit;
+    }
+    let (b0, k0, c0) = body_numbers(&given.body);
+    let refitted = &selection.last().refitted.plant;
+    let (b1, k1, c1) = body_numbers(&refitted.body);
+    d.remarks.push(format!(
+        "linear refit: acceleration gain {b0:.6e} -> {b1:.6e}, stiffness {k0:.6e} -> {k1:.6e} 1/s^2, viscous rate {c0:.4} -> {c1:.4} 1/s, delay {:.3e} -> {:.3e} s",
+        given.delay_s, refitted.delay_s
+    ));
+}
+
+/// Whether the given numbers still do, but for one of them; says which.
+fn simple_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection) -> bool {
     let all = bench.form.knobs.len() as f64;
     // Chi-square of as many parameters as were freed, and four of its standard deviations.
     let allowed = |free: usize| {
@@ -156,7 +175,7 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
         let cost = way.restricted(bench, |_| false, None).0;
         if cost - way.full() < allowed(0) {
             d.remarks.push("the linear parameters agree with the given plant".into());
-            return;
+            return true;
         }
         fixed.push(cost);
     }
@@ -196,7 +215,7 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
             d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
         }
         d.findings.push(f);
-        return;
+        return true;
     }
     if d.findings.is_empty() && selection.model.chosen.is_empty() && later_s > 0.0 {
         let lags = Lag::alone(bench, later_s);
@@ -207,7 +226,7 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
         if let Some(lag) = lags.first().filter(sure) {
             d.verdict = if like.len() > 1 { Verdict::Family } else { Verdict::Named };
             d.findings.push(lag.finding(bench, like, fixed[0]));
-            return;
+            return true;
         }
     }
     if d.findings.is_empty() && selection.model.chosen.is_empty() {
@@ -215,17 +234,8 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
         if clock.sure() && clock.cost - selection.model.cost < allowed(1) {
             d.verdict = Verdict::DataFault;
             d.findings.push(clock.finding(bench));
-            return;
+            return true;
         }
     }
-    if d.verdict == Verdict::NoMismatch {
-        d.verdict = Verdict::Refit;
-    }
-    let (b0, k0, c0) = body_numbers(&bench.form.given.body);
-    let refitted = &selection.last().refitted.plant;
-    let (b1, k1, c1) = body_numbers(&refitted.body);
-    d.remarks.push(format!(
-        "linear refit: acceleration gain {b0:.6e} -> {b1:.6e}, stiffness {k0:.6e} -> {k1:.6e} 1/s^2, viscous rate {c0:.4} -> {c1:.4} 1/s, delay {:.3e} -> {:.3e} s",
-        bench.form.given.delay_s, refitted.delay_s
-    ));
+    false
 }

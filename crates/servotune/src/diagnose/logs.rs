@@ -33,15 +33,15 @@ pub(super) fn check(
     law: Option<&Law>,
     sample_time_s: f64,
 ) -> Result<Hygiene, LtiError> {
+    let smooth = smooth(given, runs, sample_time_s)?;
     let mut faults: Vec<SampleFault> = case
         .records
         .iter()
-        .zip(runs.iter())
-        .flat_map(|((_, record), run)| sample_faults(run, &record.gaps, sample_time_s))
+        .zip(runs.iter().zip(&smooth))
+        .flat_map(|((_, record), (run, smooth))| sample_faults(run, &record.gaps, sample_time_s, smooth))
         .collect();
     let mut hygiene = Hygiene { replay: None, faults: Vec::new(), finding: None, closed: false };
     if let Some(law) = law {
-        let smooth = smooth(given, runs, sample_time_s)?;
         let all: Vec<&Run> = runs.iter().collect();
         hygiene.closed = all.iter().all(|r| r.reference.is_some());
         hygiene.replay = replay_records(law, &all, &smooth);

@@ -3,7 +3,6 @@
 use super::bench::Bench;
 use super::columns::position_columns;
 use super::finding::{Estimate, Finding, Where};
-use super::hygiene::{Grid, quantum};
 use super::line_finding::mains;
 use super::linear::Sampled;
 use super::place::place;
@@ -41,11 +40,6 @@ const HIGHER: f64 = 1.5;
 const NUDGE: f64 = 1.01;
 /// Sliding length over the sensor's noise below which friction counts as dry.
 const DRY: f64 = 12.0;
-
-/// Share of the noise's power from which a sensor's grid is worth a word.
-const GRID: f64 = 0.01;
-/// Growth of the noise's power from rest to the highest speed that is worth a word.
-const FASTER: f64 = 0.2;
 
 /// Whether two names are both drags.
 pub(super) fn same_drag(a: &str, b: &str) -> bool {
@@ -128,13 +122,15 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
         parameters.insert("base_hz".into(), plain(bench.scene.spindle_hz.unwrap_or(0.0), "Hz"));
     }
     let place = place(bench, &bench.stack, &signal);
+    let always = own == "shock" && bench.stack.segments.len() > 1;
+    let when = if always { ", at the same time of every record: it comes with the record" } else { "" };
     let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
     Some(Finding {
         effect: name.into(),
         family,
         port,
         p_value: log_p.min(0.0).exp().max(1e-300),
-        says: format!("Between {} and {} Hz {says}.", hertz(band[0]), hertz(band[1])),
+        says: format!("Between {} and {} Hz {says}{when}.", hertz(band[0]), hertz(band[1])),
         parameters,
         place,
     })
@@ -247,8 +243,16 @@ pub(super) fn unexplained(bench: &Bench, selection: &Selection, explained: f64) 
     let (fit, model) = (bench.fit(vec![]), &selection.baseline);
     let (error, _) = fit.screen_basis(&model.refitted.p);
     let place = place(bench, &bench.stack, &error);
-    let best =
-        selection.steps.first().and_then(|s| s.candidates.first()).map_or("no effect", |c| c.effect.facts().name);
+    let laws: Vec<&str> = selection.best().chosen.iter().map(|c| c.effect.facts().name).collect();
+    let nearest = match laws[..] {
+        [] => "none of its laws explains enough of it".to_owned(),
+        [one] => format!("its nearest law, {one}, leaves {} % of the error in excess of noise", percent(explained)),
+        _ => format!(
+            "its nearest laws, {}, leave {} % of the error in excess of noise",
+            laws.join(" and "),
+            percent(explained)
+        ),
+    };
     let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
     Finding {
         effect: "unexplained".into(),
@@ -256,81 +260,20 @@ pub(super) fn unexplained(bench: &Bench, selection: &Selection, explained: f64) 
         port: crate::physics::Port::Torque,
         p_value: log_tail(model.excess() + model.freedom, model.freedom as usize).min(0.0).exp().max(1e-300),
         says: format!(
-            "Between {} and {} Hz something acts that the library does not hold: its nearest law, {best}, leaves {:.1} % of the error.",
+            "Between {} and {} Hz something acts that the library does not hold: {nearest}.",
             hertz(band[0]),
             hertz(band[1]),
-            100.0 * (1.0 - explained)
         ),
         parameters: BTreeMap::new(),
         place,
     }
 }
 
+/// What is left in per cent, to three digits; along the recorded motion a law may leave more than there was.
+fn percent(explained: f64) -> String {
+    let left = 100.0 * (1.0 - explained);
+    if left > 1000.0 { "more than 1000".into() } else { hertz(left) }
+}
+
 /// Share of a single order's size below which the others do not count.
 const BESIDE_ORDER: f64 = 0.2;
-/// Share of its step to which a scale is graduated.
-const GRADUATION: f64 = 1e-4;
-
-/// What the noise itself tells: a coarse sensor grid, or noise that grows with the speed. Names it only where the mean of the
-/// records is explained.
-pub(super) fn noise_story(bench: &Bench) -> Option<Finding> {
-    let whole: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
-    let command = &bench.form.given.position_unit;
-    let grids: Vec<Grid> = whole.iter().filter_map(|r| quantum(&r.position)).collect();
-    let finest = grids.iter().copied().min_by(|a, b| a.step.total_cmp(&b.step));
-    if let Some(Grid { step: q, off }) = finest.filter(|_| grids.len() == whole.len()) {
-        // Rounding to a grid makes noise of step/√12.
-        if q * q / 12.0 > GRID * bench.levels.sensor_rms.powi(2) {
-            let off = off.max(GRADUATION * q);
-            let step = Estimate { value: q, low: q - off, high: q + off, unit: command.into() };
-            return Some(statistic("quantisation", ("step", step), 1e-300, &whole));
-        }
-    }
-    // Squares of the whitened repeats against the square of the speed.
-    let (mut n, mut sx, mut sy, mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    for (run, series) in &bench.repeats {
-        let Some(segment) = bench.stack.segments.iter().position(|s| s.runs.contains(run)) else { continue };
-        for (e, m) in series.iter().zip(&bench.trajectories[segment].samples) {
-            let (x, y) = ((m.v / bench.scene.speed).powi(2), e * e);
-            n += 1.0;
-            sx += x;
-            sy += y;
-            sxx += x * x;
-            sxy += x * y;
-            syy += y * y;
-        }
-    }
-    if n < 100.0 {
-        return None;
-    }
-    let spread = sxx - sx * sx / n;
-    let slope = (sxy - sx * sy / n) / spread;
-    let left = (syy - sy * sy / n - slope * (sxy - sx * sy / n)) / n;
-    let sigma = (left / spread).sqrt();
-    let floor = (sy - slope * sx) / n;
-    // Seven standard errors, and at the highest speed clearly more than at rest.
-    if !(slope > 7.0 * sigma && slope > FASTER * floor) {
-        return None;
-    }
-    let seconds = (slope * bench.levels.sensor_rms.powi(2)).sqrt() / bench.scene.speed;
-    let z = slope / sigma;
-    // Half the slope's relative error, the value being its root.
-    let off = 0.5 * 1.96 * seconds / z;
-    let rms = Estimate { value: seconds, low: seconds - off, high: seconds + off, unit: "s".into() };
-    let mut f = statistic("jitter", ("rms_s", rms), log_tail(z * z, 1).exp().max(1e-300), &whole);
-    f.family.push("encoder_noise".into());
-    Some(f)
-}
-
-fn statistic(name: &str, parameter: (&str, Estimate), p_value: f64, runs: &[&Run]) -> Finding {
-    let (says, port) = text_of(name);
-    Finding {
-        effect: name.into(),
-        family: vec![name.into()],
-        port,
-        p_value,
-        says: format!("{says}."),
-        parameters: BTreeMap::from([(parameter.0.to_owned(), parameter.1)]),
-        place: everywhere(runs),
-    }
-}

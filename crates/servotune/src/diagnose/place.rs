@@ -73,6 +73,8 @@ pub struct Part<'a> {
     pub records: Vec<String>,
     /// The signal.
     pub signal: &'a [f64],
+    /// When it begins in its record (s).
+    pub from_s: f64,
     /// Position and velocity under each of its samples.
     pub motion: Vec<[f64; 2]>,
 }
@@ -82,6 +84,7 @@ pub fn place(bench: &Bench, stack: &Stack, signal: &[f64]) -> Where {
     let part = |(s, motion): (&Segment, &Trajectory)| Part {
         records: s.runs.iter().map(|&r| bench.runs[r].name.clone()).collect(),
         signal: &signal[s.start..s.start + s.len],
+        from_s: bench.runs[s.runs[0]].from_s,
         motion: motion.samples.iter().map(|m| [m.x, m.v]).collect(),
     };
     let parts: Vec<Part> = stack.segments.iter().zip(&bench.trajectories).map(part).collect();
@@ -115,7 +118,8 @@ pub fn place_of(parts: &[Part], t: f64) -> Where {
     kept.sort_unstable();
     let mut time_s: Vec<[f64; 2]> = Vec::new();
     for i in kept {
-        let (from, to) = ((i * width) as f64 * t, ((i + 1) * width).min(part.len()) as f64 * t);
+        let at = |k: usize| parts[strongest].from_s + k as f64 * t;
+        let (from, to) = (at(i * width), at(((i + 1) * width).min(part.len())));
         match time_s.last_mut() {
             Some(last) if (last[1] - from).abs() < 0.5 * t => last[1] = to,
             _ => time_s.push([from, to]),

@@ -11,6 +11,8 @@ pub struct Run {
     pub role: Role,
     /// When it began in its session, the records taken one after another in the order of the case (s).
     pub began_s: f64,
+    /// When it begins in the record that it is an excerpt of (s).
+    pub from_s: f64,
     /// Index of its repeat group; each record without one is a group of its own.
     pub group: usize,
     /// Reference (position_unit), where recorded.
@@ -50,6 +52,31 @@ impl Run {
         let at = |k: isize| u[k.clamp(0, u.len() as isize - 1) as usize];
         let value = |k: isize| (0..4).map(|j| AHEAD[j as usize] * (at(k - j) + at(k + 1 + j))).sum();
         Run { input: (0..u.len() as isize).map(value).collect(), ..self.clone() }
+    }
+
+    /// A part of the record, as one of its own; it does not begin at rest.
+    pub fn stretch(&self, from: usize, to: usize) -> Run {
+        let cut = |x: &[f64]| x[from..to].to_vec();
+        let may = |x: &Option<Vec<f64>>| x.as_deref().map(cut);
+        Run {
+            began_s: self.began_s,
+            from_s: self.from_s,
+            reference: may(&self.reference),
+            command: cut(&self.command),
+            excitation: cut(&self.excitation),
+            input: cut(&self.input),
+            position: cut(&self.position),
+            before: if from == 0 { self.before } else { self.input[from - 1] },
+            origin: if from == 0 { self.origin } else { self.position[from] },
+            rested: self.rested && from == 0,
+            pes: may(&self.pes),
+            spindle_rad: may(&self.spindle_rad),
+            temperature: may(&self.temperature),
+            name: self.name.clone(),
+            role: self.role,
+            group: self.group,
+            bumped: self.bumped,
+        }
     }
 
     /// Samples.
@@ -122,6 +149,7 @@ pub fn runs(case: &Case) -> Vec<Run> {
                 name: entry.name(),
                 role: entry.role,
                 began_s,
+                from_s: 0.0,
                 group,
                 rested: still(record.reference.as_deref()) >= AT_REST.min(record.position.len()),
                 bumped: false,

@@ -2,6 +2,7 @@
 
 use super::bench::Bench;
 use super::bootstrap::{Bootstrap, bootstrap};
+use super::deep::{DEEP, SPENT, by_simulation_first, deep, together};
 use super::fitted::{fitted, fitted_from_both, refit, settled, taken_by_last};
 use super::leftover::{Leftover, leftover};
 use super::locked::follows_motion;
@@ -207,7 +208,7 @@ pub fn select(
                 !same_drag(name, other) && (other != name || again(c, &m.setting))
             });
             // A push falls into one record; what every repeat shows at the same time is none.
-            let new = new && (name != "shock" || bench.stack.segments.iter().any(|s| s.runs.len() == 1));
+            let new = new && (name != "shock" || bench.stack.segments.iter().any(|s| s.runs.len() == 1) || together(c));
             if new
                 && c.effect.possible(&c.setting, &[])
                 && (c.log_p_value(library.len()) < limit && hums(bench, c, c.gain, library.len()) < limit
@@ -219,7 +220,7 @@ pub fn select(
                     (false, 0) => best_form(c),
                     _ => false,
                 }
-                && worth.len() < settings.refits
+                && (worth.len() < settings.refits || c.effect.drag() && seen == 0 && model.excess_sigma() > DEEP)
             {
                 worth.push(i);
             }
@@ -237,6 +238,7 @@ pub fn select(
                 step.tried.push((i, tried));
             }
         }
+        let to_the_end = deep(&step).then(|| by_simulation_first(bench, &mut step));
         // Repeats take part with their mean: what differs from record to record by its nature is no first thought.
         let paid = |t: &(usize, Model)| {
             let c = &step.candidates[t.0];
@@ -289,6 +291,10 @@ pub fn select(
                     bench.renew(&next.refitted.p, &next.chosen);
                 }
                 model = fitted(bench, next.chosen.clone(), &next.refitted.p, settings.iterations);
+                // Simulated it explains all; what its column along a noisy motion falls short by is nobody's.
+                if to_the_end.is_some() && next.excess_sigma() < SPENT && model.cost > next.cost {
+                    break;
+                }
             }
             None => break,
         }
@@ -364,7 +370,9 @@ pub(super) fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model
     // A law without a strength of its own (a lag, a limit), or a vibration that a known mode has moved to stand in for, is not straight
     // in the linear parameters: it is looked for around the given plant too.
     if model.chosen.is_empty() && model.excess_sigma() > CROOKED {
-        let crooked = |e: &&'static dyn Effect| e.facts().fixed || e.facts().port == Port::Structure;
+        // Where the refit is far from the noise, any law may have bent it.
+        let far = model.excess_sigma() > DEEP;
+        let crooked = |e: &&'static dyn Effect| far || e.facts().fixed || e.facts().port == Port::Structure;
         let apart: Vec<&'static dyn Effect> = library.iter().copied().filter(crooked).collect();
         candidates.extend(scan_at(bench, &apart, model, &vec![0.0; model.refitted.p.len()]));
     }

@@ -147,6 +147,7 @@ mod tests {
         let column = |i: usize| -> Vec<f64> { rows.iter().map(|r| r[i]).collect() };
         let (command, excitation) = (column(2), column(1));
         Run {
+            from_s: 0.0,
             name: format!("r{seed}"),
             role: Role::Fit,
             began_s: 0.0,

@@ -70,11 +70,9 @@ fn two(p: &Periodogram, floor: &[f64], other: &[f64]) -> (f64, [f64; 2]) {
 }
 
 /// The best mixture of a coloured floor and low-passed noise through `gain` (1 for the sensor's own), over corners and colours.
-fn mixture(p: &Periodogram, sample_time_s: f64, gain: &dyn Fn(f64) -> f64) -> Option<Mixture> {
-    let nyquist = 0.5 / sample_time_s;
-    let all = COLOURS.iter().flat_map(|c| (0..CORNERS).map(move |i| (*c, i)));
-    let one = |(colour, i): (f64, usize)| {
-        let corner_hz = 3.0 * (nyquist / 6.0).powf(i as f64 / (CORNERS - 1) as f64);
+fn mixture(p: &Periodogram, sample_time_s: f64, gain: &dyn Fn(f64) -> f64, corners_hz: &[f64]) -> Option<Mixture> {
+    let all = COLOURS.iter().flat_map(|c| corners_hz.iter().map(move |hz| (*c, *hz)));
+    let one = |(colour, corner_hz): (f64, f64)| {
         let wc = TAU * corner_hz;
         let floor =
             |w: &f64| (1.0 - colour * colour) / (1.0 + colour * colour - 2.0 * colour * (w * sample_time_s).cos());
@@ -90,8 +88,14 @@ fn mixture(p: &Periodogram, sample_time_s: f64, gain: &dyn Fn(f64) -> f64) -> Op
 
 /// Torque noise that repeats show clearly. No mismatch by itself: every machine has some, and the model says nothing of it.
 pub(super) struct Unrest {
-    rms_command: f64,
-    corner_hz: f64,
+    pub rms_command: f64,
+    pub corner_hz: f64,
+    /// Corners that the spectrum does not tell from that one.
+    pub corners_hz: [f64; 2],
+    /// Relative standard error of the level.
+    pub spread: f64,
+    /// Twice the log-likelihood by which it is ahead of any noise of the sensor.
+    pub ahead: f64,
 }
 
 impl Unrest {
@@ -121,8 +125,34 @@ pub(super) fn unrest(bench: &Bench) -> Option<Unrest> {
     let modes: f64 = given.modes.iter().map(|m| (m.zero_rad_s / m.pole_rad_s).powi(2)).product();
     let b = b * given.resonance_gain * modes;
     let through = |w: f64| b * b / ((k - w * w).powi(2) + (c * w).powi(2));
-    let torque = mixture(&p, t, &through)?;
-    let sensor = mixture(&p, t, &|_| 1.0)?;
-    (sensor.cost - torque.cost > AHEAD && torque.ratio > LOUD)
-        .then(|| Unrest { rms_command: torque.parts[1].sqrt(), corner_hz: torque.corner_hz })
+    let nyquist = 0.5 / t;
+    let coarse: Vec<f64> = (0..CORNERS).map(|i| 3.0 * (nyquist / 6.0).powf(i as f64 / (CORNERS - 1) as f64)).collect();
+    let torque = mixture(&p, t, &through, &coarse)?;
+    let sensor = mixture(&p, t, &|_| 1.0, &coarse)?;
+    let ahead = sensor.cost - torque.cost;
+    if !(ahead > AHEAD && torque.ratio > LOUD) {
+        return None;
+    }
+    // Between two corners of the grid, and as far as the spectrum cannot tell.
+    let fine: Vec<Mixture> = (-FINE..=FINE)
+        .filter_map(|i| mixture(&p, t, &through, &[torque.corner_hz * (STEP * f64::from(i)).exp()]))
+        .collect();
+    let best = fine.iter().copied().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let alike = fine.iter().filter(|m| m.cost < best.cost + TOLD).map(|m| m.corner_hz);
+    let [low, high] = alike.fold([f64::INFINITY, 0.0f64], |[low, high], hz| [low.min(hz), high.max(hz)]);
+    // Neighbours that were not tried may be as good.
+    let corners_hz = [low * (-STEP).exp(), high * STEP.exp()];
+    let bins: f64 = p.w_rad_s.iter().zip(&p.count).filter(|(w, _)| **w < TAU * 3.0 * best.corner_hz).map(|b| b.1).sum();
+    Some(Unrest {
+        rms_command: best.parts[1].sqrt(),
+        corner_hz: best.corner_hz,
+        corners_hz,
+        spread: 0.5 / bins.max(1.0).sqrt(),
+        ahead,
+    })
 }
+
+/// Corners on either side of the best of the grid, and how far apart in the logarithm; fall of twice the log-likelihood that tells two.
+const FINE: i32 = 10;
+const STEP: f64 = 0.05;
+const TOLD: f64 = 4.0;

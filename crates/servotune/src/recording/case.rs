@@ -35,7 +35,45 @@ struct CaseFile {
     plant: PathBuf,
     controller: Option<PathBuf>,
     spindle_hz: Option<f64>,
+    #[serde(default)]
+    noise: NominalNoise,
     records: Vec<RecordEntry>,
+}
+
+/// Levels of the noise as the datasheet or a sound machine shows them; `[noise]` of case.toml.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NominalNoise {
+    /// White noise of the encoder, rms (position_unit).
+    pub encoder_rms: Option<f64>,
+    /// Torque noise at the plant's input, rms (command_unit).
+    pub windage_rms: Option<f64>,
+}
+
+impl NominalNoise {
+    /// The levels that `case.toml` of a folder states.
+    pub fn read(folder: &Path) -> Result<NominalNoise, RecordingError> {
+        Ok(CaseFile::read(&folder.join("case.toml"))?.noise)
+    }
+}
+
+impl CaseFile {
+    fn read(file: &Path) -> Result<CaseFile, RecordingError> {
+        let read: CaseFile = read_toml(file).map_err(|e| {
+            e.expecting(
+                "a case: `id`, `plant`, [[records]] with `file` and `role`, and a `controller` where there is one",
+            )
+        })?;
+        for (key, level) in
+            [("noise.encoder_rms", read.noise.encoder_rms), ("noise.windage_rms", read.noise.windage_rms)]
+        {
+            if let Some(found) = level.filter(|v| !(v.is_finite() && *v >= 0.0)) {
+                let (found, expected) = (found.to_string(), "a finite number, 0 or above");
+                return Err(RecordingError::Case { file: file.into(), key, found, expected });
+            }
+        }
+        Ok(read)
+    }
 }
 
 /// A case with its records read. Plant and controller are paths: their rooms read them.
@@ -65,11 +103,7 @@ impl Case {
     /// Reads `case.toml` of a folder and every record it lists.
     pub fn read(folder: &Path, settings: &RecordSettings) -> Result<Case, RecordingError> {
         let file = folder.join("case.toml");
-        let read: CaseFile = read_toml(&file).map_err(|e| {
-            e.expecting(
-                "a case: `id`, `plant`, [[records]] with `file` and `role`, and a `controller` where there is one",
-            )
-        })?;
+        let read = CaseFile::read(&file)?;
         let refuse = |key: &'static str, found: String, expected: &'static str| RecordingError::Case {
             file: file.clone(),
             key,

@@ -9,7 +9,7 @@ mod error;
 mod packed;
 mod record;
 
-pub use case::{Case, RecordEntry, Role};
+pub use case::{Case, NominalNoise, RecordEntry, Role};
 pub use columns::{Columns, read_columns};
 pub use error::RecordingError;
 pub use packed::gzip;

@@ -1,0 +1,123 @@
+//! The diagnosis away from home: machines of another make and real recordings, before and after.
+//!
+//! In: the folder of measured records. Out: one table; what stood there before this page was first made is `abroad_before.json`, written by the
+//! same command on the program as it was.
+
+use super::abroad_records::{guide, motor_bench, oscillator, pulley};
+use super::foreign_case::{Foretold, foretold};
+use super::{Study, StudyError};
+use serde::{Deserialize, Serialize};
+use servotune::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
+use servotune::lti::Plant;
+use servotune::recording::Case;
+use std::fmt::Write;
+use std::path::Path;
+use std::time::Instant;
+
+/// One case as it came out.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Row {
+    id: String,
+    what: String,
+    expected: String,
+    verdict: String,
+    findings: String,
+    /// Simulation of held-out rows: given, refit, with findings (position_unit).
+    holdout: [f64; 3],
+    floor: f64,
+    unit: String,
+    seconds: f64,
+}
+
+fn row(id: &str, what: &str, expected: &str, unit: &str, d: &Diagnosis, seconds: f64) -> Row {
+    let h = d.fit.holdout.unwrap_or(d.fit.fit);
+    Row {
+        id: id.into(),
+        what: what.into(),
+        expected: expected.into(),
+        verdict: serde_json::to_string(&d.verdict).unwrap_or_default().trim_matches('"').into(),
+        findings: d.findings.iter().map(|f| f.family.join(" or ")).collect::<Vec<_>>().join(", "),
+        // What is no number is written as a very large one: JSON has no infinity.
+        holdout: [h.rms_before, h.rms_refit_linear, h.rms_after].map(|v| if v.is_finite() { v } else { 1e300 }),
+        floor: h.noise_floor,
+        unit: unit.into(),
+        seconds,
+    }
+}
+
+fn foreign(f: &Foretold) -> Result<Row, StudyError> {
+    let (case, plant, controller) = f.made()?;
+    let began = Instant::now();
+    let d = diagnose(&case, &plant, Some(&controller), &DiagnoseSettings::default(), |_| {})?.diagnosis;
+    let seconds = began.elapsed().as_secs_f64();
+    let expected = if f.expected.is_empty() { "no finding".to_owned() } else { f.expected.join(", ") };
+    Ok(row(f.id, f.what, &expected, "track", &d, seconds))
+}
+
+/// Three digits, and never seventy.
+fn figure(v: f64) -> String {
+    if v >= 1e6 || (v > 0.0 && v < 1e-4) {
+        format!("{v:.2e}")
+    } else {
+        format!("{v:.*}", (2.0 - v.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize)
+    }
+}
+
+fn page(rows: &[Row], before: &[Row]) -> String {
+    let mut text = String::from(
+        "# Away from home\n\nMade by `lab abroad --data ../shared/data --out results`: machines of another make (`src/study/foreign.rs`: other forms of the laws, another integrator) and real recordings, each \
+         with a linear model. Figures are the reported simulation of held-out rows: given model, linear refit, with findings; floor is what repeats differ by. *Before* is the same command on the program as \
+         it was (`src/study/abroad_before.json`).\n\n| case | expected | before | after | before: given / refit / findings | after: given / refit / findings | floor | s before | s after |\n|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for r in rows {
+        let b = before.iter().find(|b| b.id == r.id);
+        let said = |r: &Row| format!("{} ({})", r.verdict, r.findings);
+        let three = |r: &Row| r.holdout.map(figure).join(" / ");
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "| {}: {} | {} | {} | {} | {} | {} {} | {} | {} | {} |",
+            r.id,
+            r.what,
+            r.expected,
+            b.map_or("-".into(), said),
+            said(r),
+            b.map_or("-".into(), three),
+            three(r),
+            r.unit,
+            figure(r.floor),
+            b.map_or("-".into(), |b| figure(b.seconds)),
+            figure(r.seconds)
+        );
+    }
+    text
+}
+
+/// Makes the page.
+pub fn abroad(data: &Path, say: &mut dyn FnMut(&str)) -> Result<Study, StudyError> {
+    let mut rows = Vec::new();
+    for f in &foretold() {
+        say(f.id);
+        rows.push(foreign(f)?);
+    }
+    type Make = fn(&Path) -> Result<(Case, Plant), StudyError>;
+    let real: [(&str, &str, Make); 4] = [
+        ("motor_bench", "two masses and a shaft, real", motor_bench),
+        ("linear_guide", "guide with two masses, real, 100 000 samples a record", guide),
+        ("pulley", "pulley drive, sensor without a sign, real", pulley),
+        ("silverbox", "electronic Duffing oscillator, real", oscillator),
+    ];
+    for (id, what, make) in real {
+        say(id);
+        let (case, plant) = make(data)?;
+        let began = Instant::now();
+        let d = diagnose(&case, &plant, None, &DiagnoseSettings::default(), |_| {})?.diagnosis;
+        let seconds = began.elapsed().as_secs_f64();
+        rows.push(row(id, what, "no worse than given", &plant.position_unit, &d, seconds));
+    }
+    let before: Vec<Row> = serde_json::from_str(include_str!("abroad_before.json"))?;
+    let mut study = Study::default();
+    study.page("mismatch/abroad.md", page(&rows, &before));
+    study.page("mismatch/abroad.json", serde_json::to_string_pretty(&rows)? + "\n");
+    Ok(study)
+}

@@ -1,0 +1,46 @@
+//! A step of the search in which no law comes near the noise along the recorded motion, and pushes that come with the clock of the record.
+
+use super::bench::Bench;
+use super::scan::Candidate;
+use super::select::{Model, Step};
+use super::simulated::simulated;
+
+/// Standard deviations of excess from which no law of a step is near, and below which a simulated model leaves nothing.
+pub(super) const DEEP: f64 = 30.0;
+pub(super) const SPENT: f64 = 5.0;
+/// Laws of a step that are fitted by simulation then.
+const SIMULATED: usize = 4;
+/// Share of the strongest push that every other record must show, and the fewest moves that tell.
+const LIKE: f64 = 0.5;
+const MOVES: usize = 3;
+
+/// Whether no law of a step comes near the noise.
+pub(super) fn deep(step: &Step) -> bool {
+    !step.tried.is_empty() && step.tried.iter().all(|t| t.1.excess_sigma() > DEEP)
+}
+
+/// Fits the best laws of a step by simulation, drags first, and keeps what is better: much is left, and along a noisy or a stuck motion a law that
+/// bends falls far short of itself.
+pub(super) fn by_simulation_first(bench: &Bench, step: &mut Step) {
+    let last = |m: &Model| m.chosen.last().map(|c| (c.effect.facts().name, c.effect.drag() || c.effect.bends()));
+    let mut order: Vec<usize> = (0..step.tried.len()).collect();
+    let rank = |i: &usize| {
+        let model = &step.tried[*i].1;
+        (!last(model).is_some_and(|l| l.1), model.cost)
+    };
+    order.sort_by(|a, b| rank(a).0.cmp(&rank(b).0).then(rank(a).1.total_cmp(&rank(b).1)));
+    for i in order.into_iter().take(SIMULATED) {
+        let tried = &step.tried[i].1;
+        if let Some(s) = simulated(bench, tried).filter(|s| s.cost < tried.cost && s.possible()) {
+            let evidence = tried.evidence + s.cost - tried.cost;
+            step.tried[i].1 = Model { evidence, ..s };
+        }
+    }
+}
+
+/// Whether a push has one strength in the records of several moves: it comes with the clock of the record, and not with a move.
+pub(super) fn together(c: &Candidate) -> bool {
+    let s = &c.setting.strengths;
+    let most = s.iter().fold(0.0f64, |m, v| if v.abs() > m.abs() { *v } else { m });
+    s.len() >= MOVES && s.iter().all(|v| v * most.signum() > LIKE * most.abs())
+}

@@ -1,0 +1,153 @@
+//! One search after the other, on other grounds, until one names what acts.
+//!
+//! The noise that repeats differ by is seen through the plant that was given. One that was fitted while something acted answers the commands of
+//! repeats wrongly, and what it gets wrong counts as torque noise: the very law that it conceals is hidden once more. Where a search ends without
+//! a name it is made again under the sensor's own noise, around the given plant, the refitted one, and those of the largest and the smallest
+//! motion.
+
+use super::bench::Bench;
+use super::bump::{Bump, beyond};
+use super::confirm::confirm;
+use super::corrected::corrected;
+use super::diagnose_error::DiagnoseError;
+use super::diagnosis::{DiagnoseSettings, Diagnosed};
+use super::experiment::propose;
+use super::finding::{Diagnosis, NextExperiment, Tried, Verdict};
+use super::fit_report::fit_report;
+use super::held_out::{held_out, mean};
+use super::judge::Judged;
+use super::logs::Hygiene;
+use super::noise_finding::noise_findings;
+use super::reported::Reporting;
+use super::run::Run;
+use super::select::{Selection, select};
+use super::unrest::unrest;
+use super::verdict::{ByOthers, judge};
+use crate::controller::Law;
+use crate::lti::Plant;
+use crate::physics::library;
+use crate::recording::Case;
+
+/// What every search of a case has in common.
+#[derive(Clone, Copy)]
+pub(super) struct Trial<'a> {
+    pub case: &'a Case,
+    pub given: &'a Plant,
+    /// All runs, whole; the bench may hold excerpts of them.
+    pub whole: &'a [Run],
+    pub closed: Option<&'a Law<'a>>,
+    pub settings: &'a DiagnoseSettings,
+    pub hygiene: &'a Hygiene,
+    pub bumps: &'a [Bump],
+    pub remarks: &'a [String],
+}
+
+/// Error over the noise floor up to which a model is down to the noise.
+const DOWN: f64 = 1.5;
+
+/// Whether a diagnosis says what acts, or that nothing does.
+fn settled(d: &Diagnosis) -> bool {
+    d.verdict != Verdict::LocatedUnexplained
+}
+
+/// Whether a diagnosis on another ground may stand: named, and down to the noise wherever it was fitted and held out.
+fn stands(d: &Diagnosis) -> bool {
+    let down = |f: super::finding::FitFigures| f.rms_after < DOWN * f.noise_floor && f.rms_after < f.rms_before;
+    matches!(d.verdict, Verdict::Named | Verdict::Family) && down(d.fit.fit) && d.fit.holdout.is_none_or(down)
+}
+
+impl Trial<'_> {
+    /// The first search that settles the case; the first of all where none does.
+    pub fn best(&self, bench: Bench, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
+        let cut = bench.runs.clone();
+        let first = self.made(bench, progress)?;
+        if settled(&first.diagnosis) || first.bench.lone() {
+            return Ok(first);
+        }
+        let mut plants: Vec<(&str, Plant)> = vec![("given", self.given.clone()), ("refitted", first.refitted.clone())];
+        plants.dedup_by(|a, b| a.1 == b.1);
+        let (t, spindle_hz) = (first.bench.scene.sample_time_s, self.case.spindle_hz);
+        for (name, plant) in plants {
+            progress(&format!("once more under the sensor's noise alone, around the {name} plant"));
+            let bench = Bench::new(&plant, cut.clone(), t, spindle_hz)?.quiet();
+            let mut other = self.made(bench, progress)?;
+            if stands(&other.diagnosis) {
+                other.diagnosis.remarks.push(format!(
+                    "found around the {name} plant under the sensor's noise alone: the given plant, through which repeats are seen, makes more noise of them than there is"
+                ));
+                return Ok(other);
+            }
+        }
+        Ok(first)
+    }
+
+    /// One search and what it comes to.
+    fn made(&self, mut bench: Bench, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
+        let mut remarks = self.remarks.to_vec();
+        let unrest = unrest(&bench);
+        remarks.extend(unrest.as_ref().map(|u| u.says(&self.given.command_unit)));
+        // Records whose samples slipped hold nothing that a model could be fitted to.
+        let selection = select(&mut bench, library(), &self.settings.select, &mut *progress);
+        progress("simulating all records");
+        let last = selection.last();
+        // What the search found, whether or not it is offered.
+        let fixed = corrected(&bench.form, &last.refitted.p, &last.chosen, &bench.scene);
+        let refitted = corrected(&bench.form, &selection.baseline.refitted.p, &[], &bench.scene);
+        let reporting = Reporting { bench: &bench, selection: &selection, runs: self.whole, closed: self.closed };
+        let reported = reporting.offered(self.given);
+        let (figures, errors) = fit_report(&bench, self.given, &reporting, &reported);
+        remarks.extend(reported.remarks.iter().cloned());
+        let sse = bench.stack.total as f64;
+        let whitened = [selection.given / sse, selection.baseline.cost / sse, selection.best().cost / sse];
+        let held_out = held_out(&bench, &selection, &fixed)?;
+        let mut diagnosis = Diagnosis {
+            schema: "servotune.diagnosis/1",
+            id: self.case.id.clone(),
+            verdict: Verdict::NoMismatch,
+            findings: Vec::new(),
+            fit: figures,
+            corrected_model: None,
+            next_experiment: NextExperiment { what: String::new(), expected_separation: 0.0 },
+            noise: bench.levels,
+            replay: self.hygiene.replay.clone(),
+            sample_faults: self.hygiene.faults.clone(),
+            whitened,
+            holdout_whitened: mean(&held_out),
+            confirmed: confirm(&bench, &selection, &fixed, &held_out, self.settings.select.iterations)?,
+            held_out,
+            leftover: selection.leftover.clone(),
+            remarks,
+            search: search(&selection),
+            bootstrap: selection.bootstrap.clone(),
+        };
+        let linear = Judged { plant: &refitted.plant, effects: Vec::new(), ..fixed.judged(&bench, &selection) };
+        let bumps = beyond(&bench, self.bumps.to_vec(), &linear, &fixed.judged(&bench, &selection));
+        let bumps = bumps.iter().map(|b| b.finding(&bench.runs, &self.given.command_unit)).collect();
+        let noise = noise_findings(&bench, unrest.as_ref(), &self.settings.noise, diagnosis.fit.fit);
+        let by_others = ByOthers { logs: self.hygiene.finding.clone(), bumps, noise };
+        judge(&mut diagnosis, &bench, &selection, self.given, &reported, by_others);
+        propose(&mut diagnosis, &bench, &selection);
+        // Pictures are of the whole records.
+        bench.runs = self.whole.to_vec();
+        let (corrected, refitted) = (reported.fixed.made, reported.refitted.made.plant);
+        Ok(Diagnosed { diagnosis, bench, selection, corrected, refitted, errors })
+    }
+}
+
+fn search(selection: &Selection) -> Vec<Tried> {
+    let mut all = Vec::new();
+    for (i, step) in selection.steps.iter().enumerate() {
+        for (j, c) in step.candidates.iter().enumerate().take(12) {
+            let tried = step.tried.iter().position(|t| t.0 == j);
+            all.push(Tried {
+                effect: c.effect.facts().name.into(),
+                step: i + 1,
+                screened: c.gain,
+                concealed: c.concealed,
+                error_after: tried.map(|t| step.tried[t].1.cost / (step.tried[t].1.freedom)),
+                taken: tried.is_some() && tried == step.taken,
+            });
+        }
+    }
+    all
+}

@@ -1,0 +1,321 @@
+//! From findings to a verdict: what the search found, what hold-out records say of it, and what the logs, the lines, pushes and the noise tell beside it.
+
+use super::bench::Bench;
+use super::finding::{Diagnosis, Finding, FitFigures, Verdict};
+use super::held_out::{HeldOut, astray, contradicts, unseen};
+use super::judge::Simulation;
+use super::line_finding::{line_findings, same_line};
+use super::linear_story::linear_story;
+use super::name::{finding, same_drag, unexplained};
+use super::reported::Reported;
+use super::select::{Model, Selection};
+use super::swing::swing;
+use crate::lti::Plant;
+use crate::physics::{Port, library};
+
+/// Whitened error per sample of records that were not used, up to which a model holds whatever the refit leaves.
+const HELD_OUT: f64 = 1.2;
+/// Share of the error in excess of noise that findings must explain to be named.
+pub(super) const NAMED_SHARE: f64 = 0.955;
+/// The same for several laws beside which another still sees something.
+const SEVERAL: f64 = 0.98;
+/// Standard deviations of excess below which a model counts as clean, whatever the share.
+const CLEAN: f64 = 3.0;
+/// Standard deviations of excess, and whitened error per sample, from which something is there though no law was found.
+const RESTLESS: [f64; 2] = [6.0, 1.06];
+/// Share of an error clearly beyond noise that a model which counts as clean must have explained.
+const MOSTLY: f64 = 0.6;
+/// Part of that, where no other law sees anything in what is left and records held out lose as large a part of their own excess.
+const HALF: f64 = 0.5;
+/// Share of what the findings took that another law may still see beside them: no law is a machine's own to the last part.
+const BESIDE: f64 = 0.05;
+
+/// Error of the hold-out records over the noise from which, in closed loop, no name stands that explains less than this share of it.
+const SEVERAL_TIMES: f64 = 3.0;
+const NEARLY: f64 = 0.99;
+
+/// Error over the noise floor that is down to it, and by how much the refit must leave more for a single law to be answered by it.
+const DOWN: f64 = 1.05;
+const ABOVE: f64 = 1.1;
+
+/// Findings that the search has no part in.
+pub(super) struct ByOthers {
+    pub logs: Option<Finding>,
+    pub bumps: Vec<Finding>,
+    pub noise: Vec<Finding>,
+}
+
+/// What stands for and against the model of the search.
+struct Evidence<'a> {
+    bench: &'a Bench,
+    selection: &'a Selection,
+    model: &'a Model,
+    /// Share of the error in excess of noise that it explains.
+    explained: f64,
+    clean: bool,
+    restless: bool,
+    /// Whether it holds in the reported simulation and on records that were not used.
+    holds: bool,
+    /// The record that was not used and contradicts it.
+    against: Option<HeldOut>,
+}
+
+impl<'a> Evidence<'a> {
+    fn of(d: &Diagnosis, bench: &'a Bench, selection: &'a Selection, reported: &Reported) -> Evidence<'a> {
+        let (base, model) = (&selection.baseline, selection.best());
+        let explained = if base.excess() > 0.0 { 1.0 - model.excess().max(0.0) / base.excess() } else { 1.0 };
+        // Down to the noise, and not only because there was little above it; or as near as its level may err, no law seeing anything more.
+        let spent = selection.leftover.is_none() && model.cost / model.freedom < RESTLESS[1];
+        // The level of the noise errs in the records that it is taken from; those that were held out tell on their own how much is explained.
+        let held = d.holdout_whitened.is_some_and(|[refit, after]| after - 1.0 < HALF * (refit - 1.0));
+        let clean = (model.excess_sigma() < CLEAN && base.excess_sigma() < CLEAN)
+            || (explained >= MOSTLY && (model.excess_sigma() < CLEAN || spent))
+            || (explained >= HALF * MOSTLY && spent && held);
+        // Where no law was found, much more is asked of the excess: noise may differ a little from what its repeats say.
+        let restless = model.excess_sigma() > RESTLESS[0] && model.cost / model.freedom > RESTLESS[1];
+        // Along the recorded motion, and simulated: in closed loop limits and noise play into each other, in open loop a free body
+        // drifts away; a model must hold in one of them.
+        let simulated =
+            |h: FitFigures| h.rms_after <= 1.05 * h.rms_refit_linear || h.rms_after <= HELD_OUT * h.noise_floor;
+        let simulations: Vec<FitFigures> = d.fit.holdout.into_iter().chain(d.fit.open_loop).collect();
+        let holds = d.holdout_whitened.is_none_or(|[refit, after]| after <= 1.05 * refit || after <= HELD_OUT)
+            && (simulations.is_empty() || simulations.into_iter().any(simulated))
+            && reported.withdrawn.is_none();
+        let against = contradicts(bench, &d.held_out, &selection.model).cloned();
+        Evidence { bench, selection, model, explained, clean, restless, holds, against }
+    }
+
+    /// Whether the laws of the model may be named; what speaks against it is said.
+    fn names(&self, d: &mut Diagnosis) -> bool {
+        let Evidence { selection, model, explained, .. } = *self;
+        let decisive = explained >= MOST && rival_share(selection) < RIVAL;
+        if let Some(h) = &self.against {
+            d.remarks.push(format!(
+                "the nearest law holds on the records that it was fitted to, but not on {}, which {}: whitened error {:.3} after {:.3} under the linear refit, 1 being noise",
+                h.record,
+                if h.inside { "stays within their range" } else { "goes beyond their range" },
+                h.whitened[1],
+                h.whitened[0]
+            ));
+        }
+        // A law that is asked where it hardly acts errs by its form; where the hold-out records are simulated down to their noise by it, and only
+        // by it, they have answered.
+        let down = |h: FitFigures| h.rms_after < DOWN * h.noise_floor && h.rms_refit_linear > ABOVE * h.rms_after;
+        let answered = model.chosen.len() < 2 && d.fit.holdout.is_some_and(down);
+        let denied = d.confirmed.iter().find(|c| c.denied() && !answered).cloned();
+        if let Some(c) = &denied {
+            d.remarks.push(format!(
+                "the records that were not used deny {}: it should take {:.0} units of their error, and takes {:.0}",
+                c.effect, c.says, c.gains
+            ));
+        }
+        let mixture = self.bench.levels.from_repeats && selection.mixture();
+        if mixture {
+            let laws: Vec<&str> = model.chosen.iter().map(|c| c.effect.facts().name).collect();
+            d.remarks.push(format!(
+                "it takes {} together to explain the records and none leads: likelier one thing that the library lacks; the corrected plant carries the mixture as a stand-in",
+                laws.join(", ")
+            ));
+        }
+        let beside = selection.leftover.as_ref().filter(|l| l.share > BESIDE);
+        if let Some(l) = beside {
+            d.remarks.push(format!(
+                "beside the nearest laws {} can still be seen, with {:.1} % of what they explain: they are near to what acts here, and not it",
+                l.effect,
+                100.0 * l.share
+            ));
+        }
+        // Of several laws together more is asked while yet another sees something: each further one is nearer to anything.
+        let laws = model.chosen.len();
+        let several = selection.leftover.is_some() && (laws > 2 || laws > 1 && !self.clean && explained < SEVERAL);
+        let told = (explained >= NAMED_SHARE || self.clean || decisive) && !several && beside.is_none() && !mixture;
+        // In closed loop nothing drifts: what several times the noise is left of, is not explained.
+        let left = |h: FitFigures| h.rms_after > SEVERAL_TIMES * h.noise_floor && h.explained_share < NEARLY;
+        let left = d.fit.simulation == Simulation::ClosedLoop && d.fit.holdout.is_some_and(left);
+        told && !left && self.holds && self.against.is_none() && denied.is_none()
+    }
+
+    /// The findings of the search by name.
+    fn named(&self, d: &mut Diagnosis) {
+        if !self.clean && self.explained < NAMED_SHARE {
+            d.remarks.push(format!(
+                "no other law of the library comes near, but {:.1} % of the error in excess of noise stays unexplained",
+                100.0 * (1.0 - self.explained)
+            ));
+        }
+        let mut found: Vec<Finding> = Vec::new();
+        for f in (0..self.model.chosen.len()).filter_map(|at| finding(self.bench, self.selection, at)) {
+            if found.iter().all(|g| g.effect != f.effect) {
+                found.push(f);
+            }
+        }
+        if d.findings.is_empty() && !found.is_empty() {
+            let open = found.iter().any(|f| f.family.len() > 1);
+            d.verdict = if open { Verdict::Family } else { Verdict::Named };
+        }
+        // A log that slipped explains what comes after it better than any physics does.
+        if d.verdict != Verdict::DataFault {
+            d.findings.extend(found);
+        }
+    }
+
+    /// There, without a name: unless it is a gain that swings in a phase of its own.
+    fn unnamed(&self, d: &mut Diagnosis, explained: f64) {
+        // A swing in one phase for all records may have taken the first step of one that has a phase in each.
+        let of_the_gain = self.model.chosen.iter().all(|c| c.effect.facts().name == "parametric_gain");
+        match of_the_gain.then(|| swing(self.bench, self.selection)).flatten() {
+            Some(f) => {
+                d.verdict = Verdict::Named;
+                d.findings.push(f);
+            }
+            None => {
+                d.verdict = Verdict::LocatedUnexplained;
+                d.findings.push(unexplained(self.bench, self.selection, explained));
+            }
+        }
+    }
+}
+
+/// From findings to a verdict.
+pub(super) fn judge(
+    d: &mut Diagnosis,
+    bench: &Bench,
+    selection: &Selection,
+    given: &Plant,
+    reported: &Reported,
+    by_others: ByOthers,
+) {
+    let evidence = Evidence::of(d, bench, selection, reported);
+    let ByOthers { logs, bumps, noise } = by_others;
+    if let Some(f) = logs {
+        d.verdict = if f.port == Port::Controller { Verdict::Named } else { Verdict::DataFault };
+        d.findings.push(f);
+    }
+    let chosen = !evidence.model.chosen.is_empty();
+    if !believed(d, selection) && chosen {
+        d.remarks.push(
+            "the bootstrap finds as much in records without physics: the findings of the search are withdrawn".into(),
+        );
+    } else if chosen {
+        d.remarks.extend(reported.withdrawn.clone());
+        if evidence.names(d) {
+            evidence.named(d);
+        } else if d.findings.is_empty() && selection.baseline.excess_sigma() > CLEAN {
+            evidence.unnamed(d, evidence.explained);
+        }
+    } else if d.findings.is_empty()
+        && let Some(f) = swing(bench, selection)
+    {
+        d.verdict = Verdict::Named;
+        d.findings.push(f);
+    } else if (evidence.restless || unaccounted(selection)) && d.findings.is_empty() {
+        d.verdict = Verdict::LocatedUnexplained;
+        d.findings.push(unexplained(bench, selection, 0.0));
+    }
+    if d.verdict != Verdict::DataFault {
+        take_lines(d, bench, selection, bumps);
+    }
+    linear_story(d, bench, selection, given);
+    if d.verdict == Verdict::Refit && !reported.refits {
+        // The given plant stands; whether it agrees, its own error says.
+        let far = d.fit.fit.rms_before > FAR * d.fit.fit.noise_floor;
+        d.verdict = if far { Verdict::LocatedUnexplained } else { Verdict::NoMismatch };
+        d.findings.extend(far.then(|| unexplained(bench, selection, 0.0)));
+    }
+    take_noise(d, noise);
+    beyond_the_fit(d, bench, selection);
+}
+
+/// Pushes and lines, which were found before the search.
+fn take_lines(d: &mut Diagnosis, bench: &Bench, selection: &Selection, bumps: Vec<Finding>) {
+    let (lines, unsteady) = line_findings(bench, selection);
+    for f in bumps.into_iter().chain(lines) {
+        if d.findings.is_empty() {
+            d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
+        }
+        if d.verdict != Verdict::LocatedUnexplained && !d.findings.iter().any(|g| same_line(g, &f)) {
+            d.findings.push(f);
+        }
+    }
+    if d.findings.is_empty() && !unsteady.is_empty() {
+        d.verdict = Verdict::LocatedUnexplained;
+        d.findings.push(super::line_finding::unsteady(bench, &unsteady));
+    }
+}
+
+/// What the fitted records do not show, or cannot.
+fn beyond_the_fit(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
+    // Nothing missing on the records that were fitted, and yet one that was not used is far off.
+    if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)
+        && let Some(f) = astray(bench, &d.held_out).and_then(|h| unseen(bench, selection, h))
+    {
+        d.verdict = Verdict::LocatedUnexplained;
+        d.findings.push(f);
+    }
+    // Without repeats, what the refit leaves beyond the sensor's white noise may be noise of torque or missing physics.
+    if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)
+        && !bench.levels.from_repeats
+        && d.fit.open_loop.is_some_and(|o| o.rms_after > COLOURED * bench.levels.sensor_rms)
+    {
+        d.verdict = Verdict::Undecidable;
+        d.remarks.push(
+            "no record was repeated: the error that the refit leaves is coloured, and cannot be told from noise of torque".into(),
+        );
+    }
+}
+
+/// Whether the bootstrap, where there is one, believes the search: one that finds as much where nothing is has found nothing.
+fn believed(d: &mut Diagnosis, selection: &Selection) -> bool {
+    if let Some(b) = &selection.bootstrap {
+        d.remarks.push(format!(
+            "bootstrap of {} draws without physics: chance of a candidate as strong as on these records {:.3}; draws that would have been alarms {}",
+            b.draws, b.p_value, b.alarms
+        ));
+    }
+    selection.bootstrap.as_ref().is_none_or(|b| b.p_value <= BELIEVED.max(1.0 / (b.draws + 1) as f64))
+}
+
+/// Findings of the noise beside those of the search. What is left without a name is theirs where the linear refit comes down to their noise.
+fn take_noise(d: &mut Diagnosis, noise: Vec<Finding>) {
+    for f in noise {
+        if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit) {
+            d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
+        }
+        if matches!(d.verdict, Verdict::Named | Verdict::Family) {
+            d.findings.push(f);
+        }
+    }
+}
+
+/// Error of the given plant over the noise from which it does not agree with the records though no refit is better.
+const FAR: f64 = 1.5;
+
+/// What the best rival of the first finding explains, as a share of what that finding does.
+fn rival_share(selection: &Selection) -> f64 {
+    let Some((step, taken)) = selection.steps.first().and_then(|s| s.taken.map(|t| (s, &s.tried[t]))) else {
+        return 1.0;
+    };
+    let name = |i: usize| step.candidates[i].effect.facts().name;
+    let gain = step.before - taken.1.evidence;
+    let others = step.tried.iter().filter(|t| name(t.0) != name(taken.0) && !same_drag(name(t.0), name(taken.0)));
+    others.map(|t| (step.before - t.1.evidence) / gain).fold(0.0, f64::max)
+}
+
+/// Share of the error in excess of noise from which a name may be given though more is left than noise, and the share of its
+/// gain that the best rival may reach then: what the library lacks is usually near to several of its laws.
+const MOST: f64 = 0.75;
+const RIVAL: f64 = 0.8;
+
+/// Chance over the whole search, by the bootstrap, up to which findings stand.
+const BELIEVED: f64 = 0.01;
+
+/// Whether a scan saw far more than noise shows, though no law explains enough of it.
+fn unaccounted(selection: &Selection) -> bool {
+    let best = selection.steps.first().and_then(|s| s.candidates.first());
+    best.is_some_and(|c| c.log_p_value(library().len()) < SEEN.ln())
+}
+
+/// Chance of a scan's best gain under noise below which something is there.
+const SEEN: f64 = 1e-9;
+/// Open-loop error over the sensor's white noise above which it counts as coloured.
+const COLOURED: f64 = 1.25;
