@@ -9,7 +9,7 @@ use servotune::physics::{COLUMNS, Entry, Given, Sample, Setting, facts, library}
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-const CONTRACT: &str = "pivot_friction, coulomb_friction, bearing_bias, cable_spring, nonlinear_spring, \
+const CONTRACT: &str = "sensor_curve, free_form, pivot_friction, coulomb_friction, bearing_bias, cable_spring, nonlinear_spring, \
     torque_factor_rolloff, torque_ripple, current_saturation, slew_limit, dead_band, amplifier_lag, extra_delay, \
     sensor_lag, gain_drift, parametric_gain, encoder_cyclic_error, encoder_scale_error, quantisation, encoder_noise, \
     jitter, time_base_drift, misalignment, lost_samples, unmodelled_resonance, mode_shift, aliased_mode, backlash, \
@@ -27,7 +27,8 @@ fn every_name_of_the_contract_is_known_and_no_other() {
             assert!(names.contains(other) && *other != name, "{name} is confused with {other}");
         }
     }
-    assert_eq!(library().len() + servotune::physics::data_facts().len(), names.len());
+    let others = servotune::physics::data_facts().len() + servotune::physics::curves().len();
+    assert_eq!(library().len() + others, names.len());
 }
 
 #[test]

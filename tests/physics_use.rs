@@ -27,7 +27,7 @@ fn nominal() -> Controller {
 
 fn entry(effect: &str, parameters: &[(&str, f64)]) -> PhysicsEntry {
     let parameters = parameters.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
-    PhysicsEntry { effect: effect.into(), parameters }
+    PhysicsEntry { effect: effect.into(), parameters, curve: None }
 }
 
 fn restored(plant: &Plant, entries: &[PhysicsEntry]) -> Restored {

@@ -259,7 +259,7 @@ fn what_cannot_be_tuned_is_refused_by_name() {
     spec.search.bounds.notch_hz = Some([13_000.0, 14_000.0]);
     let e = tune(&machine, &spec, None, &quick()).unwrap_err();
     assert!(matches!(e, TuneError::AboveHalfRate { key: "notch_hz", from_hz: 13_000.0, .. }));
-    plant.physics = vec![servotune::lti::PhysicsEntry { effect: "dead_band".into(), parameters: Default::default() }];
+    plant.physics = vec![servotune::lti::PhysicsEntry { effect: "dead_band".into(), ..Default::default() }];
     let e = tune(&Machine::Model(&plant), &paper_spec(), None, &quick()).unwrap_err();
     assert!(matches!(e, TuneError::Physics { effect } if effect == "dead_band"));
     let _: Plant = plant;

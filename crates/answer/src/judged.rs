@@ -1,6 +1,6 @@
 //! The margins of a plant model, with its physics where it has any.
 
-use super::{AnswerError, Named, Say, outside, restored};
+use super::{AnswerError, Named, Say, for_a_loop, outside};
 use serde::Serialize;
 use servotune::controller::Controller;
 use servotune::feedback::{
@@ -65,7 +65,7 @@ pub fn model_margins(
     let sections = controller.value.sections();
     let sections = sections.map_err(|source| AnswerError::Controller { file: controller.file.into(), source })?;
     let of_plant = |source| AnswerError::Plant { file: plant.file.into(), source };
-    let physics = restored(plant, &model_context(controller.value, amplitudes), say)?;
+    let physics = for_a_loop(plant, &model_context(controller.value, amplitudes), say)?;
     let sampled = DiscretePlant::of(plant.value, sections.sample_time_s).map_err(of_plant)?;
     let linear = confirmed_margins(&ModelLoop::new(&sampled, &sections)?)?;
     let Some(physics) = physics else { return Ok(ModelMargins::Linear(Box::new(linear))) };

@@ -26,7 +26,7 @@ pub use floor::{FloorFiles, floor_files};
 pub use identified::IdentifiedDocument;
 pub use judged::{Described, ModelMargins, model_context, model_margins};
 pub use named::{Named, controller, plant, profile};
-pub use physics::{outside, restored};
+pub use physics::{for_a_loop, outside, restored};
 pub use proof::Proof;
 pub use simulated::{Simulated, simulated};
 pub use sweep::{Ran, adjusted, opened};

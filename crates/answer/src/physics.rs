@@ -18,6 +18,15 @@ pub fn restored(plant: Named<'_, Plant>, context: &Context, say: Say<'_>) -> Res
     Ok((!physics.parts.is_empty()).then_some(physics))
 }
 
+/// The same for margins and tuning, which close a loop on what the sensor reads: refused where that does not tell where the arm is.
+pub fn for_a_loop(plant: Named<'_, Plant>, context: &Context, say: Say<'_>) -> Result<Option<Restored>, AnswerError> {
+    let physics = restored(plant, context, say)?;
+    if let Some(physics) = &physics {
+        physics.seen().map_err(|source| AnswerError::Physics { file: plant.file.into(), source })?;
+    }
+    Ok(physics)
+}
+
 /// Effects without a part in the loop's response: disturbances.
 pub fn outside(physics: &Restored) -> Vec<&'static str> {
     let acts_from_outside =

@@ -1,6 +1,6 @@
 //! The search of gains and the document of `tune`.
 
-use super::{AnswerError, Named, Proof, Say, restored};
+use super::{AnswerError, Named, Proof, Say, for_a_loop};
 use serde::Serialize;
 use servotune::controller::{Controller, Pid};
 use servotune::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
@@ -130,7 +130,7 @@ pub fn given_model(
     } else {
         let clock = start.cloned().unwrap_or_else(|| at_clock(clock));
         let profile = spec.write("tuning a plant with physics").map_err(TuneError::from)?;
-        restored(plant, &context(profile, &clock), say)?.map(Box::new)
+        for_a_loop(plant, &context(profile, &clock), say)?.map(Box::new)
     };
     let linear = Plant { physics: Vec::new(), ..plant.value.clone() };
     let digest = InputDigest { role: "plant".into(), sha256: source.sha256() };

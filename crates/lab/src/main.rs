@@ -43,6 +43,8 @@ enum StudyName {
     Abroad,
     /// The four machine classes under one controller (figures 16-22)
     Classes,
+    /// Real recordings whose missing law has no name or is the sensor's: curves, and the fit before and after
+    FreeForm,
     /// The gate on the production line (Table 3, figures 24, 35-39)
     Gate,
     /// The gate over 20 seeds, on fresh lines and on unknown kinds
@@ -128,6 +130,7 @@ fn run(a: &StudyArguments, say: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>, St
         }
         StudyName::Abroad => Pages(study::abroad(&a.data, say)?),
         StudyName::Classes => Pages(study::classes()?),
+        StudyName::FreeForm => Pages(study::free_form(&a.data)?),
         StudyName::Gate => Pages(study::gate()?),
         StudyName::GateSeeds => Pages(study::gate_seeds()?),
         StudyName::Certificate => Pages(study::certificate(&a.data, say)?),

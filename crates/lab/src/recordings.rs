@@ -15,18 +15,18 @@ use std::path::{Path, PathBuf};
 
 /// One recording and how it is split.
 pub(super) struct Recording {
-    name: &'static str,
+    pub name: &'static str,
     file: &'static str,
     names: ColumnNames,
     sample_time_s: Option<f64>,
     fit: [usize; 2],
     holdout: [usize; 2],
     /// First samples of the hold-out rows that the benchmark does not count.
-    skip: usize,
+    pub skip: usize,
     /// Factor and unit of the benchmark's metric.
-    metric: (f64, &'static str),
+    pub metric: (f64, &'static str),
     pub plant: Plant,
-    words: &'static str,
+    pub words: &'static str,
 }
 
 pub(super) fn rigid(position: &str, command: &str, body: Body) -> Plant {

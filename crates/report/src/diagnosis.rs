@@ -4,6 +4,7 @@
 //! engineer; every error is recorded less simulated position. Spec: `specs/mismatch.md`.
 
 use super::diagnosis_chance::chance_blocks;
+use super::diagnosis_curve::curve_section;
 use super::diagnosis_error::{error_figure, spectrum_figure};
 use super::diagnosis_law::{amplitude_figure, law_figures, unexplained_figure};
 use super::diagnosis_place::{Map, time_map, zone_map};
@@ -45,7 +46,12 @@ impl Shown<'_> {
 
     /// Names of the three models: as given, refitted, with the findings.
     pub fn models(&self) -> [&'static str; 3] {
-        ["model as given", "linear refit", if self.named() { "with findings" } else { "best model tried" }]
+        let last = match (self.named(), &self.made.diagnosis.free_form) {
+            (true, _) => "with findings",
+            (false, Some(_)) => "with the curve",
+            (false, None) => "best model tried",
+        };
+        ["model as given", "linear refit", last]
     }
 }
 
@@ -87,6 +93,7 @@ pub fn diagnosis_page(made: &Diagnosed, provenance: Vec<(String, String)>) -> Re
     if !d.findings.is_empty() {
         sections.push(findings_section(&shown)?);
     }
+    sections.extend(curve_section(d.free_form.as_ref())?);
     sections.push(next_section(&shown));
     sections.push(fit_section(&shown)?);
     sections.push(place_section(&shown)?);
@@ -147,7 +154,10 @@ fn verdict(made: &Diagnosed, unit: &str) -> (Badge, String) {
         }
         Verdict::LocatedUnexplained => {
             let text = "Model and machine differ, and it is known where, but no effect of the library explains it.";
-            (Badge::Fail, format!("{text} {falls}"))
+            match &d.free_form {
+                Some(curve) => (Badge::Warn, format!("{text} {} {falls}", curve.says)),
+                None => (Badge::Fail, format!("{text} {falls}")),
+            }
         }
         Verdict::Undecidable => (
             Badge::Warn,
@@ -195,12 +205,7 @@ fn cards(s: &Shown) -> Vec<Card> {
     vec![
         card(format!("{what} rms, as given"), f.rms_before, times(f.rms_before), None),
         card("After a linear refit".into(), f.rms_refit_linear, times(f.rms_refit_linear), None),
-        card(
-            (if s.named() { "With the findings" } else { "Best model tried" }).into(),
-            f.rms_after,
-            times(f.rms_after),
-            Some(good),
-        ),
+        card(capital(s.models()[2]), f.rms_after, times(f.rms_after), Some(good)),
         card("Noise floor rms".into(), f.noise_floor, "one record".into(), None),
         share,
     ]

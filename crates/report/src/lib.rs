@@ -5,6 +5,7 @@
 //! every text from outside is escaped. Spec: `specs/report.md`.
 
 mod diagnosis_chance;
+pub mod diagnosis_curve;
 mod diagnosis_error;
 mod diagnosis_law;
 mod diagnosis_place;

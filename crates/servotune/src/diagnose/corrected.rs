@@ -46,6 +46,7 @@ pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[Chosen], scene: &Scene)
     let named = |name: &str, e: &dyn Effect, s: &Setting| PhysicsEntry {
         effect: name.into(),
         parameters: e.parameters(s, scene).into_iter().map(|q| (q.name.to_owned(), q.value)).collect(),
+        curve: None,
     };
     for c in chosen.iter().filter(|c| !c.effect.facts().per_record) {
         entries.push(named(c.effect.facts().name, c.effect, &c.setting));

@@ -6,6 +6,7 @@ use super::held_out::HeldOut;
 use super::hygiene::{Replay, SampleFault};
 use super::judge::Simulation;
 use super::leftover::Leftover;
+use super::stand_in::FreeForm;
 use super::whiten::NoiseLevels;
 use crate::physics::Port;
 use serde::Serialize;
@@ -165,6 +166,9 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     /// Fit before and after.
     pub fit: FitReport,
+    /// A curve without a name that stands in for the missing law.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub free_form: Option<FreeForm>,
     /// File of the corrected model, in the output folder.
     pub corrected_model: Option<String>,
     /// What to record next.

@@ -9,13 +9,16 @@ use crate::controller::Law;
 use crate::lti::Plant;
 use crate::recording::Role;
 
-/// Errors of all runs under a model, as the report shows them.
+/// Errors of every run under three models: given, refit, corrected.
+pub(super) type Errors = [Vec<Vec<f64>>; 3];
+
+/// The figures, and the errors of all runs under the three models: as the report shows them, and in open loop.
 pub(super) fn fit_report(
     bench: &Bench,
     given: &Plant,
     reporting: &Reporting,
     reported: &Reported,
-) -> (FitReport, [Vec<Vec<f64>>; 3]) {
+) -> (FitReport, Errors, Errors) {
     let every: Vec<&Run> = reporting.runs.iter().collect();
     let closed = reporting.closed;
     let given = Offer::of(given);
@@ -24,7 +27,12 @@ pub(super) fn fit_report(
     };
     let open = three(None);
     let chosen = if closed.is_some() { three(closed) } else { open.clone() };
-    let of_role = |e: &[Vec<Vec<f64>>; 3], role: Role| -> Option<FitFigures> {
+    (figures_of(bench, &every, [&open, &chosen], closed.is_some()), chosen, open)
+}
+
+/// The figures of these errors: given, refit, corrected; in open loop and as the report shows them.
+pub(super) fn figures_of(bench: &Bench, every: &[&Run], [open, chosen]: [&Errors; 2], closed: bool) -> FitReport {
+    let of_role = |e: &Errors, role: Role| -> Option<FitFigures> {
         let which: Vec<usize> = (0..every.len()).filter(|&i| every[i].role == role && !every[i].bumped).collect();
         if which.is_empty() {
             return None;
@@ -34,7 +42,7 @@ pub(super) fn fit_report(
         // The floor from repeats of the fit records, under the model that fits best; it is the same for every record.
         let least = if after <= before || before.is_nan() { &e[2] } else { &e[0] };
         let rounding = bench.grid.map_or(0.0, |g| g.step / 12f64.sqrt());
-        let noise = floor(least, &every).unwrap_or_else(|| fallback_floor(bench, after)).max(rounding.min(after));
+        let noise = floor(least, every).unwrap_or_else(|| fallback_floor(bench, after)).max(rounding.min(after));
         let room = before * before - noise * noise;
         let explained_share =
             if room > 0.0 { (1.0 - (after * after - noise * noise).max(0.0) / room).clamp(-1.0, 1.0) } else { 1.0 };
@@ -63,17 +71,16 @@ pub(super) fn fit_report(
         .collect();
     let zero =
         FitFigures { rms_before: 0.0, rms_refit_linear: 0.0, rms_after: 0.0, noise_floor: 0.0, explained_share: 0.0 };
-    let report = FitReport {
-        simulation: if closed.is_some() { Simulation::ClosedLoop } else { Simulation::OpenLoop },
-        holdout: of_role(&chosen, Role::Holdout),
-        fit: of_role(&chosen, Role::Fit).unwrap_or(zero),
+    FitReport {
+        simulation: if closed { Simulation::ClosedLoop } else { Simulation::OpenLoop },
+        holdout: of_role(chosen, Role::Holdout),
+        fit: of_role(chosen, Role::Fit).unwrap_or(zero),
         // A loop can hold a model that runs away on its own; its open-loop figures then say nothing.
-        open_loop: of_role(&open, Role::Holdout)
-            .or_else(|| of_role(&open, Role::Fit))
+        open_loop: of_role(open, Role::Holdout)
+            .or_else(|| of_role(open, Role::Fit))
             .filter(|f| f.rms_after.is_finite() && f.rms_after < 10.0 * f.rms_before),
         records,
-    };
-    (report, chosen)
+    }
 }
 
 /// Without repeats the floor is the sensor's noise as the spectrum shows it, never more than what the best model leaves.

@@ -68,6 +68,12 @@ impl Judged<'_> {
         let mut all = free_motions(&self.plant.body, t, run.len()).to_vec();
         all.extend(self.lines.iter().flat_map(|l| l.columns(run, t)));
         all.extend(self.effects.iter().flat_map(|(e, s)| e.free(&s.inner, self.scene, run.len())));
+        for tau in self.effects.iter().filter_map(|(e, s)| e.fades(&s.inner)) {
+            let left: Vec<f64> = (0..run.len()).map(|k| (-(k as f64 * t) / tau).exp()).collect();
+            let mut y = vec![0.0; run.len()];
+            direct.add_response(&left, &mut y);
+            all.push(y);
+        }
         let spindle = self.scene.spindle_hz.unwrap_or(0.0) * TAU;
         let samples = (0..run.len())
             .map(|k| Sample {
@@ -222,8 +228,23 @@ impl<'a> Begun<'a> {
 
     /// A better start from one that is near, and what its motions come to there.
     pub fn better(&self, free: Vec<f64>, rounds: usize) -> Result<(Started, Vec<Vec<f64>>), LtiError> {
+        self.better_of(free, rounds, |felt| felt)
+    }
+
+    /// The start `by` from where the arm stood.
+    pub fn moved(&self, by: f64) -> Vec<f64> {
+        self.open[0].iter().map(|v| by * v).collect()
+    }
+
+    /// The same as [`Begun::better`] with some of the start's motions only.
+    pub fn better_of(
+        &self,
+        free: Vec<f64>,
+        rounds: usize,
+        of: impl Fn(Vec<Vec<f64>>) -> Vec<Vec<f64>>,
+    ) -> Result<(Started, Vec<Vec<f64>>), LtiError> {
         let here = self.simulated(free.clone())?;
-        let felt = self.felt(&free, &here)?;
+        let felt = of(self.felt(&free, &here)?);
         Ok((self.found_from(free, here, &felt, rounds)?, felt))
     }
 

@@ -13,7 +13,7 @@ use super::diagnose_error::DiagnoseError;
 use super::diagnosis::{DiagnoseSettings, Diagnosed};
 use super::experiment::propose;
 use super::finding::{Diagnosis, NextExperiment, Tried, Verdict};
-use super::fit_report::fit_report;
+use super::fit_report::{Errors, figures_of, fit_report};
 use super::held_out::{held_out, mean};
 use super::judge::Judged;
 use super::logs::Hygiene;
@@ -21,6 +21,7 @@ use super::noise_finding::noise_findings;
 use super::reported::Reporting;
 use super::run::Run;
 use super::select::{Selection, select};
+use super::stand_in::{Standing, enter, stand_in};
 use super::unrest::unrest;
 use super::verdict::{ByOthers, judge};
 use crate::controller::Law;
@@ -60,29 +61,61 @@ impl Trial<'_> {
     /// The first search that settles the case; the first of all where none does.
     pub fn best(&self, bench: Bench, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
         let cut = bench.runs.clone();
-        let first = self.made(bench, progress)?;
-        if settled(&first.diagnosis) || first.bench.lone() {
+        let (first, open) = self.made(bench, progress)?;
+        if settled(&first.diagnosis) {
             return Ok(first);
         }
+        if !first.bench.lone()
+            && let Some(named) = self.under_the_sensors_noise(&first, &cut, progress)?
+        {
+            return Ok(named);
+        }
+        // A curve is fitted to whole records only: excerpts of very long ones end without.
+        let whole = cut.iter().map(Run::len).eq(self.whole.iter().map(Run::len));
+        Ok(if whole { self.with_curve(first, open, progress) } else { first })
+    }
+
+    /// The first search under the sensor's own noise that names what acts, down to the noise.
+    fn under_the_sensors_noise(
+        &self,
+        first: &Diagnosed,
+        cut: &[Run],
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Option<Diagnosed>, DiagnoseError> {
         let mut plants: Vec<(&str, Plant)> = vec![("given", self.given.clone()), ("refitted", first.refitted.clone())];
         plants.dedup_by(|a, b| a.1 == b.1);
         let (t, spindle_hz) = (first.bench.scene.sample_time_s, self.case.spindle_hz);
         for (name, plant) in plants {
             progress(&format!("once more under the sensor's noise alone, around the {name} plant"));
-            let bench = Bench::new(&plant, cut.clone(), t, spindle_hz)?.quiet();
-            let mut other = self.made(bench, progress)?;
+            let bench = Bench::new(&plant, cut.to_vec(), t, spindle_hz)?.quiet();
+            let (mut other, _) = self.made(bench, progress)?;
             if stands(&other.diagnosis) {
                 other.diagnosis.remarks.push(format!(
                     "found around the {name} plant under the sensor's noise alone: the given plant, through which repeats are seen, makes more noise of them than there is"
                 ));
-                return Ok(other);
+                return Ok(Some(other));
             }
         }
-        Ok(first)
+        Ok(None)
     }
 
-    /// One search and what it comes to.
-    fn made(&self, mut bench: Bench, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
+    /// The same with a curve in the place of the law that has no name, where one is worth it.
+    fn with_curve(&self, mut made: Diagnosed, mut open: Errors, progress: &mut dyn FnMut(&str)) -> Diagnosed {
+        let floor = made.diagnosis.fit.holdout.unwrap_or(made.diagnosis.fit.fit).noise_floor;
+        let standing = Standing { closed: self.closed, errors: &made.errors, floor };
+        if let Some(found) = stand_in(&made.bench, &made.selection, &standing, progress) {
+            enter(&mut made.diagnosis, &found);
+            [made.errors[2], open[2]] = found.errors;
+            let every: Vec<&Run> = made.bench.runs.iter().collect();
+            made.diagnosis.fit = figures_of(&made.bench, &every, [&open, &made.errors], self.closed.is_some());
+            made.corrected = found.corrected;
+            propose(&mut made.diagnosis, &made.bench, &made.selection);
+        }
+        made
+    }
+
+    /// One search and what it comes to, with the errors of all runs in open loop.
+    fn made(&self, mut bench: Bench, progress: &mut dyn FnMut(&str)) -> Result<(Diagnosed, Errors), DiagnoseError> {
         let mut remarks = self.remarks.to_vec();
         let unrest = unrest(&bench);
         remarks.extend(unrest.as_ref().map(|u| u.says(&self.given.command_unit)));
@@ -95,7 +128,7 @@ impl Trial<'_> {
         let refitted = corrected(&bench.form, &selection.baseline.refitted.p, &[], &bench.scene);
         let reporting = Reporting { bench: &bench, selection: &selection, runs: self.whole, closed: self.closed };
         let reported = reporting.offered(self.given);
-        let (figures, errors) = fit_report(&bench, self.given, &reporting, &reported);
+        let (figures, errors, open) = fit_report(&bench, self.given, &reporting, &reported);
         remarks.extend(reported.remarks.iter().cloned());
         let sse = bench.stack.total as f64;
         let whitened = [selection.given / sse, selection.baseline.cost / sse, selection.best().cost / sse];
@@ -106,6 +139,7 @@ impl Trial<'_> {
             verdict: Verdict::NoMismatch,
             findings: Vec::new(),
             fit: figures,
+            free_form: None,
             corrected_model: None,
             next_experiment: NextExperiment { what: String::new(), expected_separation: 0.0 },
             noise: bench.levels,
@@ -130,7 +164,7 @@ impl Trial<'_> {
         // Pictures are of the whole records.
         bench.runs = self.whole.to_vec();
         let (corrected, refitted) = (reported.fixed.made, reported.refitted.made.plant);
-        Ok(Diagnosed { diagnosis, bench, selection, corrected, refitted, errors })
+        Ok((Diagnosed { diagnosis, bench, selection, corrected, refitted, errors }, open))
     }
 }
 

@@ -55,7 +55,7 @@ impl<'a> DescribedPlant<'a> {
                     continue;
                 }
                 Share::Ratio(_) => true,
-                Share::Cycle => false,
+                Share::Cycle | Share::Blind => false,
             };
             parts.push(Part { effect: *effect, setting, entry: effect.facts().entry, linear });
         }

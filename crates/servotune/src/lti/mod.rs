@@ -3,9 +3,11 @@
 //! In: parameters with units. Out: responses, poles, states that step in time.
 //! Convention: s in rad/s, z = exp(j w T); `specs/conventions.md`. Sources: the paper's eqs. (1)-(3), (21), (29), (31).
 
+mod curve_entry;
 mod discrete;
 mod lanes;
 mod modal;
+mod physics_entry;
 mod plant;
 mod plant_file;
 mod plant_forms;
@@ -18,10 +20,12 @@ mod state;
 mod state_space;
 mod term_answers;
 
+pub use curve_entry::{CurveEntry, CurveKnot};
 pub use discrete::{DiscretePlant, Intersample, RealForm};
 pub use lanes::{CHUNK, LaneChunk, PlantLanes};
 pub use modal::{ModalForm, ModalTerm};
-pub use plant::{Body, LtiError, Mode, PhysicsEntry, Plant};
+pub use physics_entry::PhysicsEntry;
+pub use plant::{Body, LtiError, Mode, Plant};
 pub use plant_file::PlantFile;
 pub use rational::Rational;
 pub use response::FrequencyResponse;

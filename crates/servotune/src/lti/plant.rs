@@ -2,10 +2,10 @@
 //!
 //! P(s) = resonance_gain exp(-delay s) body(s) Π (s² + 2 ζz ωz s + ωz²)/(s² + 2 ζp ωp s + ωp²), eqs. (21), (29), (30).
 
+use super::PhysicsEntry;
 use super::{FrequencyResponse, Rational};
 use crate::document::size_limits::{DAMPING, PLANT_MODES, PLANT_RAD_S, VALUE};
 use nalgebra::Complex;
-use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// The low-frequency part of the plant, or all of its rational part.
@@ -43,16 +43,6 @@ pub struct Mode {
     pub pole_rad_s: f64,
     /// ζp, above 0: a plant model is stable.
     pub pole_damping_ratio: f64,
-}
-
-/// One effect beyond linear as it stands in the plant file; its meaning belongs to the physics room.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct PhysicsEntry {
-    /// The effect's name from the contract's list.
-    pub effect: String,
-    /// Its parameters by name, in the units of the plant file.
-    #[serde(flatten)]
-    pub parameters: BTreeMap<String, f64>,
 }
 
 /// A plant model. [`Plant::check`] says whether its numbers make one.

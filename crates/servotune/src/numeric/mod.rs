@@ -1,4 +1,4 @@
-//! Numerics without control meaning: roots, minima, least squares, spectra, random numbers.
+//! Numerics without control meaning: roots, minima, least squares, splines, spectra, random numbers.
 //!
 //! In: plain slices. Out: plain numbers and small structs. Every method is deterministic.
 
@@ -11,6 +11,7 @@ pub mod polynomial;
 pub mod random;
 pub mod root;
 pub mod spectrum;
+pub mod spline;
 pub mod twofold;
 pub mod unwrap;
 pub mod wide;

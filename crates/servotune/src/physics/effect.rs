@@ -196,6 +196,14 @@ pub enum PhysicsError {
         "effect `{effect}`: acts on a second-order body or a free inertia; the plant has {poles} poles beside its resonance pairs"
     )]
     Body { effect: String, poles: usize },
+    /// A curve's keys make none.
+    #[error("effect `{effect}`: {what}")]
+    Curve { effect: String, what: String },
+    /// No loop can be closed on what the sensor reads.
+    #[error(
+        "effect `{effect}`: the reading turns round and does not tell where the arm is; margins and tuning need one that does"
+    )]
+    Blind { effect: &'static str },
     /// The effect is one of data or statistics and cannot be simulated.
     #[error(
         "effect `{effect}`: found in records, but not one that a simulation can carry; take its entry out of the plant file"
@@ -331,6 +339,11 @@ pub trait Effect: Sync {
     /// Motions of its own over `n` samples that a record may begin in, in the recorded position: what still rings from the move before.
     fn free(&self, _inner: &[f64], _scene: &Scene, _n: usize) -> Vec<Vec<f64>> {
         Vec::new()
+    }
+
+    /// Time constant (s) of what a command before the record has left in it, where that is no motion of the body.
+    fn fades(&self, _inner: &[f64]) -> Option<f64> {
+        None
     }
 
     /// Its part in the loop's response at `w_rad_s`, sampled as the law samples it.

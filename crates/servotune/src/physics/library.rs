@@ -4,10 +4,10 @@ use super::effect::{Effect, Facts};
 use super::{
     aerodynamic_drag, aliased_mode, amplifier_lag, backlash, base_mode, bearing_bias, broadband_disturbance,
     cable_spring, controller_mismatch, coulomb_friction, current_saturation, dead_band, encoder_cyclic_error,
-    encoder_noise, encoder_scale_error, extra_delay, gain_drift, jitter, line_disturbance, linear_parameters,
-    lost_samples, misalignment, modal_damping, mode_shift, nonlinear_spring, offset_drift, parametric_gain,
-    pivot_friction, quantisation, repeatable_runout, sensor_lag, shock, slew_limit, time_base_drift,
-    torque_factor_rolloff, torque_ripple, unexplained, unmodelled_resonance,
+    encoder_noise, encoder_scale_error, extra_delay, free_form, gain_drift, jitter, line_disturbance,
+    linear_parameters, lost_samples, misalignment, modal_damping, mode_shift, nonlinear_spring, offset_drift,
+    parametric_gain, pivot_friction, quantisation, repeatable_runout, sensor_curve, sensor_lag, shock, slew_limit,
+    time_base_drift, torque_factor_rolloff, torque_ripple, unexplained, unmodelled_resonance,
 };
 
 /// Every effect that can be simulated and found by its columns.
@@ -43,6 +43,11 @@ pub fn library() -> &'static [&'static dyn Effect] {
     ]
 }
 
+/// Effects that can be simulated and are found by the estimation of curves: along a recorded motion they have no columns.
+pub fn curves() -> &'static [&'static dyn Effect] {
+    &[&sensor_curve::SensorCurve]
+}
+
 static DATA: &[&Facts] = &[
     &quantisation::FACTS,
     &encoder_noise::FACTS,
@@ -53,6 +58,7 @@ static DATA: &[&Facts] = &[
     &aliased_mode::FACTS,
     &broadband_disturbance::FACTS,
     &controller_mismatch::FACTS,
+    &free_form::FACTS,
     &linear_parameters::FACTS,
     &unexplained::FACTS,
 ];
@@ -64,7 +70,7 @@ pub fn data_facts() -> &'static [&'static Facts] {
 
 /// The effect of this name.
 pub fn effect(name: &str) -> Option<&'static dyn Effect> {
-    library().iter().copied().find(|e| e.facts().name == name)
+    library().iter().chain(curves()).copied().find(|e| e.facts().name == name)
 }
 
 /// What is known of any name of the contract's list.

@@ -4,8 +4,10 @@
 //! in, and the entries that no simulation can carry, by name. Spec: `specs/mismatch.md`, "Use".
 
 use super::effect::{Effect, Given, PhysicsError, Setting};
-use super::library::{data_facts, effect, library};
+use super::free_form;
+use super::library::{curves, data_facts, effect, library};
 use super::sample::Scene;
+use super::share::Share;
 use crate::lti::{Body, PhysicsEntry, Plant};
 
 /// What a plant file does not say of the machine and its motion.
@@ -68,17 +70,25 @@ impl Restored {
         };
         let mut restored = Restored { parts: Vec::new(), scene, left_out: Vec::new() };
         for entry in &plant.physics {
+            if entry.effect == "free_form" {
+                bodied(entry, &restored.scene.plant)?;
+                restored.parts.push(free_form::restored(entry)?);
+                continue;
+            }
+            if entry.curve.is_some() {
+                let what = "found a curve; expected named parameters, a curve is effect `free_form`".into();
+                return Err(PhysicsError::Curve { effect: entry.effect.clone(), what });
+            }
             match effect(&entry.effect) {
                 Some(e) => {
-                    if let Body::Rational(r) = &restored.scene.plant.body {
-                        return Err(PhysicsError::Body { effect: entry.effect.clone(), poles: r.poles.len() });
-                    }
+                    bodied(entry, &restored.scene.plant)?;
                     restored.parts.push((e, setting(e, entry, &restored.scene)?));
                 }
                 None => match data_facts().iter().find(|f| f.name == entry.effect) {
                     Some(facts) => restored.left_out.push(facts.name),
                     None => {
-                        let known: Vec<&str> = library().iter().map(|e| e.facts().name).collect();
+                        let laws = library().iter().chain(curves()).map(|e| e.facts().name);
+                        let known: Vec<&str> = laws.chain(["free_form"]).collect();
                         return Err(PhysicsError::Unknown { effect: entry.effect.clone(), known: known.join(", ") });
                     }
                 },
@@ -92,9 +102,23 @@ impl Restored {
         self.parts.iter().map(|(e, _)| e.facts().name).collect()
     }
 
+    /// Refuses a plant whose sensor does not tell where the arm is: margins and tuning close a loop on it.
+    pub fn seen(&self) -> Result<(), PhysicsError> {
+        let blind = self.parts.iter().find(|(e, s)| e.share(s, &self.scene, 1.0) == Share::Blind);
+        blind.map_or(Ok(()), |(e, _)| Err(PhysicsError::Blind { effect: e.facts().name }))
+    }
+
     /// Effects and settings as [`super::Machine::new`] takes them.
     pub fn effects(&self) -> Vec<(&dyn Effect, &Setting)> {
         self.parts.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect()
+    }
+}
+
+/// Refuses a plant without the body that laws act on.
+fn bodied(entry: &PhysicsEntry, plant: &Plant) -> Result<(), PhysicsError> {
+    match &plant.body {
+        Body::Rational(r) => Err(PhysicsError::Body { effect: entry.effect.clone(), poles: r.poles.len() }),
+        _ => Ok(()),
     }
 }
 

@@ -16,4 +16,6 @@ pub enum Share {
     Ratio(Complex<f64>),
     /// A disturbance, or a swing whose mean is 0: it acts on the loop from outside.
     Outside,
+    /// A reading that does not tell where the arm is: no loop is closed on it.
+    Blind,
 }

@@ -1,0 +1,308 @@
+//! A curve without a name: what no law of the library holds, as it was estimated at one port of the machine.
+//!
+//! A natural cubic spline through knots, straight beyond the first and the last with the slope that it has there; at the amplifier a
+//! first-order lag may follow it. One effect for each port, all under the name `free_form`; the search of the library leaves them out (`specs/mismatch.md`, "Curves without a name").
+
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting};
+use super::sample::{Sample, Scene};
+use super::share::Share;
+use crate::lti::{CurveEntry, CurveKnot, PhysicsEntry};
+use crate::numeric::spline::Spline;
+
+/// Where a curve acts and what it goes over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CurvePort {
+    /// Torque added (command_unit) over the arm's position.
+    TorqueOverPosition,
+    /// Torque added (command_unit) over the arm's velocity.
+    TorqueOverVelocity,
+    /// What acts (command_unit) over the command.
+    AmplifierOverCommand,
+    /// Torque per command over the arm's position.
+    GainOverPosition,
+    /// What is read (position_unit) over the position.
+    SensorOverPosition,
+}
+
+/// The effect at one port. Inner: positions of the knots, then the values there, then the time constant of the lag (s) where there is one.
+pub struct FreeForm {
+    port: CurvePort,
+    facts: Facts,
+}
+
+const fn made(port: CurvePort, part: Port, entry: Entry, equation: &'static str) -> FreeForm {
+    FreeForm {
+        port,
+        facts: Facts {
+            name: "free_form",
+            port: part,
+            entry,
+            columns: 1,
+            fixed: true,
+            per_record: false,
+            equation,
+            says: "something acts along a curve that has no name in the library",
+            confused_with: &[],
+            experiment: "the same moves at three sizes, and slow ramps over the whole range in both directions",
+            band_hz: [0.1, 3000.0],
+        },
+    }
+}
+
+static TORQUE_OVER_POSITION: FreeForm =
+    made(CurvePort::TorqueOverPosition, Port::Torque, Entry::Torque, "tau = u + f(x), f a natural cubic spline");
+static TORQUE_OVER_VELOCITY: FreeForm =
+    made(CurvePort::TorqueOverVelocity, Port::Torque, Entry::Torque, "tau = u + f(x'), f a natural cubic spline");
+static AMPLIFIER_OVER_COMMAND: FreeForm =
+    made(CurvePort::AmplifierOverCommand, Port::Amplifier, Entry::Command, "i = f(u), f a natural cubic spline");
+static GAIN_OVER_POSITION: FreeForm =
+    made(CurvePort::GainOverPosition, Port::Torque, Entry::Torque, "tau = f(x) u, f a natural cubic spline");
+static SENSOR_OVER_POSITION: FreeForm =
+    made(CurvePort::SensorOverPosition, Port::Sensor, Entry::Position, "m = f(x), f a natural cubic spline");
+
+impl CurvePort {
+    /// All of them.
+    pub const ALL: [CurvePort; 5] = [
+        CurvePort::TorqueOverPosition,
+        CurvePort::TorqueOverVelocity,
+        CurvePort::AmplifierOverCommand,
+        CurvePort::GainOverPosition,
+        CurvePort::SensorOverPosition,
+    ];
+
+    /// The effect at this port.
+    pub fn effect(self) -> &'static dyn Effect {
+        self.form()
+    }
+
+    fn form(self) -> &'static FreeForm {
+        match self {
+            CurvePort::TorqueOverPosition => &TORQUE_OVER_POSITION,
+            CurvePort::TorqueOverVelocity => &TORQUE_OVER_VELOCITY,
+            CurvePort::AmplifierOverCommand => &AMPLIFIER_OVER_COMMAND,
+            CurvePort::GainOverPosition => &GAIN_OVER_POSITION,
+            CurvePort::SensorOverPosition => &SENSOR_OVER_POSITION,
+        }
+    }
+
+    /// Port and argument as files name them.
+    pub fn names(self) -> [&'static str; 2] {
+        match self {
+            CurvePort::TorqueOverPosition => ["torque", "position"],
+            CurvePort::TorqueOverVelocity => ["torque", "velocity"],
+            CurvePort::AmplifierOverCommand => ["amplifier", "command"],
+            CurvePort::GainOverPosition => ["gain", "position"],
+            CurvePort::SensorOverPosition => ["sensor", "position"],
+        }
+    }
+
+    /// Units of argument and value on a machine with these units.
+    pub fn units(self, position: &str, command: &str) -> [String; 2] {
+        let speed = format!("{position}/s");
+        match self {
+            CurvePort::TorqueOverPosition => [position.into(), command.into()],
+            CurvePort::TorqueOverVelocity => [speed, command.into()],
+            CurvePort::AmplifierOverCommand => [command.into(), command.into()],
+            CurvePort::GainOverPosition => [position.into(), "1".into()],
+            CurvePort::SensorOverPosition => [position.into(), position.into()],
+        }
+    }
+
+    /// The value that changes nothing.
+    pub fn idle(self, at: f64) -> f64 {
+        match self {
+            CurvePort::TorqueOverPosition | CurvePort::TorqueOverVelocity => 0.0,
+            CurvePort::GainOverPosition => 1.0,
+            CurvePort::AmplifierOverCommand | CurvePort::SensorOverPosition => at,
+        }
+    }
+
+    /// What the curve goes over, at a sample.
+    pub fn argument(self, s: &Sample) -> f64 {
+        match self {
+            CurvePort::TorqueOverVelocity => s.v,
+            CurvePort::AmplifierOverCommand => s.u,
+            _ => s.x,
+        }
+    }
+
+    /// The setting of a curve through these points, `at` strictly ascending.
+    pub fn setting(self, at: &[f64], value: &[f64]) -> Setting {
+        Setting { inner: at.iter().chain(value).copied().collect(), strengths: vec![1.0] }
+    }
+
+    /// The entry of a plant file.
+    pub fn entry(self, knots: Vec<CurveKnot>, lag_s: Option<f64>, position: &str, command: &str) -> PhysicsEntry {
+        let [port, argument] = self.names().map(str::to_owned);
+        let [_, unit] = self.units(position, command);
+        let curve = Some(CurveEntry { port, argument, unit, knots });
+        let parameters = lag_s.map(|lag| (LAG.to_owned(), lag)).into_iter().collect();
+        PhysicsEntry { effect: "free_form".into(), parameters, curve }
+    }
+
+    /// A setting whose output follows its curve with a lag.
+    pub fn lagged(mut setting: Setting, lag_s: f64) -> Setting {
+        setting.inner.push(lag_s);
+        setting
+    }
+}
+
+/// The curve of a setting.
+pub fn spline(setting: &Setting) -> Spline {
+    of(&setting.inner)
+}
+
+fn of(inner: &[f64]) -> Spline {
+    let n = inner.len() / 2;
+    Spline::new(inner[..n].to_vec(), inner[n..2 * n].to_vec())
+}
+
+/// The lag behind the curve (s).
+fn lag(inner: &[f64]) -> Option<f64> {
+    inner.last().copied().filter(|_| inner.len() % 2 == 1)
+}
+
+/// Name of the lag behind an amplifier's curve.
+const LAG: &str = "lag_s";
+
+/// The effect and the setting of a plant file's curve; refused by name where its keys make none.
+pub(super) fn restored(entry: &PhysicsEntry) -> Result<(&'static dyn Effect, Setting), PhysicsError> {
+    let wrong = |what: String| PhysicsError::Curve { effect: entry.effect.clone(), what };
+    let curve =
+        entry.curve.as_ref().ok_or_else(|| wrong("found no knots; expected port, argument, unit and knots".into()))?;
+    let port = CurvePort::ALL.into_iter().find(|p| p.names() == [&*curve.port, &*curve.argument]).ok_or_else(|| {
+        let known: Vec<String> = CurvePort::ALL.iter().map(|p| p.names().join(" over ")).collect();
+        wrong(format!("found {} over {}; expected one of: {}", curve.port, curve.argument, known.join(", ")))
+    })?;
+    let lagged = port == CurvePort::AmplifierOverCommand;
+    if let Some(parameter) = entry.parameters.keys().find(|k| !lagged || *k != LAG) {
+        return Err(wrong(format!(
+            "parameter `{parameter}` is unknown; expected port, argument, unit and knots, and lag_s for an amplifier"
+        )));
+    }
+    let lag_s = entry.parameters.get(LAG).copied();
+    if let Some(found) = lag_s.filter(|l| !(l.is_finite() && *l > 0.0)) {
+        return Err(wrong(format!("{LAG} = {found}; expected a finite number above 0")));
+    }
+    let knots = &curve.knots;
+    if knots.len() < 2 {
+        return Err(wrong(format!("found {} knots; expected at least 2", knots.len())));
+    }
+    if let Some(k) = knots.iter().find(|k| !k.at.is_finite() || !k.value.is_finite()) {
+        return Err(wrong(format!("found a knot at {} with the value {}; expected finite numbers", k.at, k.value)));
+    }
+    if let Some(w) = knots.windows(2).find(|w| w[1].at <= w[0].at) {
+        return Err(wrong(format!("found a knot at {} behind one at {}; expected them ascending", w[1].at, w[0].at)));
+    }
+    let at: Vec<f64> = knots.iter().map(|k| k.at).collect();
+    let value: Vec<f64> = knots.iter().map(|k| k.value).collect();
+    let setting = port.setting(&at, &value);
+    Ok((port.effect(), lag_s.map_or_else(|| setting.clone(), |lag| CurvePort::lagged(setting.clone(), lag))))
+}
+
+struct Curve {
+    port: CurvePort,
+    spline: Spline,
+    lag: Option<Lag>,
+}
+
+/// What follows an amplifier's curve with a first-order lag; what acts is the mean over each interval.
+struct Lag {
+    /// exp(-T/tau).
+    keep: f64,
+    /// Mean of exp(-t/tau) over an interval.
+    mean: f64,
+    current: Option<f64>,
+}
+
+impl Lag {
+    /// The current at the end of an interval that began with `held`.
+    fn arrived(&self, held: f64) -> f64 {
+        held + (self.current.unwrap_or(held) - held) * self.keep
+    }
+}
+
+impl Curve {
+    /// The mean over a straight way from `a` to `b` (Simpson).
+    fn mean(&self, a: f64, b: f64) -> f64 {
+        let f = |x| self.spline.value(x);
+        (f(a) + 4.0 * f(0.5 * (a + b)) + f(b)) / 6.0
+    }
+}
+
+impl Law for Curve {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        out[0] = match self.port {
+            CurvePort::TorqueOverPosition => self.mean(from.x, to.x),
+            CurvePort::TorqueOverVelocity => self.mean(from.v, to.v),
+            CurvePort::GainOverPosition => (self.mean(from.x, to.x) - 1.0) * from.i,
+            CurvePort::AmplifierOverCommand => {
+                let wanted = self.spline.value(to.u);
+                let late = |lag: &Lag| (lag.arrived(self.spline.value(from.u)) - wanted) * lag.mean;
+                wanted + self.lag.as_ref().map_or(0.0, late) - to.u
+            }
+            CurvePort::SensorOverPosition => self.spline.value(to.x) - to.x,
+        };
+    }
+
+    fn commit(&mut self, from: &Sample, _to: &Sample) {
+        let held = self.spline.value(from.u);
+        if let Some(lag) = &mut self.lag {
+            lag.current = Some(lag.arrived(held));
+        }
+    }
+}
+
+impl Effect for FreeForm {
+    fn facts(&self) -> &'static Facts {
+        &self.port.form().facts
+    }
+
+    /// None: the search of the library does not look for it.
+    fn grid(&self, _scene: &Scene) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
+    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+        let made = |tau: f64| {
+            let ratio = scene.sample_time_s / tau;
+            Lag { keep: (-ratio).exp(), mean: -(-ratio).exp_m1() / ratio, current: None }
+        };
+        Box::new(Curve { port: self.port, spline: of(inner), lag: lag(inner).map(made) })
+    }
+
+    fn fades(&self, inner: &[f64]) -> Option<f64> {
+        lag(inner)
+    }
+
+    /// None: its numbers are knots.
+    fn parameters(&self, _setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+        Vec::new()
+    }
+
+    fn bends(&self) -> bool {
+        true
+    }
+
+    /// A reading that turns round does not tell where the arm is.
+    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+        let spline = of(&setting.inner);
+        let rises = |k: &[f64]| spline.slope(k[0]) > 0.0 && spline.slope(0.5 * (k[0] + k[1])) > 0.0;
+        let monotone = self.port != CurvePort::SensorOverPosition || spline.at().windows(2).all(rises);
+        if monotone { Share::Cycle } else { Share::Blind }
+    }
+
+    /// Curves are restored from their knots ([`restored`]), not from named numbers.
+    fn restore(&self, _given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+        Err(PhysicsError::Missing { effect: "free_form", parameter: "knots" })
+    }
+}
+
+/// What is known beforehand of a curve at any port.
+pub static FACTS: Facts = made(
+    CurvePort::TorqueOverPosition,
+    Port::Torque,
+    Entry::Torque,
+    "a natural cubic spline at one port: torque over position or velocity, amplifier over command, gain over position, sensor over position",
+)
+.facts;
