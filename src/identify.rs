@@ -1,12 +1,14 @@
 //! `servotune identify`: a sweep file to a plant model.
 
 use super::arguments::IdentifyArguments;
+use super::outputs::Outputs;
 use super::{Ending, Failure, Screen, load};
 use serde::Serialize;
 use servotune::document::write_text;
 use servotune::identify::{HeldOut, Hold, Identified, Intervals, LadderRung, TrustedBand, Work, identify};
 use servotune::lti::PlantFile;
 use servotune_report::identified::{identified_sentences, ladder_table, order_table, parameter_table};
+use std::path::PathBuf;
 
 /// The document of `identify --json`.
 #[derive(Serialize)]
@@ -30,6 +32,9 @@ struct Document<'a> {
 }
 
 pub(super) fn run(a: &IdentifyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let inputs = [Some(a.frf.clone()), a.controller.clone(), a.taken.measured_with.clone()];
+    let inputs: Vec<PathBuf> = inputs.into_iter().flatten().collect();
+    let outputs = Outputs::new(&[&a.out], &inputs, a.force)?;
     let hold_included = a.model.settings().hold != Hold::NotIncluded;
     let taken = load::Taken { how: &a.taken, unstable_poles: 0, hold_included, controller: a.controller.as_deref() };
     let sweep = load::sweep(&a.frf, &a.reading, &taken, screen)?;
@@ -37,6 +42,7 @@ pub(super) fn run(a: &IdentifyArguments, screen: &mut Screen) -> Result<Ending, 
         .map_err(|source| Failure::Identify { file: a.frf.clone(), source })?;
     let file = PlantFile::from(&id.plant);
     let text = toml::to_string(&file).map_err(|source| Failure::Toml { source })?;
+    outputs.keep_old(screen)?;
     write_text(&a.out, &text)?;
     screen.say(&format!("wrote {}", a.out.display()));
     let document = Document {

@@ -1,13 +1,14 @@
 //! `servotune tune`: gains that meet the limits, a gain table, a report.
 
 use super::arguments::{ModelArguments, TuneArguments};
+use super::outputs::Outputs;
 use super::proof::{self, Proof};
 use super::slot::{self, Slot};
 use super::tune_text::{physical_text, text};
-use super::{Ending, Failure, Screen, load, physics, tune_machines};
+use super::{Ending, Failure, Screen, load, physics, tune_machines, verify};
 use serde::Serialize;
 use servotune::controller::Controller;
-use servotune::document::{FileSet, check_target, read_text, sha256_hex};
+use servotune::document::{FileSet, read_text, sha256_hex};
 use servotune::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
 use servotune::frf::Sweep;
 use servotune::identify::{self, Identified, IdentifySettings, identify};
@@ -20,7 +21,7 @@ use servotune::tune::{
 };
 use servotune::verify::{Assurance, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, tune_assured};
 use servotune_report::tuned::Units;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -124,9 +125,7 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         return tune_machines::run(a, machines, gate, screen);
     }
     // A search takes minutes: where its result cannot be put is said before it.
-    for target in [Some(&a.out), a.report.as_ref()].into_iter().flatten() {
-        check_target(target)?;
-    }
+    let outputs = outputs(a)?;
     let spec = Spec::read(&a.spec).map_err(TuneError::from)?;
     let start = a.controller.as_ref().map(|file| load::controller(file)).transpose()?;
     let settings = TuneSettings { sample_time_s: a.sample_time_s, starts: a.starts, ..TuneSettings::default() };
@@ -157,6 +156,7 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         let page = report(a, &given, &spec, start.as_ref(), &settings, &reached, proof.as_ref())?;
         files.write(file, page);
     }
+    outputs.keep_old(screen)?;
     proof::commit(files, screen)?;
     let units = given.units(&a.model);
     let physics = given.physics().zip(reached.physics.as_ref());
@@ -190,6 +190,16 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     };
     screen.result(&document, &(text + &said))?;
     Ok(if reached.tuned { Ending::Accepted } else { Ending::Rejected })
+}
+
+/// Permission to write the table, its certificate and the report.
+fn outputs(a: &TuneArguments) -> Result<Outputs, Failure> {
+    let certificate = verify::beside(&a.out);
+    let outputs: Vec<&PathBuf> = [Some(&a.out), a.report.as_ref(), Some(&certificate)].into_iter().flatten().collect();
+    let files = [&a.plant, &a.frf, &a.controller, &a.taken.measured_with, &Some(a.spec.clone())];
+    let mut inputs: Vec<PathBuf> = files.into_iter().flatten().cloned().collect();
+    inputs.extend(Spec::profile_path(&a.spec).map_err(TuneError::from)?);
+    Outputs::new(&outputs, &inputs, a.force)
 }
 
 /// The machine in the files, digests of them into `inputs`.
