@@ -20,26 +20,26 @@ LINES = [
      ["servotune init stage mystage"], ["files for", "servotune", "Every key"]),
     ("1", "`twin` is not in `servotune --help`", ["servotune --help"], ["  twin", "  init", "  check", "  export", "  completions"]),
     ("1", "reader notes: four long lines on every sweep", ["servotune margins --frf mystage/sweep.csv --controller mystage/controller.toml --quiet"], ["phase margin"]),
-    ("1", "`train` with a wrong label lists 350 column names (9 kB)", ["servotune train wide.csv --label label --out gate.json"], ["error"]),
+    ("1", "`train` with a wrong label lists 350 column names (9 kB)", ["servotune train wide.csv --label label --out gate.json"], ["error:"]),
     ("2.0", "no `check`; the meaning of a file is a riddle", ["servotune check plant.toml controller.toml spec.toml"], [""]),
     ("2.0", "\"dc gain\" is not the gain at rest", ["servotune identify vcm/sweep.csv --order 30 --out vcm/plant.toml"], ["Gain at rest", "dc_gain of the body"]),
     ("2.3", "intervals of 60 decades, and no sentence says that the numbers mean nothing",
      ["servotune identify vcm/sweep.csv --order 30 --out vcm/plant.toml"], ["does not tell", "not told"]),
     ("4.9", "rad/s under a header `Frequency`, ends not round: taken as Hz with a note", ["servotune margins --frf odd.csv --controller controller.toml --quiet"], ["warning"]),
-    ("4.11", "radians under `Phase (deg)`: wrong advice (conjugate)", ["servotune margins --frf radians.csv --controller controller.toml"], ["error"]),
-    ("4.13", "inverted sensor silently taken for a phase-margin display", ["servotune margins --frf inverted.csv --controller controller.toml"], ["error"]),
-    ("4.16", "typo in a key: \"did you mean\" missing", ["servotune margins --plant plant.toml --controller typo.toml"], ["error"]),
+    ("4.11", "radians under `Phase (deg)`: wrong advice (conjugate)", ["servotune margins --frf radians.csv --controller controller.toml"], ["error:"]),
+    ("4.13", "inverted sensor silently taken for a phase-margin display", ["servotune margins --frf inverted.csv --controller controller.toml"], ["error:"]),
+    ("4.16", "typo in a key: \"did you mean\" missing", ["servotune margins --plant plant.toml --controller typo.toml"], ["error:"]),
     ("4.17", "missing `kd_s` taken as 0 in silence", ["servotune check nokd.toml"], [""]),
-    ("4.18", "kp = \"0.27\": a Rust word", ["servotune margins --plant plant.toml --controller text.toml"], ["error"]),
-    ("4.19", "sample_time_s = 39.6 (us): cause not named, 17 digits", ["servotune margins --plant plant.toml --controller micro.toml"], ["error"]),
+    ("4.18", "kp = \"0.27\": a Rust word", ["servotune margins --plant plant.toml --controller text.toml"], ["error:"]),
+    ("4.19", "sample_time_s = 39.6 (us): cause not named, 17 digits", ["servotune margins --plant plant.toml --controller micro.toml"], ["error:"]),
     ("4.19", "the same without filters is accepted", ["servotune check bare.toml"], [""]),
-    ("4.20", "`--out` is a device: replaced by a file", ["servotune identify sweep.csv --out /dev/full"], ["error"]),
-    ("4.20", "`--out -` writes a file named `-`", ["servotune identify sweep.csv --out -"], ["error"]),
+    ("4.20", "`--out` is a device: replaced by a file", ["servotune identify sweep.csv --out /dev/full"], ["error:"]),
+    ("4.20", "`--out -` writes a file named `-`", ["servotune identify sweep.csv --out -"], ["error:"]),
     ("4.20", "`identify -` is not stdin", ["servotune margins --frf - --controller controller.toml < sweep.csv"], ["phase margin"]),
-    ("4.21", "an output that is an input is overwritten", ["servotune identify sweep.csv --out sweep.csv"], ["error"]),
-    ("4.22", "what exists is overwritten in silence", ["servotune identify sweep.csv --out mine.toml", "servotune identify sweep.csv --out mine.toml --force"], ["error", "kept as"]),
-    ("4.22", "the demo overwrites a folder without a word", ["servotune demo --out ."], ["error"]),
-    ("4.24", "disk full: half results, no advice", ["sh -c \"trap '' XFSZ; ulimit -f 0; exec servotune identify sweep.csv --out full.toml\""], ["error"]),
+    ("4.21", "an output that is an input is overwritten", ["servotune identify sweep.csv --out sweep.csv"], ["error:"]),
+    ("4.22", "what exists is overwritten in silence", ["servotune identify sweep.csv --out mine.toml", "servotune identify sweep.csv --out mine.toml --force"], ["error:", "kept as"]),
+    ("4.22", "the demo overwrites a folder without a word", ["servotune demo --out ."], ["error:"]),
+    ("4.24", "disk full: half results, no advice", ["sh -c \"trap '' XFSZ; ulimit -f 0; exec servotune identify sweep.csv --out full.toml\""], ["error:"]),
     ("4.33", "`--json` and an error: nothing on stdout", ["servotune check gone.toml --json"], ["{", "schema", "\"error\"", "exit_code", "}"]),
     ("5", "no completions, no man page", ["servotune completions bash | wc -l", "servotune completions man | head -1"], [""]),
     ("5", "no export", ["servotune export controller.toml --as c --out c.h", "servotune export controller.toml --as fixed --word-length 24 --plant plant.toml --out f.h",
@@ -106,7 +106,7 @@ def main() -> None:
 
     parts = [
         "# First use: the list and the new answers\n\n`python3 scripts/first_use.py` runs every command below and writes this page. The number is the line's place in the list; long lines are "
-        "cut at 400 characters, and of long answers the lines that matter are shown.\n"
+        "cut at 700 characters, and of long answers the lines that matter are shown.\n"
     ]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -116,7 +116,7 @@ def main() -> None:
             for command in commands:
                 code, said = run(command, folder)
                 lines = [line for line in said.splitlines() if line.strip() and any(word in line for word in words)]
-                shown = [line if len(line) <= 400 else line[:400] + " ..." for line in lines[:12]]
+                shown = [line if len(line) <= 700 else line[:700] + " ..." for line in lines[:12]]
                 parts.append(f"$ {command}\n" + "".join(f"{line}\n" for line in shown) + f"[exit code {code}]\n")
             parts.append("```\n")
     parts.append("\n## Not answered here\n\n| place | what |\n|---|---|\n" + "".join(f"| {p} | {t} |\n" for p, t in OPEN))

@@ -8,7 +8,7 @@ use super::tune_text::{physical_text, text};
 use super::{Ending, Failure, Screen, load, physics, tune_machines, verify};
 use serde::Serialize;
 use servotune::controller::Controller;
-use servotune::document::{FileSet, read_text, sha256_hex};
+use servotune::document::{FileSet, check_target, read_text, sha256_hex};
 use servotune::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
 use servotune::frf::Sweep;
 use servotune::identify::{self, Identified, IdentifySettings, identify};
@@ -196,6 +196,8 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
 fn outputs(a: &TuneArguments) -> Result<Outputs, Failure> {
     let certificate = verify::beside(&a.out);
     let outputs: Vec<&PathBuf> = [Some(&a.out), a.report.as_ref(), Some(&certificate)].into_iter().flatten().collect();
+    // Said even where the spec, which names one of the inputs, cannot be read.
+    outputs.iter().try_for_each(|out| check_target(out))?;
     let files = [&a.plant, &a.frf, &a.controller, &a.taken.measured_with, &Some(a.spec.clone())];
     let mut inputs: Vec<PathBuf> = files.into_iter().flatten().cloned().collect();
     inputs.extend(Spec::profile_path(&a.spec).map_err(TuneError::from)?);
