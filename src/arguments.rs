@@ -5,6 +5,7 @@ pub(super) use super::fleet_arguments::{FleetArguments, TwinFleetArguments};
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
 pub(super) use super::margins_arguments::MarginsArguments;
 pub(super) use super::performance_arguments::{BudgetArguments, NextSweepArguments, ParetoArguments};
+pub(super) use super::start_arguments::{CheckArguments, CompletionsArguments, ExportArguments, InitArguments};
 pub(super) use super::sweep_arguments::{MeasuredArguments, ModelArguments, ReadingArguments};
 pub(super) use super::verify_arguments::VerifyArguments;
 use super::verify_arguments::uncertainty;
@@ -23,12 +24,20 @@ pub(super) struct Arguments {
     /// One JSON document on stdout instead of text
     #[arg(long, global = true)]
     pub json: bool,
+    /// Say nothing beside the result but refusals and warnings
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Also say what the files state by themselves
+    #[arg(long, short, global = true)]
+    pub verbose: bool,
     #[command(subcommand)]
     pub command: Command,
 }
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
+    Init(InitArguments),
+    Check(CheckArguments),
     Demo(DemoArguments),
     Diagnose(Box<DiagnoseArguments>),
     Features(FeaturesArguments),
@@ -44,8 +53,9 @@ pub(super) enum Command {
     Train(Box<TrainArguments>),
     Classify(ClassifyArguments),
     Verify(Box<VerifyArguments>),
-    #[command(hide = true)]
+    Export(ExportArguments),
     Twin(TwinArguments),
+    Completions(CompletionsArguments),
 }
 
 /// The whole chain on a built-in machine: sweep, identification, tuning, gain table, report
@@ -55,6 +65,9 @@ pub(super) struct DemoArguments {
     /// Folder to write to
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Write into a folder that holds other files; those of the demo's names are kept under another name, which is said
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Raw machine folders (response.bod, pes.csv, log.toml) to one row of features each
@@ -79,12 +92,15 @@ pub(super) struct FeaturesArguments {
   servotune identify wide.csv --columns frequency=f_Hz,real=G11_re,imaginary=G11_im --out plant.toml
   servotune identify sweep.txt --phase margin --order 22 --out plant.toml")]
 pub(super) struct IdentifyArguments {
-    /// Swept-sine file: .bod, .csv, .tsv, .txt (gzip allowed) or UFF with dataset 58
+    /// Swept-sine file: .bod, .csv, .tsv, .txt (gzip allowed) or UFF with dataset 58; - reads stdin
     #[arg(value_name = "FRF")]
     pub frf: PathBuf,
     /// Plant model to write
     #[arg(long, value_name = "PLANT")]
     pub out: PathBuf,
+    /// Replace what stands at the place of the output; it is kept under another name, which is said
+    #[arg(long)]
+    pub force: bool,
     /// Controller that ran while the sweep was taken, for --measured other than P
     #[arg(long, value_name = "CONTROLLER")]
     pub controller: Option<PathBuf>,
@@ -174,7 +190,7 @@ pub(super) struct TuneArguments {
     /// Plant model (plant.toml)
     #[arg(long, value_name = "PLANT", group = "machine")]
     pub plant: Option<PathBuf>,
-    /// Swept-sine file, tuned on directly
+    /// Swept-sine file, tuned on directly; - reads stdin
     #[arg(long, value_name = "FRF", group = "machine")]
     pub frf: Option<PathBuf>,
     /// Folder of machine folders: those that the gate calls tunable are tuned on their response.bod
@@ -201,6 +217,9 @@ pub(super) struct TuneArguments {
     /// Report to write, one HTML file
     #[arg(long, value_name = "FILE", conflicts_with = "machines")]
     pub report: Option<PathBuf>,
+    /// Replace what stands at the place of an output; it is kept under another name, which is said
+    #[arg(long, conflicts_with = "machines")]
+    pub force: bool,
     /// Write the best compromise even where the limits are not met
     #[arg(long)]
     pub keep_infeasible: bool,

@@ -2,6 +2,7 @@
 //! the model does not explain, then a tester of sixteen slots.
 
 use super::arguments::DemoArguments;
+use super::outputs::Outputs;
 use super::proof::{self, OnSweep};
 use super::tune_text::text;
 use super::{Ending, Failure, Screen, demo_diagnosis, demo_fleet, demo_gate, gated};
@@ -44,16 +45,12 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let file = |name: &str| a.out.join(name);
     let machine = paper_machine(MachineClass::Tunable)?;
     let start = nominal_controller()?;
-    write_text(&file("controller.toml"), include_str!("../specs/controllers/nominal.toml"))?;
-    write_text(&file("profile.toml"), include_str!("../specs/profiles/spiral.toml"))?;
     let spec_text = include_str!("../specs/limits/paper.toml").replace("../profiles/spiral.toml", "profile.toml");
-    write_text(&file("spec.toml"), &spec_text)?;
-
     screen.say(&format!("1/7 sweep of the paper's tunable machine, 40-5000 Hz, 400 points, {} % noise", 100.0 * NOISE));
     let taken = measure(&machine, &log_grid(40.0, 5000.0, 400), NOISE, &mut Random::new(1))?;
     let mut bod = Vec::new();
     write_bod_as(&taken, PhaseDisplay::Margin, &mut bod)?;
-    write_whole(&file("response.bod"), &bod)?;
+    begin(a, &spec_text, &bod, screen)?;
     let sweep = read_file(&file("response.bod"), &ReadSettings::default())?;
     for note in &sweep.notes {
         screen.say(&format!("    {note}"));
@@ -152,4 +149,22 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     };
     screen.result(&document, &shown)?;
     Ok(ending)
+}
+
+/// Writes what the demo begins with, unless a person's files stand there.
+fn begin(a: &DemoArguments, spec: &str, response: &[u8], screen: &mut Screen) -> Result<(), Failure> {
+    let texts = [
+        (a.out.join("controller.toml"), include_str!("../specs/controllers/nominal.toml").as_bytes()),
+        (a.out.join("profile.toml"), include_str!("../specs/profiles/spiral.toml").as_bytes()),
+        (a.out.join("spec.toml"), spec.as_bytes()),
+        (a.out.join("response.bod"), response),
+    ];
+    let results = ["plant.toml", "gains.toml", "report.html"].map(|name| a.out.join(name));
+    for outputs in [Outputs::known(&texts, a.force)?, Outputs::new(&results.each_ref(), &[], a.force)?] {
+        outputs.keep_old(screen)?;
+    }
+    for (file, text) in &texts {
+        write_whole(file, text)?;
+    }
+    Ok(())
 }

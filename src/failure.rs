@@ -17,6 +17,7 @@ use servotune::verify::VerifyError;
 use servotune_answer::AnswerError;
 use servotune_fleet::FleetError;
 use servotune_report::ReportError;
+use std::error::Error as _;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -95,4 +96,39 @@ pub enum Failure {
     Json { source: serde_json::Error },
     #[error("cannot write to stdout: {source}")]
     Stdout { source: std::io::Error },
+    #[error(
+        "{}: the phase lies half a turn from that of a plant with a positive gain, and two readings fit: the column shows the phase margin (--phase margin), or it shows the response of a machine whose sensor or amplifier is inverted (--phase response). Taken wrongly, the gains give positive feedback. Evidence for the half turn: {evidence}",
+        file.display()
+    )]
+    HalfTurn { file: PathBuf, evidence: String },
+    #[error("stdin: cannot read it: {source}")]
+    Stdin { source: std::io::Error },
+    #[error("{said}")]
+    Unfit { said: String },
+    #[error("`-` is no file to write to; stdout carries the result, as text or with --json; name a file")]
+    NoStdout,
+    #[error("{}: this output is also given as {}; name another file, nothing was written", out.display(), input.display())]
+    OutputIsInput { out: PathBuf, input: PathBuf },
+    #[error(
+        "{}: already there, and not as this program writes it (a person's file, or changed by hand); name another, or --force replaces it and keeps the old one beside it",
+        file.display()
+    )]
+    Kept { file: PathBuf },
+}
+
+impl Failure {
+    /// The refusal and its causes, a line each.
+    pub(crate) fn whole(&self) -> String {
+        let mut text = self.to_string();
+        let mut cause = self.source();
+        while let Some(c) = cause {
+            let more = c.to_string();
+            // A transparent wrapper repeats what it wraps.
+            if !text.contains(&more) {
+                text.push_str(&format!("\n  because: {more}"));
+            }
+            cause = c.source();
+        }
+        text
+    }
 }

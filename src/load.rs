@@ -4,10 +4,13 @@ use super::sweep_arguments::{MeasuredArguments, ReadingArguments};
 use super::{Failure, Screen};
 use servotune::controller::Controller;
 use servotune::document::read_text;
-use servotune::frf::{Measured, Sweep, read_file};
+use servotune::document::size_limits::SWEEP_BYTES;
+use servotune::frf::{Ground, Measured, Note, ReadSettings, Sweep, read_bytes, read_file};
 use servotune::lti::Plant;
 use servotune::pes::Profile;
 use servotune_answer::{self as answer, Ran, adjusted, opened};
+use std::f64::consts::TAU;
+use std::io::Read;
 use std::path::Path;
 
 /// A plant, its physics entries not looked at yet.
@@ -37,6 +40,67 @@ pub(super) struct Taken<'a> {
     pub controller: Option<&'a Path>,
 }
 
+/// The sweep in a file, or on stdin where the file is `-`.
+fn sweep_text(file: &Path, settings: &ReadSettings) -> Result<Sweep, Failure> {
+    if file.as_os_str() != "-" {
+        return Ok(read_file(file, settings)?);
+    }
+    let mut bytes = Vec::new();
+    // One byte more than the reader takes: it then refuses by its own limit.
+    let most = SWEEP_BYTES as u64 + 1;
+    std::io::stdin().lock().take(most).read_to_end(&mut bytes).map_err(|source| Failure::Stdin { source })?;
+    if bytes.len() > SWEEP_BYTES {
+        return Err(Failure::Unfit {
+            said: format!("stdin: longer than {SWEEP_BYTES} bytes; expected a sweep of at most that length"),
+        });
+    }
+    Ok(read_bytes("stdin", &bytes, settings)?)
+}
+
+/// Refuses what would put a sign on the machine that nobody stated, and says aloud a unit that nobody stated.
+///
+/// `.bod` is the format of software that shows the margin; of any other file half a turn may as well be an inverted sensor.
+fn doubtful(file: &Path, sweep: &Sweep, screen: &mut Screen) -> Result<(), Failure> {
+    let name = file.to_string_lossy().to_lowercase();
+    let shows_margin = name.ends_with(".bod") || name.ends_with(".bod.gz");
+    for note in &sweep.notes {
+        match note {
+            Note::PhaseMargin { ground: Ground::GainPhase(evidence) } if !shows_margin => {
+                return Err(Failure::HalfTurn { file: file.into(), evidence: evidence.to_string() });
+            }
+            Note::Frequency { ground: Ground::Contract, .. } => {
+                let w = sweep.frf.w_rad_s();
+                let [low, high] = [w[0] / TAU, w[w.len() - 1] / TAU];
+                if !(round(low) || round(high)) {
+                    screen.warn(&format!(
+                        "warning: {}: nothing says the unit of frequency; hertz is taken, from {low:.6} to {high:.6} Hz. In rad/s it would be {:.6} to {:.6} Hz, and every gain wrong by 2 pi: --frequency hertz or --frequency rad_per_s settles it",
+                        file.display(),
+                        low / TAU,
+                        high / TAU
+                    ));
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Whether a person may have set this end of a sweep: three digits tell it.
+fn round(hz: f64) -> bool {
+    format!("{hz:.2e}").parse::<f64>().is_ok_and(|tidy| (tidy - hz).abs() <= 2e-5 * hz)
+}
+
+/// Whether the file itself states what the note says: nothing was decided.
+fn stated(note: &Note) -> bool {
+    let ground = match note {
+        Note::Frequency { ground, .. } | Note::Magnitude { ground, .. } | Note::Angle { ground, .. } => ground,
+        Note::PhaseMargin { ground } | Note::PhaseResponse { ground } => ground,
+        _ => return false,
+    };
+    matches!(ground, Ground::Header(_) | Ground::Format)
+}
+
 /// The plant's sweep, opened out of its loop where it was taken in one; what was decided is said.
 pub(super) fn sweep(
     file: &Path,
@@ -45,8 +109,12 @@ pub(super) fn sweep(
     screen: &mut Screen,
 ) -> Result<Sweep, Failure> {
     let measured = taken.how.measured;
-    let mut sweep = read_file(file, &adjusted(reading.settings(), measured, taken.unstable_poles))?;
-    sweep.notes.iter().for_each(|n| screen.say(&format!("note: {}: {n}", file.display())));
+    let mut sweep = sweep_text(file, &adjusted(reading.settings(), measured, taken.unstable_poles))?;
+    doubtful(file, &sweep, screen)?;
+    for note in &sweep.notes {
+        let said = format!("note: {}: {note}", file.display());
+        if stated(note) { screen.detail(&said) } else { screen.say(&said) }
+    }
     sweep.frf = sweep.frf.with_unstable_poles(taken.unstable_poles);
     if measured == Measured::Plant {
         return match taken.how.measured_with {

@@ -5,13 +5,23 @@
 
 mod arguments;
 mod budget;
+mod check;
+mod check_kind;
+mod check_words;
 mod classify;
+mod colour;
+mod completions;
 mod demo;
 mod demo_diagnosis;
 mod demo_fleet;
 mod demo_gate;
 mod diagnose;
 mod diagnose_arguments;
+mod export;
+mod export_c;
+mod export_fixed;
+mod export_matlab;
+mod export_st;
 mod failure;
 mod features;
 mod fleet;
@@ -23,16 +33,20 @@ mod fleet_twin;
 mod gate_arguments;
 mod gated;
 mod identify;
+mod init;
 mod load;
 mod margins;
 mod margins_arguments;
 mod next_sweep;
+mod outputs;
 mod pareto;
 mod performance_arguments;
 mod proof;
 mod response;
 mod screen;
 mod simulate;
+mod start_arguments;
+mod starter;
 mod sweep_arguments;
 mod train;
 mod tune;
@@ -45,7 +59,7 @@ mod verify_arguments;
 use arguments::{Arguments, Command};
 use clap::Parser;
 use failure::Failure;
-use screen::Screen;
+use screen::{Screen, Volume};
 use std::process::ExitCode;
 
 /// What a command that ran has to say by its exit code.
@@ -63,11 +77,24 @@ fn main() -> ExitCode {
         Err(e) => {
             // Help and version are answers (0); a wrong word is a refusal (2). clap prints each where it belongs.
             let _ = e.print();
+            // What stood behind the program's name is not known yet; the word itself is.
+            if e.use_stderr() && std::env::args_os().any(|a| a == "--json") {
+                Screen::new(true, Volume::Quiet).refusal(e.to_string().trim_start_matches("error: ").trim_end());
+            }
             return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
         }
     };
-    let mut screen = Screen::new(arguments.json);
+    let volume = match (arguments.quiet, arguments.verbose) {
+        (true, _) => Volume::Quiet,
+        (false, true) => Volume::Verbose,
+        (false, false) => Volume::Usual,
+    };
+    let mut screen = Screen::new(arguments.json, volume);
     let ending = match arguments.command {
+        Command::Init(a) => init::run(&a, &mut screen),
+        Command::Check(a) => check::run(&a, &mut screen),
+        Command::Completions(a) => completions::run(&a, &mut screen),
+        Command::Export(a) => export::run(&a, &mut screen),
         Command::Demo(a) => demo::run(&a, &mut screen),
         Command::Diagnose(a) => diagnose::run(&a, &mut screen),
         Command::Features(a) => features::run(&a, &mut screen),

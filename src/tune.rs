@@ -1,8 +1,9 @@
 //! `servotune tune`: gains that meet the limits, a gain table, a report.
 
 use super::arguments::TuneArguments;
+use super::outputs::Outputs;
 use super::tune_text::{physical_text, text};
-use super::{Ending, Failure, Screen, load, proof, tune_machines};
+use super::{Ending, Failure, Screen, load, proof, tune_machines, verify};
 use servotune::controller::Controller;
 use servotune::document::{FileSet, check_target, read_text, sha256_hex};
 use servotune::identify::{self, IdentifySettings};
@@ -10,6 +11,7 @@ use servotune::tune::{Hold, InputDigest, Machine, Spec, TuneError, TuneSettings,
 use servotune::verify::Source;
 use servotune_answer::slot::{self, Slot};
 use servotune_answer::{Asked, Given, Named, Proof, Reached, TunedDocument, given_model, given_sweep, tuned};
+use std::path::PathBuf;
 
 pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     if a.frf.is_none() && a.taken.any() {
@@ -19,9 +21,7 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         return tune_machines::run(a, machines, gate, screen);
     }
     // A search takes minutes: where its result cannot be put is said before it.
-    for target in [Some(&a.out), a.report.as_ref()].into_iter().flatten() {
-        check_target(target)?;
-    }
+    let outputs = outputs(a)?;
     let spec = Spec::read(&a.spec).map_err(TuneError::from)?;
     let start = a.controller.as_ref().map(|file| load::controller(file)).transpose()?;
     let settings = TuneSettings { sample_time_s: a.sample_time_s, starts: a.starts, ..TuneSettings::default() };
@@ -58,6 +58,7 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         let page = report(a, &given, &spec, start.as_ref(), &settings, &reached, proof.as_ref())?;
         files.write(file, page);
     }
+    outputs.keep_old(screen)?;
     proof::commit(files, screen)?;
     let units = given.units();
     let physics = given.physics().zip(reached.physics.as_ref());
@@ -69,6 +70,18 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     let document = TunedDocument::of(&given, &reached, &spec, proof.as_ref(), written, a.report.as_deref());
     screen.result(&document, &(text + &said))?;
     Ok(if reached.tuned { Ending::Accepted } else { Ending::Rejected })
+}
+
+/// Permission to write the table, its certificate and the report.
+fn outputs(a: &TuneArguments) -> Result<Outputs, Failure> {
+    let certificate = verify::beside(&a.out);
+    let outputs: Vec<&PathBuf> = [Some(&a.out), a.report.as_ref(), Some(&certificate)].into_iter().flatten().collect();
+    // Said even where the spec, which names one of the inputs, cannot be read.
+    outputs.iter().try_for_each(|out| check_target(out))?;
+    let files = [&a.plant, &a.frf, &a.controller, &a.taken.measured_with, &Some(a.spec.clone())];
+    let mut inputs: Vec<PathBuf> = files.into_iter().flatten().cloned().collect();
+    inputs.extend(Spec::profile_path(&a.spec).map_err(TuneError::from)?);
+    Outputs::new(&outputs, &inputs, a.force)
 }
 
 /// The machine in the files, with its digest.

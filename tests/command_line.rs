@@ -230,7 +230,9 @@ fn refusals_name_file_place_found_and_expected() {
 
 #[test]
 fn help_shows_examples_and_ends_with_0() {
-    for command in ["", "demo", "identify", "margins", "simulate", "tune", "verify"] {
+    for command in
+        ["", "demo", "identify", "margins", "simulate", "tune", "verify", "init", "check", "export", "completions"]
+    {
         let arguments: Vec<&str> = [command, "--help"].into_iter().filter(|a| !a.is_empty()).collect();
         let ran = servotune(&arguments);
         assert_eq!(ran.code, 0);

@@ -126,9 +126,7 @@ fn recovered(curve: &FreeForm, truth: impl Fn(f64) -> f64) -> (f64, f64) {
 
 fn curve(machine: &Machine) -> FreeForm {
     let made = machine.diagnosed();
-    let found = missing_curve(&made.bench, &made.selection).unwrap().curve;
-    for k in &found.knots {}
-    found
+    missing_curve(&made.bench, &made.selection).unwrap().curve
 }
 
 /// A spring that hardens, with a bump on one side.

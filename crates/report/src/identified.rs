@@ -6,7 +6,7 @@ use super::figure::Figure;
 use super::number::NumberFormat;
 use super::table::{Cell, Column, Table, Verdict};
 use servotune::frf::Frf;
-use servotune::identify::{Identified, Interval};
+use servotune::identify::{Identified, Interval, ModeIntervals};
 use servotune::lti::{Body, FrequencyResponse};
 use std::f64::consts::TAU;
 
@@ -33,6 +33,50 @@ fn unit_of_response(id: &Identified) -> String {
     format!("{}/{}", id.plant.position_unit, id.plant.command_unit)
 }
 
+/// Largest ratio of an interval's ends, and largest width in multiples of the value where it holds 0: beyond it the sweep says nothing of the number.
+const TELLING: f64 = 100.0;
+
+fn tells_nothing(i: Interval) -> bool {
+    let ends = (i.low.abs(), i.high.abs());
+    let wide = i.high - i.low > TELLING * i.value.abs().max(f64::MIN_POSITIVE);
+    let one_side = i.low * i.high > 0.0;
+    !(i.low.is_finite() && i.high.is_finite())
+        || if one_side { ends.0.max(ends.1) > TELLING * ends.0.min(ends.1) } else { wide && i.value != 0.0 }
+}
+
+/// The keys of which the sweep says nothing, in short names.
+fn untold(id: &Identified) -> Vec<String> {
+    let i = &id.intervals;
+    let body = [
+        ("dc_gain", i.dc_gain),
+        ("acceleration gain", Some(i.acceleration_gain)),
+        ("natural frequency", i.natural_frequency_rad_s),
+        ("damping ratio", i.damping_ratio),
+        ("viscous rate", i.viscous_rate_per_s),
+    ];
+    let mut all: Vec<String> =
+        body.iter().filter(|(_, x)| x.is_some_and(tells_nothing)).map(|(name, _)| (*name).to_owned()).collect();
+    let of_mode = |m: &ModeIntervals| [m.zero_rad_s, m.zero_damping_ratio, m.pole_rad_s, m.pole_damping_ratio];
+    let modes = i.modes.iter().enumerate().filter(|(_, m)| of_mode(m).into_iter().any(tells_nothing));
+    all.extend(modes.map(|(n, _)| format!("mode {}", n + 1)));
+    all
+}
+
+/// The gain at rest, where it is not the file's `dc_gain`.
+fn gain_at_rest(id: &Identified) -> Option<String> {
+    let Body::SecondOrder { dc_gain, .. } = id.plant.body else { return None };
+    let rest = id.plant.at(0.0).re;
+    let digits = NumberFormat::Significant(5);
+    ((rest / dc_gain - 1.0).abs() > 1e-3).then(|| {
+        format!(
+            "Gain at rest: {} {}. The key dc_gain ({}) is the body's alone; the resonance pairs, which are 1 at high frequency, bring the rest.",
+            digits.text(rest),
+            unit_of_response(id),
+            digits.text(dc_gain)
+        )
+    })
+}
+
 /// Parameters with their 95 % intervals.
 pub fn parameter_table(id: &Identified) -> Result<Table, ReportError> {
     let digits = NumberFormat::Significant(6);
@@ -49,12 +93,17 @@ pub fn parameter_table(id: &Identified) -> Result<Table, ReportError> {
     let mut row = |name: String, key: String, i: Interval, scale: f64, unit: &str| {
         let value = Cell::from(i.value * scale);
         let value = if id.at_bound.contains(&key) { value.flagged(Verdict::Warn, "at bound") } else { value };
+        if tells_nothing(i) {
+            let none = || Cell::from(f64::NAN);
+            let value = Cell::from(i.value * scale).flagged(Verdict::Warn, "not told by this sweep");
+            return table.push(vec![name.as_str().into(), value, none(), none(), unit.into()]);
+        }
         table.push(vec![name.as_str().into(), value, (i.low * scale).into(), (i.high * scale).into(), unit.into()])
     };
     let response = unit_of_response(id);
     let i = &id.intervals;
     if let Some(k) = i.dc_gain {
-        row("dc gain".into(), "plant.dc_gain".into(), k, 1.0, &response)?;
+        row("dc_gain of the body".into(), "plant.dc_gain".into(), k, 1.0, &response)?;
     }
     row(
         "acceleration gain".into(),
@@ -135,6 +184,14 @@ pub fn identified_sentences(id: &Identified) -> Vec<String> {
             if matches!(id.plant.body, Body::FreeInertia { .. }) { "a free inertia" } else { "the form asked for" };
         said.push(format!(
             "The body's natural frequency lies below the sweep ({lowest_hz:.4} Hz) and is not identifiable; {form} is used. Sweep from lower frequencies to see it."
+        ));
+    }
+    said.extend(gain_at_rest(id));
+    let untold = untold(id);
+    if !untold.is_empty() {
+        said.push(format!(
+            "This sweep does not tell {}: their intervals span more than a factor of {TELLING}. The response is followed, the numbers behind it are not to be read; a lower --order may do.",
+            untold.join(", ")
         ));
     }
     if !id.at_bound.is_empty() {

@@ -78,6 +78,8 @@ impl Page {
             html lang="en" {
                 head {
                     meta charset="utf-8";
+                    // A later run may replace a page of this program, and no other.
+                    meta name="generator" content="servotune";
                     meta name="viewport" content="width=device-width, initial-scale=1";
                     // Nothing may be fetched, whatever an input was called.
                     meta http-equiv="Content-Security-Policy"

@@ -55,6 +55,9 @@ pub fn way_on(refusal: &io::Error) -> &'static str {
             "; a part of this path is a file, not a folder: name another"
         }
         ErrorKind::PermissionDenied => "; check its permissions",
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            "; make room or name another place: what stood there is as it was"
+        }
         _ => "",
     }
 }
@@ -91,8 +94,40 @@ pub fn parse_toml<T: DeserializeOwned>(file: &Path, text: &str) -> Result<T, Doc
         let before = &text.as_bytes()[..at];
         let line = 1 + before.iter().filter(|&&b| b == b'\n').count();
         let column = 1 + before.iter().rev().take_while(|&&b| b != b'\n').count();
-        DocumentError::Content { file: file.into(), line, column, found: cut(e.message(), MESSAGE) }
+        DocumentError::Content { file: file.into(), line, column, found: cut(&in_words(e.message()), MESSAGE) }
     })
+}
+
+/// The parser's message without the language's words, and with the known key that an unknown one is nearest to.
+fn in_words(message: &str) -> String {
+    let message =
+        message.replace("expected f64", "expected a number").replace("invalid type: string", "found the text");
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    if !message.starts_with("unknown field") {
+        return message;
+    }
+    let found = quoted.next().unwrap_or_default();
+    let near = quoted.map(|key| (slips(found, key), key)).min_by_key(|(count, _)| *count);
+    match near {
+        Some((count, key)) if count <= (key.len() / 4).max(2) => format!("{message}; did you mean `{key}`?"),
+        _ => message,
+    }
+}
+
+/// Letters to change, add or take away to make one word of the other (Levenshtein); short words, so the plain table does.
+fn slips(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().take(80).collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().take(80).enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let change = diagonal + usize::from(x != *y);
+            diagonal = row[j + 1];
+            row[j + 1] = change.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
 }
 
 /// The document in a file.
@@ -116,6 +151,8 @@ mod tests {
         assert_eq!(parse_toml::<Row>(Path::new("a.toml"), "gain = 1.0\n").unwrap().gain, 1.0);
         let e = parse_toml::<Row>(Path::new("a.toml"), "gain = 1.0\ngian = 2.0\n").unwrap_err();
         let text = e.to_string();
-        assert!(text.starts_with("a.toml:2:1:") && text.contains("gian") && text.contains("gain"), "{text}");
+        assert!(text.starts_with("a.toml:2:1:") && text.ends_with("did you mean `gain`?"), "{text}");
+        let e = parse_toml::<Row>(Path::new("a.toml"), "gain = \"0.27\"\n").unwrap_err().to_string();
+        assert!(e.contains("found the text") && e.contains("expected a number"), "{e}");
     }
 }

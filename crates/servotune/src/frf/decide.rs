@@ -106,7 +106,18 @@ pub(crate) fn reading(
     let degrees = decider.angle(&all, said.degrees, columns, (first, second, decibels), notes)?;
     let all: Vec<Misfit> = all.into_iter().filter(|m| m.reading.degrees == degrees).collect();
     let polar = Reading { decibels, degrees, margin: false, conjugated: false };
-    let conjugated = decider.conjugate((w, first, second), polar, notes)?;
+    let conjugated = decider.conjugate((w, first, second), polar, notes).map_err(|error| {
+        // Radians under a header of degrees hardly turn at all, and what little they do looks conjugated.
+        match (degrees, narrow_phase(first, second, decibels), columns.unit(2)) {
+            (true, Some((low, high)), Some((_, words))) => FrfError::Contradiction {
+                file: file.to_owned(),
+                question: Question::Angle,
+                says: words.to_owned(),
+                doubt: Doubt::PhaseRange { low, high },
+            },
+            _ => error,
+        }
+    })?;
     let all: Vec<Misfit> = all.into_iter().filter(|m| m.reading.conjugated == conjugated).collect();
     let margin = decider.margin(&all, said.margin, columns, notes)?;
     Ok(Reading { decibels, degrees, margin, conjugated })

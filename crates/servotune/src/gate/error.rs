@@ -1,8 +1,18 @@
 //! Why the gate refuses: what was found, where, what was expected, how to go on. Spec: `specs/gate.md`.
 
 use crate::document::DocumentError;
+use crate::document::size_limits::quoted;
 use std::path::PathBuf;
 use thiserror::Error;
+
+/// Names that a message lists at most.
+const LISTED: usize = 20;
+
+fn listed(names: &[String]) -> String {
+    let shown = names.iter().take(LISTED).map(|n| quoted(n)).collect::<Vec<_>>().join(", ");
+    let more = names.len().saturating_sub(LISTED);
+    if more > 0 { format!("{shown} and {more} more") } else { shown }
+}
 
 /// Every way the gate can refuse.
 #[derive(Debug, Error)]
@@ -25,7 +35,7 @@ pub enum GateError {
     Ragged { file: PathBuf, line: u64, found: usize, expected: usize },
     #[error("{}:{line}: id `{id}` stands already in line {first}; ids must differ", file.display())]
     TwiceId { file: PathBuf, id: String, first: u64, line: u64 },
-    #[error("{}: no column `{column}`; the header has: {}", file.display(), found.join(", "))]
+    #[error("{}: no column `{column}`; the header has: {}", file.display(), listed(found))]
     Column { file: PathBuf, column: String, found: Vec<String> },
     #[error("{}: {count} of {of} columns that strangers are known by are not there, among them {}; make the table as the training table was made", file.display(), missing.join(", "))]
     FewColumns { file: PathBuf, count: usize, of: usize, missing: Vec<String> },

@@ -22,11 +22,24 @@ pub struct Section {
 #[allow(missing_docs, reason = "each field is named in the message")]
 pub enum SectionError {
     /// The corner or centre does not lie below half the sample rate.
-    #[error("{filter} at {frequency_hz} Hz: expected above 0 and below half the sample rate, {nyquist_hz} Hz")]
+    #[error(
+        "{filter} at {frequency_hz} Hz: expected above 0 and below half the sample rate, {nyquist_hz:.6} Hz{}",
+        in_microseconds(*frequency_hz, *nyquist_hz)
+    )]
     Frequency { filter: &'static str, frequency_hz: f64, nyquist_hz: f64 },
     /// A damping ratio is out of range.
     #[error("{filter} at {frequency_hz} Hz: {key} = {found}; expected a finite number {expected}")]
     Damping { filter: &'static str, frequency_hz: f64, key: &'static str, found: f64, expected: &'static str },
+}
+
+/// A sample time written in microseconds is the one slip that puts every filter a million times too high.
+fn in_microseconds(frequency_hz: f64, nyquist_hz: f64) -> String {
+    let meant = 1e6 * nyquist_hz;
+    if frequency_hz > 0.0 && frequency_hz < meant && nyquist_hz < 10.0 {
+        let found = 0.5 / nyquist_hz;
+        return format!("; sample_time_s is {found:.6} s: did you mean {found:.6} us, {:.6e} s?", 1e-6 * found);
+    }
+    String::new()
 }
 
 impl Section {
