@@ -1,11 +1,13 @@
 """What a linear model of the EMPS axis leaves out, and the model with it."""
 
 # %%
+import os
 from pathlib import Path
 
 import servotune as st
 
-CASE = Path(__file__).resolve().parents[3] / "shared/practice/emps"
+SHARED = os.environ.get("SERVOTUNE_SHARED", Path(__file__).resolve().parents[3] / "shared")
+CASE = Path(SHARED) / "practice/emps"
 if not CASE.is_dir():
     raise SystemExit("../shared/practice/emps is absent: there are no records to diagnose")
 found = st.diagnose(CASE)

@@ -185,7 +185,7 @@ pub fn batch_tune(
     let one = |i: usize| -> Result<TunedRow, String> {
         let sweep = lists.sweep(i, &slots[i], &reading)?;
         let start = law(&slots[i], controllers[i].as_deref(), all.as_ref())?;
-        let machine = Machine::Sweep(Path::new(&slots[i]), sweep, model.clone(), hold);
+        let machine = Machine::Sweep(Path::new(&slots[i]), Box::new(sweep), &model, hold);
         let start = start.as_ref().map(|(c, text)| (c, text.as_str()));
         let (given, reached) = run(machine, &job, start, &mut |_| ()).map_err(|e| words(&e))?;
         let verdict = match &reached.outcome {
@@ -364,13 +364,16 @@ pub fn batch_verify(
     rows(py, threads, slots.len(), one)
 }
 
-/// Diagnoses every case folder: verdict, effects, document.
+/// Verdict, effects, document.
+type DiagnosedRow = (String, Vec<String>, String);
+
+/// Diagnoses every case folder.
 #[pyfunction]
 pub fn batch_diagnose(
     py: Python<'_>,
     folders: Vec<Option<String>>,
     threads: usize,
-) -> PyResult<Vec<Row<(String, Vec<String>, String)>>> {
+) -> PyResult<Vec<Row<DiagnosedRow>>> {
     let one = |i: usize| match &folders[i] {
         Some(folder) => crate::diagnose::row(Path::new(folder)),
         None => Err("no folder; expected the path of a case folder in the column `case`".to_owned()),

@@ -51,7 +51,7 @@ pub enum Machine<'a> {
     /// A model.
     Model(&'a Plant),
     /// A sweep, its name, how its model is identified, and whether the hold is in it.
-    Sweep(&'a Path, Sweep, IdentifySettings, Hold),
+    Sweep(&'a Path, Box<Sweep>, &'a IdentifySettings, Hold),
 }
 
 /// What is asked, the same for every row of a batch.
@@ -81,7 +81,7 @@ pub fn run(
             let source = servotune::verify::Source { file: p.file.clone(), text: p.text.clone() };
             given_model(Named { file: &p.file, value: &p.plant }, source, spec, controller, clock, say)?
         }
-        Machine::Sweep(file, sweep, model, hold) => given_sweep(file, sweep, hold, &model, clock)?,
+        Machine::Sweep(file, sweep, model, hold) => given_sweep(file, *sweep, hold, model, clock)?,
     };
     let mut inputs = vec![digest];
     inputs
@@ -146,15 +146,11 @@ pub fn tune(
     let settings = TuneSettings { sample_time_s, starts, ..TuneSettings::default() };
     let job = Job { spec, settings, certificate, uncertainty: uncertainty(shares)?.unwrap_or_default() };
     let hold = if hold_included { Hold::Included } else { Hold::NotIncluded };
+    let units = frf.map_or(("", ""), |f| (f.units.0.as_str(), f.units.1.as_str()));
+    let model = model(keywords, units)?;
     let machine = match (plant, frf) {
-        (Some(plant), _) => {
-            model(keywords, ("", ""))?;
-            Machine::Model(plant)
-        }
-        (None, Some(frf)) => {
-            let model = model(keywords, (&frf.units.0, &frf.units.1))?;
-            Machine::Sweep(&frf.file, frf.sweep.as_ref().clone(), model, hold)
-        }
+        (Some(plant), _) => Machine::Model(plant),
+        (None, Some(frf)) => Machine::Sweep(&frf.file, Box::new(frf.sweep.as_ref().clone()), &model, hold),
         (None, None) => return Err(pyo3::exceptions::PyTypeError::new_err("expected a Plant or an Frf")),
     };
     let start = controller.map(|c| (&c.controller, c.text.as_str()));

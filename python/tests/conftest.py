@@ -13,7 +13,8 @@ import pytest
 import servotune as st
 
 ROOT = Path(__file__).resolve().parents[2]
-SHARED = ROOT.parent / "shared"
+#: Data beside the project; another place is named in SERVOTUNE_SHARED.
+SHARED = Path(os.environ.get("SERVOTUNE_SHARED", ROOT.parent / "shared"))
 
 
 @pytest.fixture(scope="session")

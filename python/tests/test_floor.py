@@ -67,8 +67,10 @@ def test_threads(fleet, alone, tmp_path):
     assert (tmp_path / "slots.parquet").exists() or pytest.importorskip("pyarrow") is None
 
 
-def test_ray(fleet, alone, tmp_path):
+def test_ray(fleet, alone, tmp_path, monkeypatch):
     ray = pytest.importorskip("ray")
+    # Ray's own workers stand back behind everything else on a machine, which is shared here.
+    monkeypatch.setenv("RAY_worker_niceness", "0")
     try:
         floor.run(fleet, engine="ray", out=tmp_path, name="one", workers=2, batch=2)
     finally:

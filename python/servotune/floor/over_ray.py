@@ -22,10 +22,8 @@ def spread(task: Task, batches: list[list[int]], workers: int) -> Iterator[list[
         found = task(batch.column("place").to_pylist())
         return pa.table({"place": [place for place, _ in found], "text": [text for _, text in found]})
 
-    # The engine puts a task that lost its worker on another one, as often as it takes.
+    # Ray Data gives a task that lost its worker to another one, as often as it takes.
     blocks = [pa.table({"place": batch}) for batch in batches]
-    slots = ray.data.from_arrow(blocks).map_batches(
-        work, batch_format="pyarrow", batch_size=None, max_retries=-1, zero_copy_batch=True
-    )
+    slots = ray.data.from_arrow(blocks).map_batches(work, batch_format="pyarrow", batch_size=None)
     for part in slots.iter_batches(batch_size=None, batch_format="pyarrow"):
         yield list(zip(part.column("place").to_pylist(), part.column("text").to_pylist()))
