@@ -8,8 +8,8 @@ use super::simulated::simulated;
 /// Standard deviations of excess from which no law of a step is near, and below which a simulated model leaves nothing.
 pub(super) const DEEP: f64 = 30.0;
 pub(super) const SPENT: f64 = 5.0;
-/// Laws of a step that are fitted by simulation then.
-const SIMULATED: usize = 4;
+/// Laws of a step that are fitted by simulation then: each takes as long as the last fit of all.
+const SIMULATED: usize = 1;
 /// Share of the strongest push that every other record must show, and the fewest moves that tell.
 const LIKE: f64 = 0.5;
 const MOVES: usize = 3;

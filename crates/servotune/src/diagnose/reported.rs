@@ -64,6 +64,8 @@ pub(super) struct Reporting<'a> {
     /// All runs, whole.
     pub runs: &'a [Run],
     pub closed: Option<&'a Law<'a>>,
+    /// Whether the logs are: nothing is fitted once more to those that are not.
+    pub sound: bool,
 }
 
 /// Whether one root mean square over so many samples is above another by more than sampling.
@@ -105,6 +107,9 @@ impl<'a> Reporting<'a> {
 
     /// The model fitted by the plain error from where it stands, on these runs: its numbers and the root of its mean square.
     fn descended(&self, model: &Model, runs: &[(&Run, usize)]) -> Option<Model> {
+        if !self.sound {
+            return None;
+        }
         let mut problem = Problem::plain_error(self.bench, model, self.closed, runs);
         let mut x = problem.start();
         let before = size(&problem.settle(&x));

@@ -29,11 +29,21 @@ pub struct SelectSettings {
     pub iterations: usize,
     /// Draws of the parametric bootstrap; 0 for none.
     pub bootstrap: usize,
+    /// Whether laws are fitted by simulation before one is taken, where none comes near the noise.
+    pub by_simulation: bool,
 }
 
 impl Default for SelectSettings {
     fn default() -> SelectSettings {
-        SelectSettings { most: 4, refits: 5, false_alarm: 1e-4, share: 0.35, iterations: 8, bootstrap: 0 }
+        SelectSettings {
+            most: 4,
+            refits: 5,
+            false_alarm: 1e-4,
+            share: 0.35,
+            iterations: 8,
+            bootstrap: 0,
+            by_simulation: true,
+        }
     }
 }
 
@@ -238,7 +248,8 @@ pub fn select(
                 step.tried.push((i, tried));
             }
         }
-        let to_the_end = deep(&step).then(|| by_simulation_first(bench, &mut step));
+        let to_the_end = (settings.by_simulation && model.chosen.is_empty() && deep(&step))
+            .then(|| by_simulation_first(bench, &mut step));
         // Repeats take part with their mean: what differs from record to record by its nature is no first thought.
         let paid = |t: &(usize, Model)| {
             let c = &step.candidates[t.0];

@@ -20,7 +20,7 @@ use super::logs::Hygiene;
 use super::noise_finding::noise_findings;
 use super::reported::Reporting;
 use super::run::Run;
-use super::select::{Selection, select};
+use super::select::{SelectSettings, Selection, select};
 use super::stand_in::{Standing, enter, stand_in};
 use super::unrest::unrest;
 use super::verdict::{ByOthers, judge};
@@ -120,13 +120,17 @@ impl Trial<'_> {
         let unrest = unrest(&bench);
         remarks.extend(unrest.as_ref().map(|u| u.says(&self.given.command_unit)));
         // Records whose samples slipped hold nothing that a model could be fitted to.
-        let selection = select(&mut bench, library(), &self.settings.select, &mut *progress);
+        // A log that slipped or is in other units is no ground for the long way.
+        let sound = self.hygiene.finding.is_none();
+        let search_settings = SelectSettings { by_simulation: sound, ..self.settings.select.clone() };
+        let selection = select(&mut bench, library(), &search_settings, &mut *progress);
         progress("simulating all records");
         let last = selection.last();
         // What the search found, whether or not it is offered.
         let fixed = corrected(&bench.form, &last.refitted.p, &last.chosen, &bench.scene);
         let refitted = corrected(&bench.form, &selection.baseline.refitted.p, &[], &bench.scene);
-        let reporting = Reporting { bench: &bench, selection: &selection, runs: self.whole, closed: self.closed };
+        let reporting =
+            Reporting { bench: &bench, selection: &selection, runs: self.whole, closed: self.closed, sound };
         let reported = reporting.offered(self.given);
         let (figures, errors, open) = fit_report(&bench, self.given, &reporting, &reported);
         remarks.extend(reported.remarks.iter().cloned());

@@ -197,10 +197,14 @@ pub(super) fn judge(
             "the bootstrap finds as much in records without physics: the findings of the search are withdrawn".into(),
         );
     } else if chosen {
+        let said = d.remarks.len();
         d.remarks.extend(reported.withdrawn.clone());
         if evidence.names(d) {
             evidence.named(d);
-        } else if d.findings.is_empty() && selection.baseline.excess_sigma() > CLEAN {
+        } else if selection.baseline.excess_sigma() < CLEAN {
+            // Nothing is there to be named, and nothing to be said of it.
+            d.remarks.truncate(said);
+        } else if d.findings.is_empty() {
             evidence.unnamed(d, evidence.explained);
         }
     } else if d.findings.is_empty()
