@@ -1,9 +1,10 @@
 //! A step of the search in which no law comes near the noise along the recorded motion, and pushes that come with the clock of the record.
 
 use super::bench::Bench;
-use super::scan::Candidate;
+use super::scan::{Candidate, Ground};
 use super::select::{Model, Step};
 use super::simulated::simulated;
+use crate::physics::Effect;
 
 /// Standard deviations of excess from which no law of a step is near, and below which a simulated model leaves nothing.
 pub(super) const DEEP: f64 = 30.0;
@@ -43,4 +44,16 @@ pub(super) fn together(c: &Candidate) -> bool {
     let s = &c.setting.strengths;
     let most = s.iter().fold(0.0f64, |m, v| if v.abs() > m.abs() { *v } else { m });
     s.len() >= MOVES && s.iter().all(|v| v * most.signum() > LIKE * most.abs())
+}
+
+/// The scan around linear parameters `p`; gains count from where the model stands.
+pub(super) fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Model, p: &[f64]) -> Vec<Candidate> {
+    let fit = bench.fit(model.chosen.clone());
+    let (error, basis) = fit.screen_basis(p);
+    let plant = bench.form.carrier(p).plant;
+    let ahead = model.cost - error.iter().map(|e| e * e).sum::<f64>();
+    let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
+    let mut candidates = ground.beside(bench).best(library);
+    candidates.iter_mut().for_each(|c| c.gain += ahead.min(0.0));
+    candidates
 }

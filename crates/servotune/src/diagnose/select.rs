@@ -2,14 +2,14 @@
 
 use super::bench::Bench;
 use super::bootstrap::{Bootstrap, bootstrap};
-use super::deep::{DEEP, SPENT, by_simulation_first, deep, together};
+use super::deep::{DEEP, SPENT, by_simulation_first, deep, scan_at, together};
 use super::fitted::{fitted, fitted_from_both, refit, settled, taken_by_last};
 use super::leftover::{Leftover, leftover};
 use super::locked::follows_motion;
 use super::name::same_drag;
 use super::refit::{Chosen, Refitted};
 use super::rival::{Rival, by_simulation, numbers as free_numbers};
-use super::scan::{Candidate, Ground, log_tail};
+use super::scan::{Candidate, log_tail};
 use super::settle::{exchange, prune, spare};
 use super::simulated::simulated;
 use crate::physics::{Effect, Port, Setting};
@@ -393,15 +393,3 @@ pub(super) fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model
 
 /// Standard deviations of excess above which a linear refit is taken to hide something.
 const CROOKED: f64 = 3.0;
-
-/// The scan around linear parameters `p`; gains count from where the model stands.
-pub(super) fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Model, p: &[f64]) -> Vec<Candidate> {
-    let fit = bench.fit(model.chosen.clone());
-    let (error, basis) = fit.screen_basis(p);
-    let plant = bench.form.carrier(p).plant;
-    let ahead = model.cost - error.iter().map(|e| e * e).sum::<f64>();
-    let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
-    let mut candidates = ground.beside(bench).best(library);
-    candidates.iter_mut().for_each(|c| c.gain += ahead.min(0.0));
-    candidates
-}

@@ -1,10 +1,11 @@
 //! The final model of a search, looked at again: effects that others made needless go, and rivals are tried in the place of each.
 
 use super::bench::Bench;
+use super::deep::scan_at;
 use super::fitted::{fitted, fitted_from_both};
 use super::refit::Chosen;
 use super::rival::{BETTER, Rival, more, numbers};
-use super::select::{MINOR, Model, OWN, Step, begun, gain_of, scan_at};
+use super::select::{MINOR, Model, OWN, Step, begun, gain_of};
 use super::simulated::simulated;
 use crate::physics::{Effect, library};
 
