@@ -292,7 +292,7 @@ impl Effect for FreeForm {
         if monotone { Share::Cycle } else { Share::Blind }
     }
 
-    /// Curves are restored from their knots ([`restored`]), not from named numbers.
+    /// Curves are restored from their knots (`restored`), not from named numbers.
     fn restore(&self, _given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Err(PhysicsError::Missing { effect: "free_form", parameter: "knots" })
     }
