@@ -1,9 +1,4 @@
-//! One search after the other, on other grounds, until one names what acts.
-//!
-//! The noise that repeats differ by is seen through the plant that was given. One that was fitted while something acted answers the commands of
-//! repeats wrongly, and what it gets wrong counts as torque noise: the very law that it conceals is hidden once more. Where a search ends without
-//! a name it is made again under the sensor's own noise, around the given plant, the refitted one, and those of the largest and the smallest
-//! motion.
+//! The search on the ground of a case, and what it comes to; a curve in the place of the law where it ends without a name.
 
 use super::bench::Bench;
 use super::bump::{Bump, beyond};
@@ -43,60 +38,22 @@ pub(super) struct Trial<'a> {
     pub remarks: &'a [String],
 }
 
-/// Error over the noise floor up to which a model is down to the noise.
-const DOWN: f64 = 1.5;
-
 /// Whether a diagnosis says what acts, or that nothing does.
 fn settled(d: &Diagnosis) -> bool {
     d.verdict != Verdict::LocatedUnexplained
 }
 
-/// Whether a diagnosis on another ground may stand: named, and down to the noise wherever it was fitted and held out.
-fn stands(d: &Diagnosis) -> bool {
-    let down = |f: super::finding::FitFigures| f.rms_after < DOWN * f.noise_floor && f.rms_after < f.rms_before;
-    matches!(d.verdict, Verdict::Named | Verdict::Family) && down(d.fit.fit) && d.fit.holdout.is_none_or(down)
-}
-
 impl Trial<'_> {
-    /// The first search that settles the case; the first of all where none does.
+    /// The search, with a curve where it ends without a name and one is worth it.
     pub fn best(&self, bench: Bench, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
         let cut = bench.runs.clone();
         let (first, open) = self.made(bench, progress)?;
         if settled(&first.diagnosis) {
             return Ok(first);
         }
-        if !first.bench.lone()
-            && let Some(named) = self.under_the_sensors_noise(&first, &cut, progress)?
-        {
-            return Ok(named);
-        }
         // A curve is fitted to whole records only: excerpts of very long ones end without.
         let whole = cut.iter().map(Run::len).eq(self.whole.iter().map(Run::len));
         Ok(if whole { self.with_curve(first, open, progress) } else { first })
-    }
-
-    /// The first search under the sensor's own noise that names what acts, down to the noise.
-    fn under_the_sensors_noise(
-        &self,
-        first: &Diagnosed,
-        cut: &[Run],
-        progress: &mut dyn FnMut(&str),
-    ) -> Result<Option<Diagnosed>, DiagnoseError> {
-        let mut plants: Vec<(&str, Plant)> = vec![("given", self.given.clone()), ("refitted", first.refitted.clone())];
-        plants.dedup_by(|a, b| a.1 == b.1);
-        let (t, spindle_hz) = (first.bench.scene.sample_time_s, self.case.spindle_hz);
-        for (name, plant) in plants {
-            progress(&format!("once more under the sensor's noise alone, around the {name} plant"));
-            let bench = Bench::new(&plant, cut.to_vec(), t, spindle_hz)?.quiet();
-            let (mut other, _) = self.made(bench, progress)?;
-            if stands(&other.diagnosis) {
-                other.diagnosis.remarks.push(format!(
-                    "found around the {name} plant under the sensor's noise alone: the given plant, through which repeats are seen, makes more noise of them than there is"
-                ));
-                return Ok(Some(other));
-            }
-        }
-        Ok(None)
     }
 
     /// The same with a curve in the place of the law that has no name, where one is worth it.
