@@ -13,7 +13,9 @@ import numpy as np
 
 import write
 from machine import Controller, Profile
-from realise import Sampled, chain_response, chain_state_space, closed_loop, sections
+from realise import Sampled, closed_loop, sections
+from sections import response as chain_response
+from sections import state_space
 
 GRID_POINTS = 1000
 GRID_HZ = (10.0, 12_500.0)
@@ -73,8 +75,8 @@ def control_disk(p: Prepared, c: Controller) -> Figures:
 
 
 def _loop(p: Prepared, c: Controller) -> control.StateSpace:
-    a, b, row, d = chain_state_space(sections(c))
-    return p.system * control.ss(a, b, row, d, p.plant.sample_time_s)
+    a, b, row, d = state_space(sections(c))
+    return p.system * control.ss(a, b.reshape(-1, 1), row.reshape(1, -1), d, p.plant.sample_time_s)
 
 
 def numpy_by_hand(p: Prepared, c: Controller) -> Figures:

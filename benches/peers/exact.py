@@ -10,7 +10,8 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from machine import Plant
-from realise import Sampled, chain_response
+from realise import Sampled
+from sections import response as chain_response
 
 DIGITS = 50
 

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.linalg import block_diag, expm
 
 from machine import Controller, Plant
+from sections import bilinear, state_space
 
 
 def poles_and_residues(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
@@ -124,51 +125,16 @@ def sections(c: Controller) -> np.ndarray:
     integral = c.ki_per_s * t * np.array([a, -f, 0.0])
     derivative = c.kd_s * np.array([1.0, -2.0, 1.0])
     rows = [np.concatenate([(proportional + integral + derivative) / a, [-(a + f) / a, f / a]])]
-    rows += [_bilinear(hz, t, (0.0, 0.0, 1.0), d) for hz, d in c.lowpasses]
-    rows += [_bilinear(hz, t, (1.0, 2 * zero, 1.0), pole) for hz, zero, pole in c.notches]
+    rows += [bilinear(hz, t, (0.0, 0.0, 1.0), d) for hz, d in c.lowpasses]
+    rows += [bilinear(hz, t, (1.0, 2 * zero, 1.0), pole) for hz, zero, pole in c.notches]
     return np.array(rows)
-
-
-def _bilinear(hz: float, t: float, numerator: tuple[float, float, float], damping: float) -> np.ndarray:
-    """(n2 s^2 + n1 s + n0)/(s^2 + 2 d s + 1), s in units of its corner, prewarped there."""
-    n2, n1, n0 = numerator
-    c = 1 / np.tan(np.pi * hz * t)
-    a0 = c * c + 2 * damping * c + 1
-    top = [n2 * c * c + n1 * c + n0, 2 * (n0 - n2 * c * c), n2 * c * c - n1 * c + n0]
-    return np.array(top + [2 * (1 - c * c), c * c - 2 * damping * c + 1]) / a0
-
-
-def chain_response(rows: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Product of the sections at q = 1/z."""
-    value = np.ones_like(q)
-    for b0, b1, b2, a1, a2 in rows:
-        value = value * (b0 + q * (b1 + q * b2)) / (1 + q * (a1 + q * a2))
-    return value
-
-
-def chain_state_space(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """(A, B, C, D) of the sections in series, two states each (transposed direct form II)."""
-    n = 2 * len(rows)
-    a, b = np.zeros((n, n)), np.zeros(n)
-    signal, through = np.zeros(n), 1.0  # what enters the next section: signal x + through u
-    for i, (b0, b1, b2, a1, a2) in enumerate(rows):
-        j = 2 * i
-        out = b0 * signal
-        out[j] += 1.0
-        out_through = b0 * through
-        a[j] = b1 * signal - a1 * out
-        a[j, j + 1] += 1.0
-        a[j + 1] = b2 * signal - a2 * out
-        b[j] = b1 * through - a1 * out_through
-        b[j + 1] = b2 * through - a2 * out_through
-        signal, through = out, out_through
-    return a, b.reshape(-1, 1), signal.reshape(1, -1), through
 
 
 def closed_loop(plant: Sampled, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(A, B) of the loop; states: plant, delay, sections; inputs: reference less encoder noise, windage."""
     ap, bp, cp = plant.state_space()
-    ac, bc, cc, dc = chain_state_space(rows)
+    ac, bc, cc, dc = state_space(rows)
+    bc, cc = bc.reshape(-1, 1), cc.reshape(1, -1)
     a = np.block([[ap - bp @ cp * dc, bp @ cc], [-bc @ cp, ac]])
     b = np.block([[bp * dc, bp], [bc, np.zeros_like(bc)]])
     return a, b

@@ -15,7 +15,8 @@ from scipy import signal
 import noise
 from exact import block_response
 from machine import Profile
-from realise import Sampled, chain_response, closed_loop
+from realise import Sampled, closed_loop
+from sections import response as chain_response
 
 LOW_BAND_HZ, HIGH_BAND_HZ = (600.0, 1500.0), (1500.0, 3000.0)
 

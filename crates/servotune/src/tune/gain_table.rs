@@ -214,20 +214,11 @@ impl GainTable {
         inputs: Vec<InputDigest>,
     ) -> Result<GainTable, GainTableError> {
         let (before, work, feasible) = (outcome.before(), outcome.work(), outcome.tuned().is_some());
-        let c = outcome.controller().clone();
-        Ok(GainTable {
-            position_unit: None,
-            command_unit: None,
-            section: c.sections()?.chain,
-            sample_time_s: c.sample_time_s,
-            output_limit: c.output_limit,
-            pid: c.pid,
-            lowpass: c.lowpass,
-            notch: c.notch,
-            feedforward: c.feedforward,
-            before: before.and_then(|b| b.get(worst)).map(Summary::of),
-            after: Summary::of(&outcome.after()[worst]),
-            provenance: Provenance {
+        GainTable::new(
+            outcome.controller(),
+            before.and_then(|b| b.get(worst)).map(Summary::of),
+            Summary::of(&outcome.after()[worst]),
+            Provenance {
                 program: env!("CARGO_PKG_VERSION").into(),
                 route: work.route,
                 feasible,
@@ -241,7 +232,7 @@ impl GainTable {
                 physics: Vec::new(),
                 inputs,
             },
-        })
+        )
     }
 
     /// The table of a tuning with physics: before and after as judged with every effect, which the provenance names.
