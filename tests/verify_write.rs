@@ -23,7 +23,15 @@ fn bounded(plant: &Plant, c: &Controller, profile: &Profile, u: &Uncertainty, bo
     let sections = c.sections().unwrap().chain;
     let b = prove_loop(plant, &sections, c.sample_time_s, u, &VerifySettings::default()).unwrap();
     let ms = (b.stability == Stability::Stable).then_some(b.max_sensitivity.high).flatten();
-    let l = BoxedLoop { plant, sections: &sections, controller: c, profile, uncertainty: u, max_sensitivity: ms };
+    let l = BoxedLoop {
+        plant,
+        sections: &sections,
+        controller: c,
+        profile,
+        bands_hz: [[600.0, 1500.0], [1500.0, 3000.0]],
+        uncertainty: u,
+        max_sensitivity: ms,
+    };
     bound_write(&l, &[1, 3], &BoxSettings { boxes, ..BoxSettings::default() })
 }
 

@@ -94,6 +94,7 @@ fn machine(
             sections: &sections,
             controller: c,
             profile,
+            bands_hz: [[600.0, 1500.0], [1500.0, 3000.0]],
             uncertainty: &u,
             max_sensitivity: bounds.max_sensitivity.high.filter(|_| stable),
         };

@@ -112,7 +112,10 @@ pub fn certificate_sentence(c: &Certificate) -> String {
                 {
                     case.write_box.as_ref().map_or(String::new(), |w| write_line(w).trim_end_matches('.').to_owned())
                 }
-                None if case.write.is_none() && l.proven.high.is_none() => "a sweep alone does not prove it".into(),
+                None if c.sweep.is_some() && case.write.is_none() && l.proven.high.is_none() => {
+                    "a sweep alone does not prove it".into()
+                }
+                None if c.uncertainty.any() && l.proven.low.is_some() => "no bound over a box".into(),
                 None => "no bound is proved".into(),
             };
             // A certificate keeps the field of the plant file in which the unit stands; a sentence says what it means.

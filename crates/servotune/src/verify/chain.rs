@@ -1,7 +1,7 @@
 //! The sections as the firmware holds them: value, slope and bend on the unit circle, and where their poles lie.
 
-use super::VerifyError;
 use super::expansion::{Expansion, Jet};
+use super::{Patch, Range, VerifyError};
 use crate::lti::Section;
 use nalgebra::Complex;
 
@@ -94,6 +94,15 @@ impl Chain {
     /// Angles at which a root lies near the circle.
     pub fn angles(&self) -> impl Iterator<Item = f64> + '_ {
         self.sections.iter().flat_map(|s| s.zeros.iter().chain(&s.poles)).map(|z| z.arg()).filter(|a| *a > 0.0)
+    }
+
+    /// The set that holds C over the cell from `a` to `b`.
+    pub fn patch(&self, a: f64, b: f64) -> Patch {
+        let half = 0.5 * (b - a);
+        let c = self.expand(0.5 * (a + b), half).term(half);
+        let radius = if c.remainder.is_nan() { f64::INFINITY } else { c.remainder };
+        let (gain, turn) = (Range::ZERO, Range::ZERO);
+        Patch { centre: c.value, half: c.first * half, radius, floor: 0.0, gain, turn, stuck: 0.0 }
     }
 
     /// C over the cell angle ± half.

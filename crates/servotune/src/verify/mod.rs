@@ -8,11 +8,13 @@ mod assured;
 mod blocks;
 mod bounds;
 mod cascade;
+mod case;
 mod certificate;
 mod chain;
 mod clusters;
 mod contour;
 mod core_moves;
+mod curve;
 mod error;
 mod expansion;
 mod family;
@@ -30,6 +32,7 @@ mod rounding;
 mod settings;
 mod size;
 mod spectrum_box;
+mod step;
 mod swept;
 mod table;
 mod uncertain;
@@ -48,7 +51,7 @@ pub use swept::{LEAST_DAMPING, SweepAgain, SweepAssumption};
 pub use table::Finding;
 pub use uncertain::Uncertainty;
 pub use word::Word;
-pub use write::WriteFigures;
+pub use write::{Bands, WriteFigures};
 pub use write_box::{BoxFigure, BoxHarmonic, BoxSettings, BoxedLoop, WriteBox, WriteOpen, bound_write};
 
 use crate::frf::Frf;
@@ -65,9 +68,14 @@ pub fn prove_loop(
     uncertainty: &Uncertainty,
     settings: &VerifySettings,
 ) -> Result<Bounds, VerifyError> {
+    prove::prove(&modelled(plant, sections, sample_time_s, uncertainty)?, settings)
+}
+
+/// The loop of a plant model that can be proved.
+fn modelled(plant: &Plant, sections: &[Section], t: f64, u: &Uncertainty) -> Result<Sampled, VerifyError> {
     plant.check()?;
-    size::fits(plant, sample_time_s, uncertainty)?;
-    prove::prove(&Sampled::new(plant, sections, sample_time_s, uncertainty)?, settings)
+    size::fits(plant, t, u)?;
+    Sampled::new(plant, sections, t, u)
 }
 
 /// Proves the loop of a sweep, as far as its points allow: bounds, and the bands to sweep again where what may hide between them
@@ -81,6 +89,19 @@ pub fn prove_sweep(
     away: f64,
     settings: &VerifySettings,
 ) -> Result<(Bounds, Vec<SweepAgain>), VerifyError> {
+    let swept = taken(frf, sections, sample_time_s, assumption, uncertainty)?;
+    let bounds = prove::prove(&swept, settings)?;
+    Ok((bounds, swept.again(away)))
+}
+
+/// The loop of a sweep under these assumptions.
+fn taken(
+    frf: &Frf,
+    sections: &[Section],
+    t: f64,
+    assumption: SweepAssumption,
+    uncertainty: &Uncertainty,
+) -> Result<Swept, VerifyError> {
     let found = assumption.least_damping;
     if !(found > 0.0 && found < 1.0) {
         return Err(VerifyError::LeastDamping { found });
@@ -92,7 +113,5 @@ pub fn prove_sweep(
             return Err(VerifyError::SweepBox { key });
         }
     }
-    let swept = Swept::new(frf, sections, sample_time_s, assumption, uncertainty)?;
-    let bounds = prove::prove(&swept, settings)?;
-    Ok((bounds, swept.again(away)))
+    Swept::new(frf, sections, t, assumption, uncertainty)
 }

@@ -12,6 +12,8 @@ pub(super) trait Enclosed {
     /// The sets whose union holds L over the cell from `a` to `b` (angle w T), for everything uncertain. The first one's
     /// certain part (centre, half, radius) holds the nominal L.
     fn patches(&self, a: f64, b: f64, into: &mut Vec<Patch>);
+    /// The set that holds C, the sections as the firmware has them, over the same cell.
+    fn law(&self, a: f64, b: f64) -> Patch;
     /// Where the curve begins and what is known below.
     fn start(&self) -> Result<Start, VerifyError>;
     /// Where it ends (angle).
@@ -107,6 +109,10 @@ impl Enclosed for Sampled {
             None => into.push(patch),
             Some(s) => s.patches(&patch, &others, [a, b], into),
         }
+    }
+
+    fn law(&self, a: f64, b: f64) -> Patch {
+        self.chain.patch(a, b)
     }
 
     fn start(&self) -> Result<Start, VerifyError> {

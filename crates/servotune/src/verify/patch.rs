@@ -27,7 +27,7 @@ pub(super) struct Patch {
 }
 
 /// A set this much wider than its certain part gains nothing from smaller cells.
-const SPREAD_SHARE: f64 = 0.15;
+pub(super) const SPREAD_SHARE: f64 = 0.15;
 /// The same beside the floor.
 const FLOOR_SHARE: f64 = 0.5;
 /// Steps of the bisection for the disk margin: to the last bit of a ratio below 1.

@@ -3,11 +3,14 @@
 //! In: the loop's bounds, the write's figures and their bounds over the box. Out: a verdict for each limit; a figure of which no bound is computed is not
 //! proved. Spec: `specs/certificate.md`.
 
+use super::VerifySettings;
 use super::bounds::{Bounded, Bounds, ProvenCrossing, Stability};
 use super::certificate::{ProvenLimit, Verdict};
+use super::curve::{bound_bandwidth, bound_curve};
+use super::model::Enclosed;
 use super::write::WriteFigures;
 use super::write_box::{BoxFigure, WriteBox};
-use crate::tune::{Objective, Requirement, Side, Spec, What};
+use crate::tune::{Requirement, Side, Spec, What};
 
 /// Rounding of a member's write, in that of the plant as it stands.
 const MEMBERS: f64 = 10.0;
@@ -26,14 +29,40 @@ fn every_crossing(b: &Bounds, stabilised: &[[f64; 2]]) -> Bounded {
     if low <= high { Bounded { low: Some(low), high: Some(high), hz: None } } else { Bounded::default() }
 }
 
-pub(super) fn proven_limits(
-    spec: &Spec,
-    wanted: &[Requirement],
-    b: &Bounds,
-    w: Option<&WriteFigures>,
-    over: Option<&WriteBox>,
-) -> Vec<ProvenLimit> {
-    let usual = Objective::usual_bands();
+/// What is proved of one machine.
+pub(super) struct Known<'a> {
+    pub bounds: &'a Bounds,
+    /// Ratios to the spec's curves, and the bandwidth.
+    pub magnitudes: &'a Magnitudes,
+    /// Whether the machine is a model: of a sweep nothing is known beyond its ends.
+    pub model: bool,
+    pub write: Option<&'a WriteFigures>,
+    pub write_box: Option<&'a WriteBox>,
+    /// Overshoot (%), settling time (s) and the command's rms under the disturbance; an end without a number where a box is asked for.
+    pub step: [Bounded; 2],
+    pub command_rms: Bounded,
+}
+
+/// Bounds of magnitudes over frequency.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Magnitudes {
+    /// In the order of the spec's curves.
+    pub curves: Vec<Bounded>,
+    pub bandwidth_hz: Bounded,
+}
+
+impl Magnitudes {
+    /// Those that the spec asks for.
+    pub fn of(l: &impl Enclosed, spec: &Spec, settings: &VerifySettings) -> Magnitudes {
+        let curves = spec.limits.curve.iter().map(|c| bound_curve(l, c, settings)).collect();
+        let asked = spec.margins.bandwidth_hz.is_some();
+        let bandwidth_hz = if asked { bound_bandwidth(l, settings) } else { Bounded::default() };
+        Magnitudes { curves, bandwidth_hz }
+    }
+}
+
+pub(super) fn proven_limits(spec: &Spec, wanted: &[Requirement], known: &Known<'_>) -> Vec<ProvenLimit> {
+    let (b, w, over) = (known.bounds, known.write, known.write_box);
     let around = |x: f64, e: f64| Bounded { low: Some(x - e), high: Some(x + e), hz: None };
     // Over a box the lower end stays a member's own, as with the margins: what that member misses is missed. Members round much as the plant does.
     let boxed = |own: Bounded, e: f64, figure: &dyn Fn(&WriteBox) -> Option<BoxFigure>| match over {
@@ -52,11 +81,11 @@ pub(super) fn proven_limits(
                 What::GainMargin => b.gain_margin_db,
                 What::MaxSensitivity => b.max_sensitivity,
                 What::GainCrossover => every_crossing(b, &spec.margins.phase_stabilised_hz),
-                // No bound of these is computed.
-                What::Bandwidth | What::CommandRms | What::Overshoot | What::Settling | What::Curve { .. } => {
-                    Bounded::default()
-                }
-                What::DftLow | What::DftHigh if spec.objective.bands_hz != usual => Bounded::default(),
+                What::Bandwidth => known.magnitudes.bandwidth_hz,
+                What::Curve { index } => known.magnitudes.curves.get(index).copied().unwrap_or_default(),
+                What::Overshoot => known.step[0],
+                What::Settling => known.step[1],
+                What::CommandRms if w.is_none() => known.command_rms,
                 what => w.map_or(Bounded::default(), |w| match what {
                     What::DftLow => boxed(around(w.dft_low, w.error), w.error, &|o| o.dft_low),
                     What::DftHigh => boxed(around(w.dft_high, w.error), w.error, &|o| o.dft_high),
@@ -64,12 +93,17 @@ pub(super) fn proven_limits(
                         .harmonics
                         .get(k - 1)
                         .map_or(Bounded::default(), |a| boxed(around(*a, w.error), w.error, &|o| o.harmonic(k))),
+                    // Over a box no bound of it is computed.
+                    What::CommandRms => w.command_rms.map_or(Bounded::default(), |x| {
+                        let own = around(x, w.command_error());
+                        if over.is_some() { Bounded { high: None, ..own } } else { own }
+                    }),
                     _ => boxed(around(w.command_peak, w.command_error()), w.command_error(), &|o| o.command_peak),
                 }),
             };
-            // Of a sweep nothing is known beyond its ends: a margin without a crossing between them is not proved. A write is of models only.
-            let model = w.is_some();
-            let unlimited = model && matches!(r.what, What::PhaseMargin | What::GainMargin) && proven.low.is_none();
+            // Of a sweep nothing is known beyond its ends: a margin without a crossing between them is not proved.
+            let margin = matches!(r.what, What::PhaseMargin | What::GainMargin);
+            let unlimited = known.model && margin && proven.low.is_none();
             let (good, bad) = match r.side {
                 Side::AtLeast => {
                     let least = r.limit - TOUCH * r.limit.abs();

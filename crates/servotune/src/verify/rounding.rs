@@ -168,7 +168,7 @@ mod tests {
         let sections = c.sections().unwrap().chain;
         for class in MachineClass::ALL {
             let (plant, profile) = (paper_machine(class).unwrap(), paper_profile(class).unwrap());
-            let w = write(&plant, &sections, &c, &profile);
+            let w = write(&plant, &sections, &c, &profile, &[[600.0, 1500.0], [1500.0, 3000.0]]);
             let run = simulate(&plant, &c, &profile).unwrap();
             let f = figures(&run.pes, &profile);
             let peak = run.command.iter().fold(0.0f64, |m, x| m.max(x.abs()));

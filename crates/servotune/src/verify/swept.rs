@@ -162,6 +162,10 @@ impl Enclosed for Swept {
         into.push(self.patch(i, middle, 0.5 * (b - a)));
     }
 
+    fn law(&self, a: f64, b: f64) -> Patch {
+        self.chain.patch(a, b)
+    }
+
     fn start(&self) -> Result<Start, VerifyError> {
         // arg(1 + L) is that of L and what 1/L adds.
         let expected = self.phase + ((1.0 + self.first) / self.first).arg();

@@ -17,9 +17,9 @@ use std::f64::consts::TAU;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WriteFigures {
-    /// Norm over 600 to 1500 Hz (position_unit).
+    /// Norm over the first band (position_unit).
     pub dft_low: f64,
-    /// Norm over 1500 to 3000 Hz (position_unit).
+    /// Norm over the second band (position_unit).
     pub dft_high: f64,
     /// |X_k|/N for k = 1 to N/2 (position_unit).
     pub harmonics: Vec<f64>,
@@ -30,6 +30,9 @@ pub struct WriteFigures {
     /// Half width of the command's peak (command_unit): rounding; absent in certificates from before it was bounded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command_error: Option<f64>,
+    /// Rms of the command over the whole write (command_unit); absent in certificates from before it was a limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command_rms: Option<f64>,
 }
 
 impl WriteFigures {
@@ -130,12 +133,23 @@ pub(super) fn forward(c: &Controller, profile: &Profile, k: usize) -> f64 {
 }
 
 /// Simulates the write with these sections and reads the window.
-pub(super) fn write(plant: &Plant, sections: &[Section], c: &Controller, profile: &Profile) -> WriteFigures {
+pub(super) fn write(
+    plant: &Plant,
+    sections: &[Section],
+    c: &Controller,
+    profile: &Profile,
+    bands_hz: &Bands,
+) -> WriteFigures {
     let stepped = Loop::of(plant, sections, c);
     let record = run(&stepped, c, profile);
     let peak = record.command.iter().fold(0.0f64, |m, u| m.max(u.abs()));
     let [error, command] = rounding::bound(&stepped, &record, c, profile);
-    WriteFigures { command_error: Some(command), ..of_window(&record.window, profile.pes.sample_rate_hz, peak, error) }
+    let power = record.command.iter().map(|u| u * u).sum::<f64>() / record.command.len().max(1) as f64;
+    WriteFigures {
+        command_error: Some(command),
+        command_rms: Some(power.sqrt()),
+        ..of_window(&record.window, profile.pes.sample_rate_hz, bands_hz, peak, error)
+    }
 }
 
 /// The write, sample by sample.
@@ -198,19 +212,21 @@ pub(super) fn bin(window: &[f64], k: usize) -> Complex<f64> {
     window.iter().rev().fold(Complex::new(0.0, 0.0), |s, x| s * z + x)
 }
 
+/// First and second band of the DFT norms (Hz, both ends included); a band without a bin has the norm 0.
+pub type Bands = [[f64; 2]; 2];
+
 /// Bins of the two bands.
-pub(super) fn bands(n: usize, rate: f64) -> [Vec<usize>; 2] {
-    [(600.0, 1500.0), (1500.0, 3000.0)]
-        .map(|(low, high)| (1..=n / 2).filter(|k| (low..=high).contains(&(*k as f64 * rate / n as f64))).collect())
+pub(super) fn bands(bands_hz: &Bands, n: usize, rate: f64) -> [Vec<usize>; 2] {
+    bands_hz.map(|[low, high]| (1..=n / 2).filter(|k| (low..=high).contains(&(*k as f64 * rate / n as f64))).collect())
 }
 
 /// The figures of a window.
-pub(super) fn of_window(window: &[f64], rate: f64, command_peak: f64, error: f64) -> WriteFigures {
+pub(super) fn of_window(window: &[f64], rate: f64, bands_hz: &Bands, command_peak: f64, error: f64) -> WriteFigures {
     let n = window.len();
     let harmonics: Vec<f64> = (1..=n / 2).map(|k| bin(window, k).norm() / n as f64).collect();
     let [dft_low, dft_high] =
-        bands(n, rate).map(|b| b.iter().map(|k| harmonics[k - 1] * harmonics[k - 1]).sum::<f64>().sqrt());
-    WriteFigures { dft_low, dft_high, harmonics, command_peak, error, command_error: None }
+        bands(bands_hz, n, rate).map(|b| b.iter().map(|k| harmonics[k - 1] * harmonics[k - 1]).sum::<f64>().sqrt());
+    WriteFigures { dft_low, dft_high, harmonics, command_peak, error, command_error: None, command_rms: None }
 }
 
 /// The reference: the double integral of a pulse of acceleration and one of deceleration.

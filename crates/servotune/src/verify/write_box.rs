@@ -7,7 +7,7 @@ use super::Uncertainty;
 use super::contour::{Contour, Task};
 use super::family::{Family, Ranges};
 use super::spectrum_box::Beside;
-use super::write::{bands, of_window, simulate};
+use super::write::{Bands, bands, of_window, simulate};
 use super::write_piece::{Piece, Question};
 use crate::controller::Controller;
 use crate::lti::{Body, Plant, Section};
@@ -59,10 +59,10 @@ pub struct WriteBox {
     /// Why nothing is proved; then the rest is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub open: Option<WriteOpen>,
-    /// Norm over 600 to 1500 Hz (position_unit).
+    /// Norm over the first band (position_unit).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dft_low: Option<BoxFigure>,
-    /// Norm over 1500 to 3000 Hz (position_unit).
+    /// Norm over the second band (position_unit).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dft_high: Option<BoxFigure>,
     /// Bins of both bands, and those that are asked for.
@@ -98,6 +98,8 @@ pub struct BoxedLoop<'a> {
     pub controller: &'a Controller,
     /// The write.
     pub profile: &'a Profile,
+    /// First and second band of the DFT norms (Hz).
+    pub bands_hz: Bands,
     /// The box.
     pub uncertainty: &'a Uncertainty,
     /// |S| of no member is above this anywhere; none where the box is not proved stable.
@@ -139,7 +141,7 @@ pub fn bound_write(l: &BoxedLoop<'_>, harmonics: &[usize], settings: &BoxSetting
     let task = Task::of(l.controller, l.sections, l.profile);
     let [first, last] = task.clock.window;
     let (n, rate) = (last - first, l.profile.pes.sample_rate_hz);
-    let groups = bands(n, rate);
+    let groups = bands(&l.bands_hz, n, rate);
     let mut bins: Vec<usize> = groups.iter().flatten().chain(harmonics).copied().collect();
     bins.sort_unstable();
     bins.dedup();
@@ -175,6 +177,7 @@ pub fn bound_write(l: &BoxedLoop<'_>, harmonics: &[usize], settings: &BoxSetting
         beside: &beside,
         family: &family,
         bins: &bins,
+        bands_hz: l.bands_hz,
         groups: &indices,
         judged: &judged,
         ms,
@@ -251,7 +254,7 @@ fn branch(q: &Question<'_>, ranges: Ranges, settings: &BoxSettings) -> Option<(V
 fn look(q: &Question<'_>, at: &[f64], seen: &mut [f64]) {
     let record = simulate(&q.family.member(at), q.task.sections, q.task.c, q.task.profile);
     let peak = record.command.iter().fold(0.0f64, |m, u| m.max(u.abs()));
-    let w = of_window(&record.window, q.task.profile.pes.sample_rate_hz, peak, 0.0);
+    let w = of_window(&record.window, q.task.profile.pes.sample_rate_hz, &q.bands_hz, peak, 0.0);
     let figures = [w.dft_low, w.dft_high].into_iter().chain(q.bins.iter().map(|k| w.harmonics[k - 1])).chain([peak]);
     for (s, x) in seen.iter_mut().zip(figures) {
         *s = s.max(x);

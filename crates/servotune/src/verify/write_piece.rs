@@ -7,7 +7,7 @@ use super::contour::{Contour, Task};
 use super::family::{Family, PAIRS, Ranges};
 use super::moves::size;
 use super::spectrum_box::{Beside, Cut, OnCircle};
-use super::write::{bin, simulate};
+use super::write::{Bands, bin, simulate};
 use crate::numeric::spectrum;
 use nalgebra::Complex;
 
@@ -19,6 +19,7 @@ pub(super) struct Question<'a> {
     pub family: &'a Family,
     /// Bins on the circle.
     pub bins: &'a [usize],
+    pub bands_hz: Bands,
     /// Groups of bins, by index: the norm over each is a figure.
     pub groups: &'a [Vec<usize>],
     /// Which figures the box is split for; the command's peak is the last.
