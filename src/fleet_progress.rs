@@ -1,5 +1,6 @@
 //! How far a run is: a bar with rate and time left on a terminal, plain lines elsewhere. The clock is read here.
 
+use super::pace::left;
 use servotune_fleet::{Stage, Watch};
 use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
@@ -82,15 +83,6 @@ fn name(stage: Stage) -> &'static str {
         Stage::Slots => "slots",
         Stage::Explain => "explaining",
         Stage::Share => "shared tables",
-    }
-}
-
-/// Seconds as a person says them.
-fn left(seconds: f64) -> String {
-    match seconds {
-        s if s < 90.0 => format!("{s:.0} s"),
-        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.1} h", s / 3600.0),
     }
 }
 

@@ -39,6 +39,7 @@ mod margins;
 mod margins_arguments;
 mod next_sweep;
 mod outputs;
+mod pace;
 mod pareto;
 mod performance_arguments;
 mod proof;

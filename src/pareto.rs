@@ -34,7 +34,10 @@ pub(super) fn run(a: &ParetoArguments, screen: &mut Screen) -> Result<Ending, Fa
     let start = a.controller.as_ref().map(|file| load::controller(file)).transpose()?;
     let settings = TuneSettings { sample_time_s: a.sample_time_s, ..TuneSettings::default() };
     let front = ParetoSettings { max_sensitivity: [a.from, a.to], points: a.points };
-    let points = pareto(&machines, &spec, start.as_ref(), &settings, &front)?;
+    let pace = screen.pace();
+    let watch = |done, of| pace.part("front, points", done, of);
+    let points = pareto(&machines, &spec, start.as_ref(), &settings, &front, &watch)?;
+    drop(pace);
     let of = spec.objective.unit(unit, slot::units(&plants[0]).command);
     let objective = (spec.objective.minimise.name(), of.as_str());
     let document = Document { schema: "servotune.pareto/1", machines: plants.len(), points: &points };

@@ -8,9 +8,9 @@ use servotune::controller::Controller;
 use servotune::document::FileSet;
 use servotune::frf::Sweep;
 use servotune::lti::Plant;
-use servotune::tune::{GainTable, Hold, InputDigest, Machine, Spec, TuneError, TuneSettings};
+use servotune::tune::{GainTable, Hold, InputDigest, Machine, SearchStep, Spec, TuneError, TuneSettings};
 use servotune::verify::{
-    Assurance, Assured, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, tune_assured,
+    Assurance, Assured, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, Watched, tune_assured,
 };
 use servotune_answer::Proof;
 use std::path::Path;
@@ -76,6 +76,12 @@ impl OnSweep<'_> {
             inputs: self.inputs,
             gains: self.gains,
         };
-        Ok(tune_assured(&job, settings, &mut |words| screen.say(words))?)
+        Ok({
+            let pace = screen.pace();
+            let (search, proof) =
+                (|s: &SearchStep| pace.search(s), |done, of| pace.part("proof of the write, boxes", done, of));
+            let watch = Watched { search: &search, proof: &proof };
+            tune_assured(&job, settings, &mut |words| screen.say(words), &watch)?
+        })
     }
 }

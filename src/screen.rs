@@ -1,5 +1,6 @@
 //! What a person sees: results on stdout, messages and progress on stderr. Names and texts of files reach a terminal as words, never as commands.
 
+use super::pace::Pace;
 use super::{Failure, colour};
 use serde::Serialize;
 use servotune::document::printable;
@@ -57,6 +58,11 @@ impl Screen {
             Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Stdout { source: e }),
             _ => Ok(()),
         }
+    }
+
+    /// Progress of a long piece of work.
+    pub(super) fn pace(&self) -> Pace {
+        Pace::new(self.volume < Volume::Usual)
     }
 
     /// A message beside the result.

@@ -7,8 +7,8 @@ use super::{Ending, Failure, Screen, load, proof, tune_machines, verify};
 use servotune::controller::Controller;
 use servotune::document::{FileSet, check_target, read_text, sha256_hex};
 use servotune::identify::{self, IdentifySettings};
-use servotune::tune::{Hold, InputDigest, Machine, Spec, TuneError, TuneSettings, sample_time_s, tune};
-use servotune::verify::Source;
+use servotune::tune::{Hold, InputDigest, Machine, SearchStep, Spec, TuneError, TuneSettings, sample_time_s, tune};
+use servotune::verify::{Source, Watched};
 use servotune_answer::slot::{self, Slot};
 use servotune_answer::{Asked, Given, Named, Proof, Reached, TunedDocument, given_model, given_sweep, tuned};
 use std::path::PathBuf;
@@ -32,6 +32,9 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         inputs.push(InputDigest { role: "controller".into(), sha256: sha256_hex(read_text(file)?.as_bytes()) });
     }
     let profile = Spec::profile_path(&a.spec).map_err(TuneError::from)?.map(|p| Source::read(&p)).transpose()?;
+    let pace = screen.pace();
+    let search = |s: &SearchStep| pace.search(s);
+    let proof = |done, of| pace.part("proof of the write, boxes", done, of);
     let asked = Asked {
         spec: &spec,
         spec_source: &Source::read(&a.spec)?,
@@ -42,8 +45,10 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
         uncertainty: a.uncertainty.unwrap_or_default(),
         inputs: &inputs,
         gains: &a.out,
+        watch: Watched { search: &search, proof: &proof },
     };
     let reached = tuned(&given, &asked, &mut |words| screen.say(words))?;
+    drop(pace);
     // All that belongs to one table appears together or not at all.
     let mut files = FileSet::default();
     let (outcome, table) = (&reached.outcome, &reached.table);

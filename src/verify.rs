@@ -5,7 +5,7 @@ use super::{Ending, Failure, Screen, load};
 use servotune::document::{check_target, read_text, write_text};
 use servotune::frf::Sweep;
 use servotune::tune::Spec;
-use servotune::verify::{Inputs, Source, SweepAssumption, VerifyError, VerifySettings, certify, choices};
+use servotune::verify::{Inputs, Source, SweepAssumption, VerifyError, VerifySettings, certify_watched, choices};
 use servotune_report::certificate::certificate_text;
 use std::path::{Path, PathBuf};
 
@@ -49,7 +49,10 @@ pub(super) fn run(a: &VerifyArguments, screen: &mut Screen) -> Result<Ending, Fa
         word: a.word().unwrap_or(word),
         uncertainty: a.uncertainty.unwrap_or(uncertainty),
     };
-    let mut c = certify(&inputs, &VerifySettings::default())?;
+    let pace = screen.pace();
+    let watch = |done, of| pace.part("proof of the write, boxes", done, of);
+    let mut c = certify_watched(&inputs, &VerifySettings::default(), &watch)?;
+    drop(pace);
     if let Some(file) = &a.out {
         write_text(file, &c.text()?)?;
         screen.say(&format!("wrote {}", file.display()));

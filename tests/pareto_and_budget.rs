@@ -17,7 +17,7 @@ fn along_the_front_more_margin_never_costs_nothing() {
     let start = nominal_controller().unwrap();
     let settings = TuneSettings { starts: 4, ..TuneSettings::default() };
     let front = ParetoSettings { max_sensitivity: [1.4, 2.4], points: 5 };
-    let points = pareto(&[Machine::Model(&plant)], &spec, Some(&start), &settings, &front).unwrap();
+    let points = pareto(&[Machine::Model(&plant)], &spec, Some(&start), &settings, &front, &|_, _| {}).unwrap();
     assert_eq!(points.len(), 5);
     let on: Vec<_> = points.iter().filter(|p| p.on_front).collect();
     assert!(!on.is_empty(), "{points:?}");
@@ -28,7 +28,7 @@ fn along_the_front_more_margin_never_costs_nothing() {
         assert!(p.max_sensitivity <= p.allowed * (1.0 + servotune::tune::MET));
     }
     let wrong = ParetoSettings { max_sensitivity: [1.0, 2.0], points: 3 };
-    let e = pareto(&[Machine::Model(&plant)], &spec, None, &settings, &wrong).unwrap_err();
+    let e = pareto(&[Machine::Model(&plant)], &spec, None, &settings, &wrong, &|_, _| {}).unwrap_err();
     assert!(matches!(e, TuneError::Setting { key: "max_sensitivity from", found, .. } if found == 1.0), "{e}");
 }
 

@@ -32,7 +32,7 @@ fn bounded(plant: &Plant, c: &Controller, profile: &Profile, u: &Uncertainty, bo
         uncertainty: u,
         max_sensitivity: ms,
     };
-    bound_write(&l, &[1, 3], &BoxSettings { boxes, ..BoxSettings::default() })
+    bound_write(&l, &[1, 3], &BoxSettings { boxes, ..BoxSettings::default() }, &|_, _| {})
 }
 
 /// Bounds in the order of [`exact`], and the bins.

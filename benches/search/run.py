@@ -54,12 +54,12 @@ class Judges:
 
 
 def specs_of(folder: Path, only: str, unseen: bool, on: str) -> list[str]:
-    """Names of specs that begin with `only`, on machines that begin with one of the words of `on`."""
+    """Names of specs that begin with one of the words of `only`, on machines that begin with one of the words of `on`."""
     names = sorted(p.name for p in (folder / "specs").iterdir() if p.is_dir())
     names = [
         n
         for n in names
-        if n.startswith(only) and n.startswith("u") == unseen and n.startswith("p_") == only.startswith("p_")
+        if n.startswith(tuple(only.split(","))) and n.startswith("u") == unseen and n.startswith("p_") == only.startswith("p_")
     ]
     machine = lambda n: json.loads((folder / "specs" / n / "meta.json").read_text())["machine"]  # noqa: E731
     return [n for n in names if machine(n).startswith(tuple(on.split(",")))]

@@ -10,11 +10,11 @@ use servotune::lti::Plant;
 use servotune::pes::context;
 use servotune::physics::Restored;
 use servotune::tune::{
-    GainTable, Hold, InputDigest, Machine, Outcome, PhysicalProof, PhysicalTuning, Spec, TuneError, TuneSettings, tune,
-    tune_physical,
+    GainTable, Hold, InputDigest, Machine, Outcome, PhysicalProof, PhysicalTuning, Spec, TuneError, TuneSettings,
+    tune_physical, tune_watched,
 };
 use servotune::verify::{
-    Assurance, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, tune_assured,
+    Assurance, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, Watched, tune_assured,
 };
 use servotune_report::tuned::Units;
 use std::path::Path;
@@ -43,7 +43,7 @@ pub enum Given {
 }
 
 /// What is asked of a tuning.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Asked<'a> {
     /// Limits and objective.
     pub spec: &'a Spec,
@@ -63,6 +63,8 @@ pub struct Asked<'a> {
     pub inputs: &'a [InputDigest],
     /// The table's file, named in errors.
     pub gains: &'a Path,
+    /// Who is told how far it is.
+    pub watch: Watched<'a>,
 }
 
 /// What a tuning came to.
@@ -220,7 +222,7 @@ fn reach(given: &Given, asked: &Asked<'_>, say: Say<'_>) -> Result<Reached, Answ
         return Ok(Reached { outcome: t.outcome.clone(), table, tuned: t.passes(), certificate, physics: Some(t) });
     }
     if !asked.certificate {
-        let outcome = tune(&given.machine(), spec, start, settings)?;
+        let outcome = tune_watched(&[given.machine()], spec, start, &[], settings, asked.watch.search)?;
         let table = GainTable::of(&outcome, spec.search.seed, sha256, inputs)?;
         let tuned = outcome.tuned().is_some();
         let table = table.in_units(units.position, units.command);
@@ -245,7 +247,7 @@ fn reach(given: &Given, asked: &Asked<'_>, say: Say<'_>) -> Result<Reached, Answ
         inputs: asked.inputs,
         gains: asked.gains,
     };
-    let done = tune_assured(&job, settings, say)?;
+    let done = tune_assured(&job, settings, say, &asked.watch)?;
     let tuned = done.outcome.tuned().is_some();
     Ok(Reached { outcome: done.outcome, table: done.table, tuned, certificate: Some(done.certificate), physics: None })
 }

@@ -98,7 +98,7 @@ fn machine(
             uncertainty: &u,
             max_sensitivity: bounds.max_sensitivity.high.filter(|_| stable),
         };
-        let w = bound_write(&l, harmonics, &BoxSettings::default());
+        let w = bound_write(&l, harmonics, &BoxSettings::default(), &|_, _| {});
         let seconds = clock.elapsed().as_secs_f64();
         let percent = 100.0 * share;
         tally.boxes += 1;

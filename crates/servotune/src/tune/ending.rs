@@ -37,7 +37,7 @@ pub(super) struct Ending<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct Settled {
     pub x: Vec<f64>,
-    /// ln of the objective, as the search scores it; of the bandwidth by the exact judgement.
+    /// ln of the objective, as the search scores it; of the bandwidth by the exact judgement; of `room` the largest violation by either.
     pub objective: f64,
     /// Largest violation of a limit with its guard, by the exact judgement.
     pub worst: f64,
@@ -91,6 +91,10 @@ impl<'a> Ending<'a> {
                         moved = true;
                     }
                 }
+            }
+            if problem.minimise == Minimise::Room {
+                // A dip of |T| between two points of the grid is less room than the search saw.
+                objective = objective.max(worst);
             }
             round += 1;
             let passes = worst <= MET;

@@ -37,6 +37,7 @@ mod step_figures;
 mod structure;
 mod tune_error;
 mod tuning;
+mod watch;
 mod write_figures;
 
 pub use bounds::{Bounds, Ranges};
@@ -59,4 +60,5 @@ pub use spec::{GUARD, Search, Spec};
 pub use spec_error::SpecError;
 pub use structure::{Kind, Setting, Structure};
 pub use tune_error::TuneError;
-pub use tuning::{TuneSettings, ranges, sample_time_s, tune, tune_from, tune_jointly};
+pub use tuning::{TuneSettings, ranges, sample_time_s, tune, tune_from, tune_jointly, tune_watched};
+pub use watch::{SearchStep, SearchWatch, unwatched};

@@ -8,7 +8,7 @@ use super::placement::{notches, placed, refine_placed};
 use super::polish::Polished;
 use super::search::{DRAWN, Effort, Found, best_of, fresh, order, simplex, walk_back};
 use super::starts::further;
-use super::{Parameter, TuningProblem, TuningWork};
+use super::{Minimise, Parameter, Score, SearchStep, SearchWatch, TuningProblem, TuningWork};
 use crate::numeric::random::Random;
 use rayon::prelude::*;
 
@@ -19,8 +19,8 @@ pub(super) type Exact<'a> = dyn Fn(&[f64], f64) -> f64 + 'a;
 const TRIES: usize = 12;
 const TRIES_A_NOTCH: usize = 4;
 /// Rounds without a better end after which it is over, where the best has repeated and where it has not.
-const PATIENCE: usize = 4;
-const LONG_PATIENCE: usize = 6;
+const PATIENCE: usize = 6;
+const LONG_PATIENCE: usize = 16;
 /// The same while no end meets the limits.
 const HOPELESS_PATIENCE: usize = 2;
 /// Polishes that must have ended at the best before it counts as repeated.
@@ -40,7 +40,14 @@ const NOTCH_SHAKE: f64 = 0.5;
 /// Improves the ends, best first, until the best repeats.
 ///
 /// Ends that the grid takes for good and the exact judgement refuses come last: their neighbours would all be refused with them.
-pub(super) fn improve(problem: &TuningProblem, found: &mut Found, effort: &Effort, seed: u64, exact: &Exact<'_>) {
+pub(super) fn improve(
+    problem: &TuningProblem,
+    found: &mut Found,
+    effort: &Effort,
+    seed: u64,
+    exact: &Exact<'_>,
+    watch: &SearchWatch<'_>,
+) {
     let mut waited = 0;
     let mut judged = Judged::default();
     judged.parents(problem, &mut found.ends, exact);
@@ -50,9 +57,17 @@ pub(super) fn improve(problem: &TuningProblem, found: &mut Found, effort: &Effor
         let Some(best) = parents.first().map(|p| p.score) else { break };
         let repeated = found.at_best(BETTER);
         let patience = if !best.meets() { HOPELESS_PATIENCE } else { LONG_PATIENCE };
-        if waited >= patience || repeated >= REPEATS && waited >= PATIENCE {
+        let patience = if repeated >= REPEATS { patience.min(PATIENCE) } else { patience };
+        if waited >= patience {
             break;
         }
+        let value = |s: Score| if problem.minimise == Minimise::Room { s.objective } else { s.objective.exp() };
+        watch(&SearchStep {
+            polishes: found.starts,
+            rounds: round,
+            rounds_left: (patience - waited).min(effort.rounds - round),
+            best: best.meets().then(|| value(best)),
+        });
         let ends: Vec<(Option<Polished>, usize)> = (0..tries)
             .into_par_iter()
             .map(|i| {
@@ -60,7 +75,9 @@ pub(super) fn improve(problem: &TuningProblem, found: &mut Found, effort: &Effor
                 let mut random = Random::stream(seed, FIRST_STREAM + (round * tries + i) as u64);
                 if i % 2 == 0 {
                     // Somewhere else altogether: what nobody looked at yet.
-                    let drawn = (0..DRAWN).map(|_| further(problem, &mut random)).collect();
+                    // Every second one is the best of several; the others may lie where a drawn score looks bad and a polished one is not.
+                    let drawn = if i % 4 == 0 { DRAWN } else { 1 };
+                    let drawn = (0..drawn).map(|_| further(problem, &mut random)).collect();
                     let x = best_of(problem, drawn, &mut work).unwrap_or_else(|| parents[0].x.clone());
                     let x = simplex(problem, x, effort.simplex_steps, &mut work);
                     let end = refine_placed(problem, &x, effort.polish_steps, Some(&best), &mut random, &mut work);

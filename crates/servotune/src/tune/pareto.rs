@@ -45,13 +45,14 @@ pub struct ParetoPoint {
     pub controller: Controller,
 }
 
-/// Tunes at every point; each starts from the one before as well as afresh, so that the front has no gaps of the search's making.
+/// Tunes at every point, telling `watch` how many of how many are done; each starts from the one before as well as afresh, so that the front has no gaps of the search's making.
 pub fn pareto(
     machines: &[Machine<'_>],
     spec: &Spec,
     start: Option<&Controller>,
     settings: &TuneSettings,
     front: &ParetoSettings,
+    watch: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<ParetoPoint>, TuneError> {
     let [from, to] = front.max_sensitivity;
     for (key, found) in [("max_sensitivity from", from), ("max_sensitivity to", to)] {
@@ -79,6 +80,7 @@ pub fn pareto(
         // The next point, with less room, starts from this one's table as well as afresh.
         near = if p.feasible { vec![p.controller.clone()] } else { Vec::new() };
         all.push(p);
+        watch(all.len(), count);
     }
     all.reverse();
     // A table that meets a smaller Ms meets a larger one: no point may be worse than the one before it.

@@ -9,7 +9,7 @@ use super::placement::refine_placed;
 use super::polish::{Goal, Polished, polish};
 use super::problem::UNSTABLE;
 use super::starts::starts;
-use super::{Score, TuningProblem, TuningWork};
+use super::{Score, SearchWatch, TuningProblem, TuningWork};
 use crate::numeric::random::Random;
 use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::neldermead::NelderMead;
@@ -118,6 +118,7 @@ pub(super) fn search(
     seed: u64,
     effort: &Effort,
     exact: &Exact<'_>,
+    watch: &SearchWatch<'_>,
 ) -> Found {
     let from = starts(problem, given, seed, effort.starts * SCREENED);
     let from = screened(problem, from, given.len() + BY_RULE, effort.starts);
@@ -136,7 +137,7 @@ pub(super) fn search(
     ends.into_iter().for_each(|end| found.take(end));
     // The sort is stable: of equals the earlier start stays ahead.
     found.ends.sort_by(|a, b| order(&a.score, &b.score));
-    improve(problem, &mut found, effort, seed, exact);
+    improve(problem, &mut found, effort, seed, exact, watch);
     found
 }
 

@@ -9,7 +9,7 @@ use super::outcome::{Outcome, Reached, Tuned, Work};
 use super::polish::{Goal, polish};
 use super::problem::UNSTABLE;
 use super::search::{Effort, Found, search};
-use super::{Machine, Minimise, Parameters, Proof, Spec, TuneError, TuningProblem, judge};
+use super::{Machine, Minimise, Parameters, Proof, SearchWatch, Spec, TuneError, TuningProblem, judge, unwatched};
 use crate::controller::Controller;
 
 /// How the search is run; what it looks for stands in the spec.
@@ -36,7 +36,7 @@ impl Default for TuneSettings {
             starts: 12,
             simplex_steps: 25,
             polish_steps: 60,
-            rounds: 24,
+            rounds: 60,
             nominal_first: false,
         }
     }
@@ -81,8 +81,20 @@ pub fn tune_from(
     near: &[Controller],
     settings: &TuneSettings,
 ) -> Result<Outcome, TuneError> {
+    tune_watched(machines, spec, start, near, settings, &unwatched)
+}
+
+/// The same, telling `watch` after each round of the search.
+pub fn tune_watched(
+    machines: &[Machine<'_>],
+    spec: &Spec,
+    start: Option<&Controller>,
+    near: &[Controller],
+    settings: &TuneSettings,
+    watch: &SearchWatch<'_>,
+) -> Result<Outcome, TuneError> {
     if !spec.structure.feedforward {
-        return tune_feedback(machines, spec, start, near, settings);
+        return tune_feedback(machines, spec, start, near, settings, watch);
     }
     let model = match machines.first() {
         Some(Machine::Model(plant)) => *plant,
@@ -91,12 +103,12 @@ pub fn tune_from(
         None => return Err(TuneError::NoMachine),
     };
     spec.write("feed-forward")?;
-    let mut outcome = tune_feedback(machines, spec, start, near, settings)?;
+    let mut outcome = tune_feedback(machines, spec, start, near, settings, watch)?;
     for _ in 0..FORWARD_ROUNDS {
         let mut around = outcome.controller().clone();
         let Some(forward) = best_feedforward(model, &around, spec)? else { break };
         around.feedforward = Some(forward);
-        outcome = tune_feedback(machines, spec, Some(&around), near, settings)?;
+        outcome = tune_feedback(machines, spec, Some(&around), near, settings, watch)?;
     }
     // What was before is the caller's start, not the round before.
     let before = start.map(|c| judged(machines, c, spec)).transpose()?;
@@ -113,6 +125,7 @@ fn tune_feedback(
     start: Option<&Controller>,
     near: &[Controller],
     settings: &TuneSettings,
+    watch: &SearchWatch<'_>,
 ) -> Result<Outcome, TuneError> {
     let parameters = prepare(machines, spec, start, settings)?;
     let mut problem = TuningProblem::new(machines, spec, parameters.clone())?;
@@ -132,7 +145,7 @@ fn tune_feedback(
     // The objective `room` asks for the most room; the guard is then no limit of its own.
     let held = spec.objective.minimise != Minimise::Room;
     problem.aim_guarded(held);
-    let mut found = search(&problem, &given, seed, &effort, &exact);
+    let mut found = search(&problem, &given, seed, &effort, &exact, watch);
     let mut best = settled(&mut ending, &mut problem, &mut found, held)?;
     let mut guarded = best.as_ref().is_some_and(|b| b.passes);
     if !guarded && held && problem.keeps_room() {
@@ -140,12 +153,12 @@ fn tune_feedback(
         let mut starts = given.clone();
         starts.extend(found.ends.iter().take(ENDS).map(|e| e.x.clone()));
         problem.aim_guarded(false);
-        let mut free = search(&problem, &starts, seed, &effort, &exact);
+        let mut free = search(&problem, &starts, seed, &effort, &exact, watch);
         let roomiest = roomiest(&problem, &free, settings.polish_steps);
         let unguarded = settled(&mut ending, &mut problem, &mut free, false)?;
         if let Some((x, _)) = roomiest.filter(|(_, room)| *room >= NEARLY * spec.guard) {
             problem.aim_guarded(true);
-            let mut again = search(&problem, &[x], seed, &Effort { starts: 1, ..effort }, &exact);
+            let mut again = search(&problem, &[x], seed, &Effort { starts: 1, ..effort }, &exact, watch);
             let held = settled(&mut ending, &mut problem, &mut again, true)?;
             found.join(again);
             guarded = held.as_ref().is_some_and(|b| b.passes);
@@ -160,7 +173,7 @@ fn tune_feedback(
         problem.aim_guarded(false);
         let wider = Effort { starts: effort.starts * SECOND_SEARCH, ..effort };
         let starts: Vec<Vec<f64>> = given.iter().cloned().chain(best.iter().map(|b| b.x.clone())).collect();
-        let mut second = search(&problem, &starts, seed ^ SECOND_SEED, &wider, &exact);
+        let mut second = search(&problem, &starts, seed ^ SECOND_SEED, &wider, &exact, watch);
         if let Some(other) = settled(&mut ending, &mut problem, &mut second, false)?
             && best.as_ref().is_none_or(|b| other.worst < b.worst)
         {
@@ -320,16 +333,25 @@ pub fn sample_time_s(spec: &Spec, start: Option<&Controller>, settings: &TuneSet
     taken.map(|(_, t)| t).ok_or(TuneError::NoSampleTime)
 }
 
-/// The error of the search's figures for one candidate, as a share: the largest exact miss of a limit on the loop, or by how much the write
+/// The error of the search's figures for one candidate, as a share: the largest exact miss of a limit on the loop, or by how much the objective
 /// is larger than it was taken for; infinite where the loop cannot be judged.
 fn error_of_grid(machines: &[Machine<'_>], c: &Controller, spec: &Spec, objective: f64) -> f64 {
     let of = |m: &Machine<'_>| -> Result<f64, TuneError> {
-        let (_, found) = super::judge::judge_loop(m, c, spec)?;
+        let (margins, found) = super::judge::judge_loop(m, c, spec)?;
         let wanted = super::Requirement::list(&spec.margins, &spec.limits);
         let limits = wanted.iter().filter(|w| w.what.of_loop());
-        let worst = limits.map(|w| w.violation_of(&found, &mut 0)).fold(0.0, f64::max);
+        let worst = limits.map(|w| w.violation_of(&found, &mut 0)).fold(f64::NEG_INFINITY, f64::max);
+        // The objectives that are read off the loop: how much of them the grid saw that is not there.
+        let unseen = match spec.objective.minimise {
+            Minimise::Room => worst - objective,
+            Minimise::Bandwidth => {
+                let lowest = margins.gain_crossings.iter().map(|c| c.hz).fold(f64::INFINITY, f64::min);
+                -(std::f64::consts::TAU * lowest).ln() - objective
+            }
+            _ => 0.0,
+        };
         let lasting = lasting_objective(m, c, spec)?.map_or(0.0, |j| j / objective.exp() - 1.0);
-        Ok(if found.unstable_poles == 0 { worst.max(lasting) } else { f64::INFINITY })
+        Ok(if found.unstable_poles == 0 { worst.max(unseen).max(lasting).max(0.0) } else { f64::INFINITY })
     };
     machines.iter().map(|m| of(m).unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
 }

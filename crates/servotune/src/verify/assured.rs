@@ -5,14 +5,16 @@
 //! Spec: `specs/certificate.md`.
 
 use super::{
-    Certificate, Inputs, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, Verdict, VerifyError, VerifySettings,
-    Word, certify,
+    BoxWatch, Certificate, Inputs, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, Verdict, VerifyError,
+    VerifySettings, Word, certify_watched,
 };
 use crate::controller::Controller;
 use crate::frf::Sweep;
 use crate::lti::Plant;
 use crate::numeric::random::Random;
-use crate::tune::{GainTable, InputDigest, Machine, Outcome, Requirement, Spec, TuneSettings, tune_from};
+use crate::tune::{
+    GainTable, InputDigest, Machine, Outcome, Requirement, SearchWatch, Spec, TuneSettings, tune_watched, unwatched,
+};
 
 /// What a table is tuned and proved on.
 #[derive(Clone, Copy, Debug)]
@@ -71,20 +73,35 @@ pub struct Assured {
     pub rounds: usize,
 }
 
+/// Who is told how far search and proof are.
+#[derive(Clone, Copy)]
+pub struct Watched<'a> {
+    /// After each round of a search.
+    pub search: &'a SearchWatch<'a>,
+    /// After each box of the proof of a write.
+    pub proof: &'a BoxWatch<'a>,
+}
+
+impl Watched<'_> {
+    /// Nobody.
+    pub const NOBODY: Watched<'static> = Watched { search: &unwatched, proof: &|_, _| {} };
+}
+
 /// Tunings at most.
 const ROUNDS: usize = 6;
 /// How far beyond what a bound lacks the next round keeps room.
 const BEYOND: f64 = 1.15;
-/// Most room that is asked for, as a share of a limit.
-const MOST: f64 = 0.6;
+/// Most room that is asked for, as a share of a limit. What lacks more, such as the margin of a crossing that may hide anywhere, no room mends.
+const MOST: f64 = 0.4;
 /// Share of a later round's starts: the last table is near.
 const LATER: usize = 4;
 
-/// Tunes, proves, and tunes again with more room until the table is proved or a limit cannot have that much; `said` is told each round.
+/// Tunes, proves, and tunes again with more room until the table is proved or a limit cannot have that much; `said` is told each round, `watch` how far it is.
 pub fn tune_assured(
     job: &Assurance<'_>,
     settings: &TuneSettings,
     said: &mut dyn FnMut(&str),
+    watch: &Watched<'_>,
 ) -> Result<Assured, VerifyError> {
     let corners: Vec<Plant> = match &job.ground {
         Ground::Plant { plant, .. } => corners(plant, &job.uncertainty),
@@ -103,19 +120,23 @@ pub fn tune_assured(
     let mut near: Vec<Controller> = Vec::new();
     let mut best: Option<Assured> = None;
     for round in 1..=ROUNDS {
-        let outcome = tune_from(&machines, &spec, job.start, &near, if round == 1 { &settings } else { &later })?;
+        let settings = if round == 1 { &settings } else { &later };
+        let outcome = tune_watched(&machines, &spec, job.start, &near, settings, watch.search)?;
         let inputs = job.inputs.to_vec();
         let sha256 = job.spec_source.sha256();
         let table = GainTable::of_first(&outcome, spec.search.seed, sha256, inputs)?.in_units(job.units.0, job.units.1);
         if outcome.tuned().is_none() || (best.is_some() && !matches!(outcome, Outcome::Tuned(_))) {
             // That much room is not to be had: the table before stands, with what is proved of it.
-            return Ok(best.unwrap_or_else(|| assured(job, outcome, table, round)));
+            return Ok(best.unwrap_or_else(|| assured(job, outcome, table, round, watch)));
         }
-        let now = assured(job, outcome, table, round);
+        let now = assured(job, outcome, table, round, watch);
         let Ok(c) = &now.certificate else { return Ok(now) };
-        let (lacking, grown) = room(c, &wanted, spec.guard, &mut spec.further_room);
-        if c.proved || !grown {
-            return Ok(if c.proved { now } else { better(best, now) });
+        if c.proved {
+            return Ok(now);
+        }
+        let (lacking, mended) = room(c, &wanted, spec.guard, &mut spec.further_room);
+        if !mended {
+            return Ok(better(best, now));
         }
         said(&format!("proof, round {round}: {} without enough room; tuning again with more", lacking.join(", ")));
         near = vec![now.outcome.controller().clone()];
@@ -127,25 +148,25 @@ pub fn tune_assured(
     }
 }
 
-/// The table with fewer limits left open; of equals the later one.
+/// The table with fewer limits left open; of equals the earlier one, which gave away less of the objective.
 fn better(before: Option<Assured>, now: Assured) -> Assured {
     let open = |a: &Assured| match &a.certificate {
         Ok(c) => c.cases.iter().flat_map(|c| &c.limits).filter(|l| l.verdict != Verdict::Proved).count(),
         Err(_) => usize::MAX,
     };
     match before {
-        Some(b) if open(&b) < open(&now) => b,
+        Some(b) if open(&b) <= open(&now) => b,
         _ => now,
     }
 }
 
-fn assured(job: &Assurance<'_>, outcome: Outcome, table: GainTable, rounds: usize) -> Assured {
-    let certificate = prove(job, &table).map_err(|e| e.to_string());
+fn assured(job: &Assurance<'_>, outcome: Outcome, table: GainTable, rounds: usize, watch: &Watched<'_>) -> Assured {
+    let certificate = prove(job, &table, watch).map_err(|e| e.to_string());
     Assured { outcome, table, certificate, rounds }
 }
 
 /// The certificate of a table that lies in no file yet.
-fn prove(job: &Assurance<'_>, table: &GainTable) -> Result<Certificate, VerifyError> {
+fn prove(job: &Assurance<'_>, table: &GainTable, watch: &Watched<'_>) -> Result<Certificate, VerifyError> {
     let gains = Source { file: job.gains.to_owned(), text: table.text()? };
     let (mut plants, mut sweeps, mut assumption) =
         (Vec::new(), Vec::new(), SweepAssumption { least_damping: LEAST_DAMPING, hold_included: false });
@@ -166,7 +187,7 @@ fn prove(job: &Assurance<'_>, table: &GainTable) -> Result<Certificate, VerifyEr
         word: Word::Double,
         uncertainty: job.uncertainty,
     };
-    certify(&inputs, &VerifySettings::default())
+    certify_watched(&inputs, &VerifySettings::default(), watch.proof)
 }
 
 /// What each limit lacks to its proof is added to the room it keeps: the names of the lacking ones, and whether any room has grown.
@@ -184,8 +205,8 @@ fn room(c: &Certificate, wanted: &[Requirement], guard: f64, room: &mut Vec<f64>
             };
             // Without a bound there is nothing that room could mend.
             let Some(lacks) = lacks.filter(|l| l.is_finite() && *l > 0.0) else { continue };
-            let more = (guard.max(*room) + BEYOND * lacks).min(MOST);
-            if more > *room {
+            let more = guard.max(*room) + BEYOND * lacks;
+            if more > *room && more <= MOST {
                 *room = more;
                 grown = true;
                 names.push(limit.name.clone());

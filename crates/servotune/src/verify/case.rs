@@ -8,7 +8,7 @@ use super::prove::prove;
 use super::proven_limits::{Known, Magnitudes, proven_limits};
 use super::table::{self, Finding};
 use super::write::{Bands, write};
-use super::write_box::{BoxSettings, BoxedLoop, bound_write};
+use super::write_box::{BoxSettings, BoxWatch, BoxedLoop, bound_write};
 use super::{SweepAssumption, Uncertainty, VerifyError, VerifySettings, modelled, step, taken};
 use crate::controller::Controller;
 use crate::frf::Sweep;
@@ -31,6 +31,7 @@ pub(super) struct Job<'a> {
     /// The firmware holds the table's own numbers, and nothing is uncertain.
     pub plain: bool,
     pub settings: &'a VerifySettings,
+    pub watch: &'a BoxWatch<'a>,
 }
 
 impl Job<'_> {
@@ -62,7 +63,7 @@ impl Job<'_> {
                 uncertainty: u,
                 max_sensitivity: bounds.max_sensitivity.high.filter(|_| stable),
             };
-            bound_write(&boxed, &self.bins(), &BoxSettings::default())
+            bound_write(&boxed, &self.bins(), &BoxSettings::default(), self.watch)
         });
         let (step, command_rms) = if stable { self.records(plant) } else { Default::default() };
         let known = Known {

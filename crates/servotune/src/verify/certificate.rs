@@ -5,7 +5,7 @@ use super::case::Job;
 use super::size::fits;
 use super::table::{self, Finding};
 use super::write::WriteFigures;
-use super::write_box::WriteBox;
+use super::write_box::{BoxWatch, WriteBox};
 use super::{SweepAgain, SweepAssumption, Uncertainty, VerifyError, VerifySettings, Word};
 use crate::document::{parse_toml, read_text, sha256_hex};
 use crate::frf::Sweep;
@@ -144,6 +144,15 @@ pub struct Inputs<'a> {
 
 /// Proves a gain table from its files.
 pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate, VerifyError> {
+    certify_watched(i, settings, &|_, _| {})
+}
+
+/// The same, telling `watch` how far the proof of the write over a box is.
+pub fn certify_watched(
+    i: &Inputs<'_>,
+    settings: &VerifySettings,
+    watch: &BoxWatch<'_>,
+) -> Result<Certificate, VerifyError> {
     for (key, found) in [
         ("gain", i.uncertainty.gain),
         ("frequency", i.uncertainty.frequency),
@@ -178,6 +187,7 @@ pub fn certify(i: &Inputs<'_>, settings: &VerifySettings) -> Result<Certificate,
         uncertainty: &i.uncertainty,
         plain: i.word == Word::Double && !i.uncertainty.any(),
         settings,
+        watch,
     };
     let (mut cases, mut unfit) = (Vec::new(), Vec::new());
     for source in i.plants {

@@ -41,9 +41,11 @@ mod write;
 mod write_box;
 mod write_piece;
 
-pub use assured::{Assurance, Assured, Ground, tune_assured};
+pub use assured::{Assurance, Assured, Ground, Watched, tune_assured};
 pub use bounds::{Bounded, Bounds, ProvenCrossing, Stability};
-pub use certificate::{CaseProof, Certificate, Inputs, ProvenLimit, SCHEMA, Source, Verdict, certify, choices};
+pub use certificate::{
+    CaseProof, Certificate, Inputs, ProvenLimit, SCHEMA, Source, Verdict, certify, certify_watched, choices,
+};
 pub use error::VerifyError;
 pub use range::Range;
 pub use settings::VerifySettings;
@@ -52,7 +54,7 @@ pub use table::Finding;
 pub use uncertain::Uncertainty;
 pub use word::Word;
 pub use write::{Bands, WriteFigures};
-pub use write_box::{BoxFigure, BoxHarmonic, BoxSettings, BoxedLoop, WriteBox, WriteOpen, bound_write};
+pub use write_box::{BoxFigure, BoxHarmonic, BoxSettings, BoxWatch, BoxedLoop, WriteBox, WriteOpen, bound_write};
 
 use crate::frf::Frf;
 use crate::lti::{Plant, Section};

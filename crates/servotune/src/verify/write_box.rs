@@ -106,6 +106,9 @@ pub struct BoxedLoop<'a> {
     pub max_sensitivity: Option<f64>,
 }
 
+/// Told after each box: how many, and how many at most.
+pub type BoxWatch<'a> = dyn Fn(usize, usize) + Sync + 'a;
+
 /// How far the proof goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxSettings {
@@ -126,7 +129,9 @@ impl Default for BoxSettings {
 const TURNED: f64 = 1e-9;
 
 /// Bounds the write over the box; `harmonics` are further bins that are asked for.
-pub fn bound_write(l: &BoxedLoop<'_>, harmonics: &[usize], settings: &BoxSettings) -> WriteBox {
+///
+/// `watch` is told how many boxes of how many at most have been looked at.
+pub fn bound_write(l: &BoxedLoop<'_>, harmonics: &[usize], settings: &BoxSettings, watch: &BoxWatch<'_>) -> WriteBox {
     let Some(ms) = l.max_sensitivity else { return WriteBox::open(WriteOpen::NotProvedStable) };
     let plant = &l.plant.paired();
     if let Body::Rational(r) = &plant.body {
@@ -183,7 +188,7 @@ pub fn bound_write(l: &BoxedLoop<'_>, harmonics: &[usize], settings: &BoxSetting
         ms,
         turned: enough,
     };
-    branch(&question, ranges, settings).map_or_else(
+    branch(&question, ranges, settings, watch).map_or_else(
         || WriteBox::open(WriteOpen::MayClip),
         |(most, seen, boxes)| {
             let limit = l.controller.output_limit.unwrap_or(f64::INFINITY);
@@ -207,7 +212,12 @@ pub fn bound_write(l: &BoxedLoop<'_>, harmonics: &[usize], settings: &BoxSetting
 }
 
 /// Splits the box that is worst for the loosest figure until every judged one is tight enough. Bounds, largest seen, boxes.
-fn branch(q: &Question<'_>, ranges: Ranges, settings: &BoxSettings) -> Option<(Vec<f64>, Vec<f64>, usize)> {
+fn branch(
+    q: &Question<'_>,
+    ranges: Ranges,
+    settings: &BoxSettings,
+    watch: &BoxWatch<'_>,
+) -> Option<(Vec<f64>, Vec<f64>, usize)> {
     let root = Piece::of(q, ranges)?;
     let mut seen = root.middle.clone();
     for corner in &root.corner {
@@ -228,6 +238,7 @@ fn branch(q: &Question<'_>, ranges: Ranges, settings: &BoxSettings) -> Option<(V
             let most = (0..q.judged.len()).map(|i| leaves[top(i)].most[i].max(seen[i])).collect();
             return Some((most, seen, boxes));
         }
+        watch(boxes, settings.boxes);
         let parent = leaves.swap_remove(leaf);
         let along = parent.widest[figure];
         let cut = 0.5 * (parent.ranges[along].low + parent.ranges[along].high);
