@@ -67,6 +67,7 @@ fn machine(name: &str) -> (DiscretePlant, Controller) {
             zero_damping_ratio: 0.05,
             pole_damping_ratio: 0.3,
         }],
+        biquad: vec![],
         feedforward: None,
     };
     (DiscretePlant::of(&plant, sample_time_s).unwrap(), c)

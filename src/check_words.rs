@@ -161,6 +161,9 @@ fn controller(c: Controller) -> Meaning {
         let depth = 20.0 * (n.zero_damping_ratio / n.pole_damping_ratio).log10();
         format!("notch at {} Hz, {depth:.1} dB", short(n.frequency_hz))
     }));
+    if !c.biquad.is_empty() {
+        says.push(format!("{} own second-order sections, which no search changes", c.biquad.len()));
+    }
     let mut doubts = Vec::new();
     if c.sample_time_s > SLOWEST_S {
         let micro = 1e-6 * c.sample_time_s;

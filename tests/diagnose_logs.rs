@@ -152,7 +152,15 @@ fn closed(seed: u64) -> (RecordEntry, Record) {
 
 fn law() -> Controller {
     let pid = Pid { kp: 0.3, ki_per_s: 20.0, kd_s: 2.5e-4, derivative_filter_s: 2e-5 };
-    Controller { sample_time_s: T, output_limit: None, pid, lowpass: vec![], notch: vec![], feedforward: None }
+    Controller {
+        sample_time_s: T,
+        output_limit: None,
+        pid,
+        lowpass: vec![],
+        notch: vec![],
+        biquad: vec![],
+        feedforward: None,
+    }
 }
 
 fn replayed(records: Vec<(RecordEntry, Record)>) -> Diagnosis {

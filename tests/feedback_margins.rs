@@ -156,6 +156,7 @@ fn controller(r: &mut Random) -> Controller {
             zero_damping_ratio: 0.05,
             pole_damping_ratio: 0.25,
         }],
+        biquad: vec![],
         feedforward: None,
     }
 }

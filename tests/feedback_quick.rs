@@ -64,6 +64,7 @@ fn draw(r: &mut Random, plant: &DiscretePlant, crossover_hz: f64) -> Vec<Section
         pid,
         lowpass: vec![Lowpass { frequency_hz: any(r, 4.0 * crossover_hz), damping_ratio: r.between(0.4, 1.0) }],
         notch: vec![],
+        biquad: vec![],
         feedforward: None,
     };
     for _ in 0..(r.uniform() * 3.0) as usize {

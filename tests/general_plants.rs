@@ -216,6 +216,7 @@ fn controller(kp: f64, kd_s: f64, ki_per_s: f64, r: &mut Random) -> Controller {
         pid: Pid { kp, ki_per_s, kd_s, derivative_filter_s: 0.5 * T },
         lowpass: vec![Lowpass { frequency_hz: r.between(1500.0, 4500.0), damping_ratio: 0.8 }],
         notch: vec![],
+        biquad: vec![],
         feedforward: None,
     }
 }

@@ -36,6 +36,7 @@ fn chain(gain: f64, notch_hz: f64) -> Vec<Section> {
         pid: Pid { kp: 0.27 * gain, ki_per_s: 60.0 * gain, kd_s: 3.7e-4 * gain, derivative_filter_s: 12e-6 },
         lowpass: vec![Lowpass { frequency_hz: 7000.0, damping_ratio: 0.7 }],
         notch: vec![Notch { frequency_hz: notch_hz, zero_damping_ratio: 0.05, pole_damping_ratio: 0.25 }],
+        biquad: vec![],
         feedforward: None,
     };
     c.sections().unwrap().chain

@@ -80,6 +80,7 @@ fn controller(filters: usize) -> Controller {
         pid: Pid { kp: 0.1, ki_per_s: 20.0, kd_s: 1.3e-4, derivative_filter_s: 12e-6 },
         lowpass,
         notch: (0..filters.saturating_sub(2)).map(notch).collect(),
+        biquad: vec![],
         feedforward: Some(Feedforward { factor: 0.5, velocity_s: 1e-5, acceleration_s2: 9.8e-8 }),
     }
 }

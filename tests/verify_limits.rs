@@ -24,6 +24,7 @@ fn law(kp: f64, ki_per_s: f64, kd_s: f64, notch: Option<Notch>) -> Controller {
         pid: Pid { kp, ki_per_s, kd_s, derivative_filter_s: 12e-6 },
         lowpass: vec![],
         notch: notch.into_iter().collect(),
+        biquad: vec![],
         feedforward: None,
     }
 }

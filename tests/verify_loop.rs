@@ -77,6 +77,7 @@ fn random_loops_stable_or_not_agree() {
                 zero_damping_ratio: 0.05,
                 pole_damping_ratio: 0.4,
             }],
+            biquad: vec![],
             feedforward: None,
         };
         let size =
@@ -168,6 +169,7 @@ fn a_loop_whose_gain_at_rest_is_near_1_is_decided() {
             pid: Pid { kp: 1.0, ki_per_s: 0.0, kd_s: r.between(0.1, 1.0) / (TAU * hz), derivative_filter_s: 12e-6 },
             lowpass: vec![Lowpass { frequency_hz: 9000.0, damping_ratio: 0.7 }],
             notch: vec![],
+            biquad: vec![],
             feedforward: None,
         };
         let sampled = DiscretePlant::of(&plant, t).unwrap();

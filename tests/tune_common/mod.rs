@@ -87,6 +87,7 @@ pub fn start_controller() -> Controller {
         pid: Pid { kp: 0.27, ki_per_s: 60.0, kd_s: 3.7e-4, derivative_filter_s: 12e-6 },
         lowpass: vec![Lowpass { frequency_hz: 7000.0, damping_ratio: 0.7 }],
         notch: vec![Notch { frequency_hz: 1222.0, zero_damping_ratio: 0.05, pole_damping_ratio: 0.25 }],
+        biquad: vec![],
         feedforward: None,
     }
 }

@@ -286,5 +286,5 @@ impl<'a> TunedDocument<'a> {
 fn at_clock(sample_time_s: f64) -> Controller {
     let pid = Pid { kp: 1.0, ki_per_s: 0.0, kd_s: 0.0, derivative_filter_s: 0.0 };
     let (lowpass, notch) = (Vec::new(), Vec::new());
-    Controller { sample_time_s, output_limit: None, pid, lowpass, notch, feedforward: None }
+    Controller { sample_time_s, output_limit: None, pid, lowpass, notch, biquad: Vec::new(), feedforward: None }
 }

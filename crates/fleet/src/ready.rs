@@ -80,7 +80,9 @@ impl<'a> Ready<'a> {
     /// Whether gains have as many filters as the fleet's tables.
     fn shaped(&self, gains: &Controller) -> bool {
         let base = self.problem.parameters().base();
-        gains.lowpass.len() == base.lowpass.len() && gains.notch.len() == base.notch.len()
+        gains.lowpass.len() == base.lowpass.len()
+            && gains.notch.len() == base.notch.len()
+            && gains.biquad == base.biquad
     }
 
     /// Whether the problem can say what the write of these gains is: they differ from the fleet's in searched numbers only.

@@ -114,6 +114,7 @@ pub(super) fn draw(seed: u64) -> Result<(Plant, Controller, bool), StudyError> {
             zero_damping_ratio: r.between(0.02, 0.2),
             pole_damping_ratio: r.between(0.2, 0.6),
         }],
+        biquad: vec![],
         feedforward: None,
     };
     let size = DiscretePlant::of(&plant, T)?.at(TAU * hz).norm() * c.sections()?.at(TAU * hz).norm();

@@ -281,6 +281,7 @@ impl Foretold {
             pid,
             lowpass: vec![],
             notch: vec![],
+            biquad: vec![],
             feedforward: None,
         };
         Ok((case, self.plant()?, controller))

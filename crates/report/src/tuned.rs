@@ -114,6 +114,10 @@ fn gains(c: &Controller) -> Vec<(String, f64, &'static str)> {
         all.push((format!("notch {} zero damping", i + 1), n.zero_damping_ratio, ""));
         all.push((format!("notch {} pole damping", i + 1), n.pole_damping_ratio, ""));
     }
+    for (i, b) in c.biquad.iter().enumerate() {
+        let named = [("b0", b.b0), ("b1", b.b1), ("b2", b.b2), ("a1", b.a1), ("a2", b.a2)];
+        all.extend(named.map(|(key, x)| (format!("own section {} {key}", i + 1), x, "")));
+    }
     all
 }
 

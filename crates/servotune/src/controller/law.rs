@@ -107,6 +107,7 @@ mod tests {
             pid: Pid { kp: 0.3, ki_per_s: 60.0, kd_s: 3e-4, derivative_filter_s: 2e-5 },
             lowpass: vec![Lowpass { frequency_hz: 7000.0, damping_ratio: 0.7 }],
             notch: vec![Notch { frequency_hz: 1222.0, zero_damping_ratio: 0.05, pole_damping_ratio: 0.25 }],
+            biquad: vec![],
             feedforward: None,
         };
         let law = Law::new(&controller).unwrap();

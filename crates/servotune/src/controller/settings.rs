@@ -4,6 +4,7 @@ use super::{Feedforward, Lowpass, Notch, Pid};
 use crate::document::size_limits::{DAMPING, FILTER_DAMPING, VALUE};
 use crate::lti::{Section, SectionError, Sections};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 use thiserror::Error;
 
 /// A controller, field by field as in `controller.toml`.
@@ -23,6 +24,9 @@ pub struct Controller {
     /// Notch filters, after the low-passes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notch: Vec<Notch>,
+    /// The user's own sections (a0 = 1), after the notches; no search changes them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub biquad: Vec<Section>,
     /// Feed-forward from the reference.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub feedforward: Option<Feedforward>,
@@ -86,9 +90,26 @@ impl Controller {
             damping("notch.pole_damping_ratio", n.pole_damping_ratio, FILTER_DAMPING, poles)?;
             damping("notch.zero_damping_ratio", n.zero_damping_ratio, 0.0, "a damping ratio from 0 to 1e4")?;
         }
+        for b in &self.biquad {
+            for (key, found) in [
+                ("biquad.b0", b.b0),
+                ("biquad.b1", b.b1),
+                ("biquad.b2", b.b2),
+                ("biquad.a1", b.a1),
+                ("biquad.a2", b.a2),
+            ] {
+                range(key, found, found.abs() <= VALUE[1], "a finite number of a size up to 1e30")?;
+            }
+            let any = b.b0 != 0.0 || b.b1 != 0.0 || b.b2 != 0.0;
+            range("biquad.b0", b.b0, any, "a numerator that is not 0")?;
+        }
         let chain = self.chain()?;
         let lowpass = self.lowpass.iter().map(|l| ("low-pass", l.frequency_hz));
-        let filters = lowpass.chain(self.notch.iter().map(|n| ("notch", n.frequency_hz)));
+        let own = self.biquad.iter().map(|b| {
+            let angle = b.poles().iter().map(|z| z.arg().abs()).fold(0.0, f64::max);
+            ("biquad", angle / (TAU * self.sample_time_s))
+        });
+        let filters = lowpass.chain(self.notch.iter().map(|n| ("notch", n.frequency_hz))).chain(own);
         for (section, (filter, frequency_hz)) in chain.iter().skip(1).zip(filters) {
             // The rule of the second prover: a filter has no pole that is an integrator.
             let away = section.poles().iter().map(|z| 1.0 - z.norm()).fold(f64::INFINITY, f64::min);
@@ -108,10 +129,11 @@ impl Controller {
         for n in &self.notch {
             chain.push(Section::notch(n.frequency_hz, n.zero_damping_ratio, n.pole_damping_ratio, t)?);
         }
+        chain.extend(&self.biquad);
         Ok(chain)
     }
 
-    /// The sections that the firmware runs, in order: PID, low-passes, notches.
+    /// The sections that the firmware runs, in order: PID, low-passes, notches, own sections.
     pub fn sections(&self) -> Result<Sections, ControllerError> {
         self.check()?;
         Ok(Sections { chain: self.chain()?, sample_time_s: self.sample_time_s })

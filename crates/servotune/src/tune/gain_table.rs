@@ -30,6 +30,8 @@ pub struct GainTable {
     lowpass: Vec<Lowpass>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     notch: Vec<Notch>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    biquad: Vec<Section>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     feedforward: Option<Feedforward>,
     section: Vec<Section>,
@@ -269,6 +271,7 @@ impl GainTable {
             pid: c.pid,
             lowpass: c.lowpass,
             notch: c.notch,
+            biquad: c.biquad,
             feedforward: c.feedforward,
             before,
             after,
@@ -295,6 +298,7 @@ impl GainTable {
             pid: self.pid,
             lowpass: self.lowpass.clone(),
             notch: self.notch.clone(),
+            biquad: self.biquad.clone(),
             feedforward: self.feedforward,
         }
     }

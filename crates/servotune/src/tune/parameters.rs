@@ -106,6 +106,7 @@ impl Parameters {
             },
             lowpass: vec![],
             notch: vec![],
+            biquad: vec![],
             feedforward: None,
         });
         let end_hz = BELOW_HALF_RATE * 0.5 / t;
@@ -282,6 +283,7 @@ impl Parameters {
         c.sample_time_s == self.base.sample_time_s
             && c.lowpass.len() == self.base.lowpass.len()
             && c.notch.len() == self.base.notch.len()
+            && c.biquad == self.base.biquad
     }
 
     /// Puts the vector into `c`, a copy of [`Parameters::base`], without allocating.
@@ -372,5 +374,6 @@ pub(super) fn chain_of(c: &Controller, chain: &mut Vec<Section>) -> bool {
             Err(_) => return false,
         }
     }
+    chain.extend(&c.biquad);
     true
 }

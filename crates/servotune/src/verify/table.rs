@@ -81,6 +81,7 @@ pub(super) fn sections(c: &Controller, found: &[Section]) -> Vec<Finding> {
         bilinear(n.frequency_hz, t, [1.0, 2.0 * n.zero_damping_ratio, 1.0], n.pole_damping_ratio)
     };
     expected.extend(c.notch.iter().map(notch));
+    expected.extend(&c.biquad);
     if found.len() != expected.len() {
         return vec![Finding::Count { found: found.len(), expected: expected.len() }];
     }
