@@ -3,7 +3,8 @@
 //! In: samples. Out: bins. Convention: X_k = sum over n of x\[n\] exp(-2 pi i k n / N), unscaled (`specs/conventions.md`).
 
 use nalgebra::Complex;
-use rustfft::FftPlanner;
+use rustfft::{Fft, FftPlanner};
+use std::sync::Arc;
 
 /// All N bins of the transform of N real samples; empty in, empty out.
 ///
@@ -31,6 +32,34 @@ pub fn forward(samples: &[f64]) -> Vec<Complex<f64>> {
 pub fn backward(bins: &mut [Complex<f64>]) {
     if !bins.is_empty() {
         FftPlanner::new().plan_fft_inverse(bins.len()).process(bins);
+    }
+}
+
+/// The inverse of one length, planned once for many uses without allocation.
+#[derive(Clone)]
+pub struct Backward(Arc<dyn Fft<f64>>);
+
+impl Backward {
+    /// For rows of `length` bins.
+    pub fn of(length: usize) -> Backward {
+        Backward(FftPlanner::new().plan_fft_inverse(length))
+    }
+
+    /// Bins of a row.
+    pub fn length(&self) -> usize {
+        self.0.len()
+    }
+
+    /// x_n = sum over k of X_k exp(+2 pi i k n / N), in place; `row` has the planned length, `scratch` is of one thread.
+    pub fn process(&self, row: &mut [Complex<f64>], scratch: &mut Vec<Complex<f64>>) {
+        scratch.resize(self.0.get_inplace_scratch_len(), Complex::new(0.0, 0.0));
+        self.0.process_with_scratch(row, scratch);
+    }
+}
+
+impl std::fmt::Debug for Backward {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Backward({})", self.length())
     }
 }
 

@@ -10,6 +10,7 @@ use super::{PesError, Profile, Reference, WindowDft};
 use crate::controller::{Controller, Feedforward};
 use crate::feedback::{LoopOnGrid, ResponseCurve, SampledPlant};
 use crate::lti::{FrequencyResponse, Section};
+use crate::numeric::spectrum::Backward;
 use crate::numeric::wide::wide;
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
@@ -41,8 +42,11 @@ struct CommandLines {
     forward: Vec<Complex<f64>>,
     /// Density of the windage on every line.
     windage: Vec<f64>,
-    /// Angle steps: instants (s) at which the command is looked at.
-    instants: Vec<f64>,
+    /// The lines' sum at all instants of half a period at once; instant m lies at m period/(2 N), N the plan's length.
+    together: Backward,
+    /// e^{j w t} of the first line at the instants at which the command is looked at, and the first of these.
+    turns: Vec<Complex<f64>>,
+    first: usize,
     /// The plant next to rest, and the mean of the reference: half the distance.
     rest: SampledPlant,
     mean: f64,
@@ -67,14 +71,17 @@ pub struct SpectralWork {
     pub(super) x: Vec<Complex<f64>>,
     pub(super) power: Vec<f64>,
     pub(super) adjoint: Adjoint,
+    /// The command's lines, then its instants; and the transform's own memory.
+    command: Vec<Complex<f64>>,
+    scratch: Vec<Complex<f64>>,
 }
 
 /// Rest after the move before the way back, where the record itself leaves less (s).
 const REST_S: f64 = 0.02;
 /// How near to rest, as a share of the first line, the command that holds the mean position is taken.
 const NEAR_REST: f64 = 1e-2;
-/// Instants at which the command is looked at, spread over the move and a little beyond.
-const INSTANTS: usize = 400;
+/// Instants at which the command is looked at in half a period, at least.
+const INSTANTS: usize = 1024;
 
 impl SpectralPes {
     /// The write of `profile` on a measured plant; `bins` of the window are read.
@@ -138,12 +145,18 @@ impl SpectralPes {
             x.chain(std::iter::repeat(0.0)).take(frame.width()).collect()
         };
         let command = command.then(|| {
+            let together = Backward::of(count.max(INSTANTS).next_power_of_two());
+            // From the move's start to a little beyond its end.
+            let place = |time: f64| time * 2.0 * together.length() as f64 / period;
+            let (first, last) = (place(spiral.start_s) as usize, place(end_s + 0.5 * REST_S).ceil() as usize);
             Box::new(CommandLines {
                 forward: forward.iter().zip(&reference).map(|(f, r)| f * r).collect(),
                 windage: windage.clone(),
-                instants: (0..INSTANTS)
-                    .map(|i| spiral.start_s + (end_s + 0.5 * REST_S - spiral.start_s) * i as f64 / INSTANTS as f64)
+                first,
+                turns: (first..=last)
+                    .map(|m| Complex::from_polar(1.0, PI * m as f64 / together.length() as f64))
                     .collect(),
+                together,
                 rest: {
                     let near = NEAR_REST * w[0];
                     SampledPlant::of_points(t, plant.integrators(), vec![near], &[plant.at(near)])
@@ -268,7 +281,8 @@ impl SpectralPes {
         let n = self.outside.len();
         let mut power = 0.0;
         // U = C E + F R; C from L = P C, and outside the sweep, where P is 0, nothing is known of it: the lines end there.
-        let mut command = Vec::with_capacity(n);
+        let mut command = std::mem::take(&mut work.command);
+        command.clear();
         for i in 0..n {
             let (p, l) = (self.lines.value(i), Complex::new(work.lines.re[i], work.lines.im[i]));
             let s = Complex::new(work.s_re[i], work.s_im[i]);
@@ -280,18 +294,15 @@ impl SpectralPes {
         c.rest.close(chain, &mut work.rest);
         let l = Complex::new(work.rest.re[0], work.rest.im[0]);
         let held = c.mean * (l / (c.rest.value(0) * (1.0 + l))).re;
-        let at = |time: f64| {
-            // The lines are odd multiples of the first: one rotation steps from each to the next.
-            let first = self.lines.w_rad_s()[0] * time;
-            let (mut turn, step) = (Complex::from_polar(1.0, first), Complex::from_polar(1.0, 2.0 * first));
-            let mut sum = 0.0;
-            for u in &command {
-                sum += u.re * turn.re - u.im * turn.im;
-                turn *= step;
-            }
-            (held + 2.0 * sum).abs()
+        // The lines are odd multiples of the first: their sum at m/(2 N) of the period is its turn there times an inverse transform of length N.
+        command.resize(c.together.length(), Complex::new(0.0, 0.0));
+        c.together.process(&mut command, &mut work.scratch);
+        let at = |(m, turn): (usize, &Complex<f64>)| {
+            let sum = command[(c.first + m) % command.len()];
+            (held + 2.0 * (sum.re * turn.re - sum.im * turn.im)).abs()
         };
-        let peak = c.instants.iter().map(|t| at(*t)).fold(0.0, f64::max);
+        let peak = c.turns.iter().enumerate().map(at).fold(0.0, f64::max);
+        work.command = command;
         peak + (power * 2.0 * c.samples.max(2.0).ln()).sqrt()
     }
 }
