@@ -65,6 +65,10 @@ pub(super) struct Place {
 pub(super) struct LoopLimits<'a> {
     pub machine: usize,
     pub aimed: &'a [Requirement],
+    /// The limits themselves, without room.
+    pub wanted: &'a [Requirement],
+    /// Room that every limit keeps: a share of it.
+    pub guard: f64,
     pub curves: &'a [CurveLimit],
     /// Ranges in which |L| may cross 1 outside the crossover range (rad/s).
     pub stabilised: &'a [[f64; 2]],
@@ -189,6 +193,9 @@ fn crossover_rows(
 ) {
     let (w, grid) = (&l.aimed[wanted], sampled.w_rad_s());
     let edge = TAU * w.limit;
+    // Room asked for beyond the guard is kept to a crossing elsewhere too: as a share of |L|.
+    let beyond = (w.limit / l.wanted[wanted].limit).ln().abs() - l.guard;
+    let away = GRAZE + if beyond > GRAZE { beyond } else { 0.0 };
     let free = |x: f64| l.stabilised.iter().any(|[from, to]| (*from..=*to).contains(&x));
     let gain = |i: usize| on.re[i] * on.re[i] + on.im[i] * on.im[i];
     let (range, sign) = if w.side == Side::AtLeast {
@@ -207,7 +214,7 @@ fn crossover_rows(
         // The first point of the loop is an end of its own; the edge of the range stands among the places.
         if g >= a && g >= b && before != i {
             let ln = 0.5 * refined([a.ln(), g.ln(), b.ln()]);
-            put(grid[i], FAR_CROSSING * (ln + GRAZE), real(FAR_CROSSING * sign));
+            put(grid[i], FAR_CROSSING * (ln + away), real(FAR_CROSSING * sign));
         }
     }
     if w.side == Side::AtMost && on.quick.gain_crossings.is_empty() {

@@ -30,6 +30,7 @@ pub struct TuningProblem {
     pub(super) asked: Asked,
     /// Share of each limit that is kept as room while the guard is held.
     rooms: Vec<f64>,
+    guard: f64,
     /// Whether the objective is the first machine's alone; else the worst one's counts.
     pub(super) nominal_first: bool,
 }
@@ -112,6 +113,7 @@ impl TuningProblem {
             wanted,
             asked,
             rooms: Vec::new(),
+            guard: spec.guard,
             nominal_first: false,
         };
         problem.rooms = (0..problem.wanted.len())
@@ -228,6 +230,8 @@ impl TuningProblem {
         LoopLimits {
             machine,
             aimed: &aimed.wanted,
+            wanted: &self.wanted,
+            guard: self.guard,
             curves: &self.curves,
             stabilised: &self.stabilised,
             places: &aimed.places,

@@ -13,7 +13,8 @@ use crate::frf::Sweep;
 use crate::lti::Plant;
 use crate::numeric::random::Random;
 use crate::tune::{
-    GainTable, InputDigest, Machine, Outcome, Requirement, SearchWatch, Spec, TuneSettings, tune_watched, unwatched,
+    GainTable, InputDigest, Machine, Outcome, Requirement, SearchWatch, Spec, TuneSettings, What, tune_watched,
+    unwatched,
 };
 
 /// What a table is tuned and proved on.
@@ -93,6 +94,8 @@ const ROUNDS: usize = 6;
 const BEYOND: f64 = 1.15;
 /// Most room that is asked for, as a share of a limit. What lacks more, such as the margin of a crossing that may hide anywhere, no room mends.
 const MOST: f64 = 0.4;
+/// Room of |L| from 1 that a crossing elsewhere asks for in one round.
+const ELSEWHERE: f64 = 0.08;
 /// Share of a later round's starts: the last table is near.
 const LATER: usize = 4;
 
@@ -205,6 +208,8 @@ fn room(c: &Certificate, wanted: &[Requirement], guard: f64, room: &mut Vec<f64>
             };
             // Without a bound there is nothing that room could mend.
             let Some(lacks) = lacks.filter(|l| l.is_finite() && *l > 0.0) else { continue };
+            // A crossing that may lie at a mode elsewhere is as far away as the mode: there |L| is to keep away from 1.
+            let lacks = if w.what == What::GainCrossover { lacks.min(ELSEWHERE) } else { lacks };
             let more = guard.max(*room) + BEYOND * lacks;
             if more > *room && more <= MOST {
                 *room = more;
