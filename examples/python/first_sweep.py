@@ -12,7 +12,9 @@ print(frf, *frf.notes, sep="\n")
 # %% The model, and how far it is to be trusted.
 plant = st.identify(frf)
 trusted = plant.quality.trusted
-print(f"order {plant.order}, delay {1e6 * plant.delay_s:.1f} us, trusted {trusted['low_hz']:.0f} to {trusted['high_hz']:.0f} Hz")
+print(
+    f"order {plant.order}, delay {1e6 * plant.delay_s:.1f} us, trusted {trusted['low_hz']:.0f} to {trusted['high_hz']:.0f} Hz"
+)
 
 # %% The loop of today.
 controller = st.Controller.from_toml(STAGE / "controller.toml")
