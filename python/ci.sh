@@ -3,7 +3,7 @@
 # `python/ci.sh dask` and `python/ci.sh spark` run the floor on those engines instead.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-packages="pytest pandas pyarrow control ray nbclient ipykernel"
+packages="pytest pandas pyarrow control ray<2.64 nbclient ipykernel"
 chosen=()
 case "${1:-}" in
     "") ;;

@@ -19,6 +19,8 @@ from pathlib import Path
 
 from machine import ROOT, busy, children, fleet_file, program_file
 
+#: Few, so that the stage before the slots is short; it is not what is measured.
+PILOTS = 8
 #: Files that say nothing of the time of the run.
 FILES = ("slots.csv", "slots.jsonl", "coverage.csv", "shared.json", "work_list.csv", "untunable.json")
 
@@ -122,7 +124,7 @@ def main() -> None:
     os.environ.setdefault("RAY_worker_niceness", "0")
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
-        fleet = fleet_file(folder, asked.slots)
+        fleet = fleet_file(folder, asked.slots, PILOTS)
         ways = []
         for name in ["fleet run", *asked.engines]:
             for workers in (1, 2):
@@ -138,7 +140,7 @@ def page(slots: int, ways: list[Way], store: int) -> list[str]:
     lines = [
         "# The floor on an engine, measured",
         "",
-        f"Made by `python python/bench/floor.py --slots {slots}`. A floor of {slots} made-up slots, drawn when they are needed. {busy()}",
+        f"Made by `python python/bench/floor.py --slots {slots}`. A floor of {slots} made-up slots, drawn when they are needed, {PILOTS} pilots. {busy()}",
         "Pilots, library, shared tables and files are in the whole run; the engine works on the pilots and on the slots.",
         "",
         "| way | workers | slots/s | processor ms a slot | beside `fleet run` | whole run (s) | until the engine stands (s) | memory of all processes (MiB) | files equal |",

@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import sqlite3
+import time
 from contextlib import nullcontext
 from importlib import import_module
 from pathlib import Path
@@ -99,6 +100,30 @@ def test_ray_survives_dead_workers(fleet, alone, tmp_path, monkeypatch):
     same(tmp_path / "out", alone)
 
 
+def test_a_slot_that_ends_every_worker(fleet, alone, tmp_path, monkeypatch):
+    """It is given up, the others are kept, and a later run needs that one only."""
+    pytest.importorskip("ray")
+    from servotune.floor import over_ray
+
+    monkeypatch.setenv("RAY_worker_niceness", "0")
+
+    class Deadly(Task):
+        def __call__(self, places):
+            if self.library is not None and 5 in places:
+                # The others have long come back.
+                time.sleep(5.0)
+                os.kill(os.getpid(), signal.SIGKILL)
+            return super().__call__(places)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(import_module("servotune.floor.run"), "Task", Deadly)
+        patch.setattr(over_ray, "TRIES", 1)
+        with pytest.raises(floor.EngineFailed, match="5 of 6 slots are done and kept"):
+            floor.run(fleet, engine="ray", out=tmp_path, name="one", workers=2, batch=1)
+    floor.run(fleet, out=tmp_path, name="one")
+    same(tmp_path, alone)
+
+
 def test_dask(fleet, alone, tmp_path):
     pytest.importorskip("distributed")
     floor.run(fleet, engine="dask", out=tmp_path, name="one", workers=2, batch=2)
@@ -127,7 +152,7 @@ def test_a_run_goes_on_where_it_ended(fleet, alone, tmp_path, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(local, "engine", lambda workers: nullcontext(torn))
-        with pytest.raises(RuntimeError, match="the node is gone"):
+        with pytest.raises(floor.EngineFailed, match="the node is gone; 2 of 6 slots are done and kept"):
             floor.run(fleet, out=tmp_path, name="one", batch=2)
     said = []
     floor.run(fleet, out=tmp_path, name="one", said=said.append)

@@ -6,6 +6,6 @@ every engine and any number of workers; a worker that dies is replaced by its en
 it was when it is started again.
 """
 
-from servotune.floor.run import ENGINES, Ran, run
+from servotune.floor.run import ENGINES, EngineFailed, Ran, run
 
-__all__ = ["ENGINES", "Ran", "run"]
+__all__ = ["ENGINES", "EngineFailed", "Ran", "run"]

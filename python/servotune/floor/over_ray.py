@@ -9,6 +9,9 @@ import pyarrow as pa
 
 from servotune.floor.task import Found, Spread, Task
 
+#: Workers that a batch may lose before it is given up; Ray Data by itself goes on for ever.
+TRIES = 10
+
 
 @contextmanager
 def engine(workers: int) -> Iterator[Spread]:
@@ -26,10 +29,12 @@ def engine(workers: int) -> Iterator[Spread]:
             found = task(batch.column("place").to_pylist())
             return pa.table({"place": [place for place, _ in found], "text": [text for _, text in found]})
 
-        # Ray Data gives a task that lost its worker to another one, as often as it takes.
         blocks = [pa.table({"place": batch}) for batch in batches]
-        slots = ray.data.from_arrow(blocks).map_batches(work, batch_format="pyarrow", batch_size=None)
-        for part in slots.iter_batches(batch_size=None, batch_format="pyarrow"):
+        slots = ray.data.from_arrow(blocks).map_batches(
+            work, batch_format="pyarrow", batch_size=None, ray_remote_args_fn=lambda: {"max_retries": TRIES}
+        )
+        # Nothing is held back here: what has come is in the store when a later batch is given up.
+        for part in slots.iter_batches(batch_size=None, batch_format="pyarrow", prefetch_batches=0):
             yield list(zip(part.column("place").to_pylist(), part.column("text").to_pylist()))
 
     try:

@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from servotune import _core
+from servotune import ServotuneError, _core
 from servotune.document import PathLike
 from servotune.floor.source import fleet_file
 from servotune.floor.task import Found, Spread, Task
@@ -23,6 +23,10 @@ ENGINES = {
     "dask": "servotune.floor.over_dask",
     "spark": "servotune.floor.over_spark",
 }
+
+
+class EngineFailed(ServotuneError):
+    """The engine gave up, mostly on a batch that ended its worker every time. What came back before is in the store."""
 
 
 @dataclass(frozen=True)
@@ -77,21 +81,16 @@ def run(
     # An engine is not started where all is done: what is left is the end.
     nothing_left = not (floor.pilots_left() or floor.slots_left())
     started = nullcontext(None) if nothing_left else import_module(ENGINES[engine]).engine(workers)
-    with started as spread:
-        pilots = floor.pilots_left()
-        said(f"pilots: {len(pilots)} left")
-        for found in over(spread, Task(str(fleet)), pilots, 1):
-            floor.add_pilots(found)
-        said("library")
-        library = floor.library(workers if engine == "local" else 0)
-
-        left = floor.slots_left()
-        said(f"slots: {len(left)} of {floor.slots()} left")
-        done = floor.slots() - len(left)
-        for found in over(spread, Task(str(fleet), library), left, batch):
-            floor.add_rows([text for _, text in found])
-            done += len(found)
-            said(f"slots: {done} of {floor.slots()}")
+    try:
+        with started as spread:
+            on_slots(floor, fleet, spread, engine, workers, batch, said)
+    except ServotuneError:
+        raise
+    except Exception as e:
+        raise EngineFailed(
+            f"{fleet}: {engine} gave up: {e}; {floor.slots() - len(floor.slots_left())} of {floor.slots()} slots are done and kept; "
+            "start it again to go on, with batch=1 to lose no slot but the one that fails"
+        ) from e
     said("shared tables and files")
     verdicts, files = floor.conclude(workers if engine == "local" else 0, pages)
     written = [str(f) for f in files]
@@ -99,6 +98,32 @@ def run(
     if table.exists():
         written.append(parquet_beside(table))
     return Ran(floor.run(), floor.slots(), verdicts, written)
+
+
+def on_slots(
+    floor: _core.Floor,
+    fleet: Path,
+    spread: Spread | None,
+    engine: str,
+    workers: int,
+    batch: int,
+    said: Callable[[str], Any],
+) -> None:
+    """Pilots, library, slots: what is left of them."""
+    pilots = floor.pilots_left()
+    said(f"pilots: {len(pilots)} left")
+    for found in over(spread, Task(str(fleet)), pilots, 1):
+        floor.add_pilots(found)
+    said("library")
+    library = floor.library(workers if engine == "local" else 0)
+
+    left = floor.slots_left()
+    said(f"slots: {len(left)} of {floor.slots()} left")
+    done = floor.slots() - len(left)
+    for found in over(spread, Task(str(fleet), library), left, batch):
+        floor.add_rows([text for _, text in found])
+        done += len(found)
+        said(f"slots: {done} of {floor.slots()}")
 
 
 def over(spread: Spread | None, task: Task, places: list[int], size: int) -> Iterable[Found]:
