@@ -1,14 +1,29 @@
 #!/usr/bin/env bash
-# The Python package from nothing: a venv, the package by pip, its tests. The profile `ci` builds in a fraction of the time of `release`.
+# The Python package from nothing: a venv, the package by pip, its tests, the floor on Ray with two workers.
+# `python/ci.sh dask` and `python/ci.sh spark` run the floor on those engines instead.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-venv="target/python-venv"
-[ -x "$venv/bin/python" ] || python3 -m venv "$venv"
+packages="pytest pandas pyarrow control ray<2.64 nbclient ipykernel"
+chosen=()
+case "${1:-}" in
+    "") ;;
+    dask) packages="pytest pyarrow dask distributed" chosen=(-k dask) ;;
+    spark)
+        packages="pytest pyarrow pyspark" chosen=(-k spark)
+        command -v java >/dev/null || { apt-get update -qq && apt-get install -y -qq default-jre-headless; }
+        ;;
+    *) echo "found '$1'; expected nothing, dask or spark" >&2 && exit 2 ;;
+esac
+python3 -c "import ensurepip, venv" 2>/dev/null || { apt-get update -qq && apt-get install -y -qq python3 python3-venv; }
+venv="$PWD/target/python-venv"
+[ -x "$venv/bin/pip" ] || python3 -m venv "$venv"
 # pip finds the builder of the venv.
-export PATH="$PWD/$venv/bin:$PATH"
-"$venv/bin/pip" install -q --disable-pip-version-check "maturin>=1.9,<2" numpy pytest pandas pyarrow control ray dask distributed
-# The program that the package is held against; the tests of the root have built it already.
+export PATH="$venv/bin:$PATH"
+# shellcheck disable=SC2086
+pip install -q --disable-pip-version-check "maturin>=1.9,<2" "numpy>=1.23" $packages
+# The folder and the profile of the root's own tests: what they have compiled is not compiled again.
+export CARGO_TARGET_DIR="$PWD/target"
+# The program that the package is held against.
 cargo build --locked --bin servotune
-CARGO_TARGET_DIR=target/python "$venv/bin/pip" install -q --disable-pip-version-check --no-build-isolation --force-reinstall --no-deps . \
-    -C build-args="--profile ci --locked"
-"$venv/bin/python" -m pytest -q -x python/tests "$@"
+pip install -q --disable-pip-version-check --no-build-isolation --force-reinstall --no-deps . -C build-args="--profile dev --locked"
+SERVOTUNE="$CARGO_TARGET_DIR/debug/servotune" python -m pytest -q -x "${chosen[@]}" python/tests

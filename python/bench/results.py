@@ -20,11 +20,11 @@ from pathlib import Path
 import control
 import numpy as np
 import pyarrow as pa
+from machine import ROOT, program_file
 
 import servotune as st
 from servotune import _core, batch
 
-ROOT = Path(__file__).resolve().parents[2]
 SLOTS = 1000
 LOOPS = 25
 
@@ -54,13 +54,6 @@ def microseconds(call: Callable[[], object], repeats: int) -> tuple[float, float
         call()
         times.append(1e6 * (time.perf_counter() - begun))
     return statistics.median(times), min(times)
-
-
-def program() -> Path:
-    """The program, optimised where it is built so."""
-    named = os.environ.get("SERVOTUNE")
-    found = [Path(named)] if named else [ROOT / "target" / kind / "servotune" for kind in ("release", "debug")]
-    return next(p for p in found if p.exists())
 
 
 def speed(machine: st.Plant, law: st.Controller) -> list[str]:
@@ -134,7 +127,7 @@ def same(machines: list[st.Plant], law: st.Controller, law_file: Path) -> list[s
     rows = batch.margins(table, law).column("document").to_pylist()
     spent = time.perf_counter() - begun
     single = [st.margins(m, law).to_json() for m in machines]
-    named = program()
+    named = program_file()
     with tempfile.TemporaryDirectory() as folder:
 
         def one(i: int) -> dict:

@@ -17,8 +17,8 @@ import pyarrow as pa
 
 from servotune import _core
 from servotune.controller import controller_of
-from servotune.frf import WORDS
 from servotune.gate import Gate, table_text
+from servotune.machine import WORDS
 from servotune.spec import spec_of
 
 SWEEP = ("frequency_hz", "magnitude_db", "phase_deg")

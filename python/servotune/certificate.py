@@ -60,7 +60,5 @@ def verify(
     sweeps = [sweep_of(m)._core for m in machines if is_sweep(m)]
     of = spec_of(spec)._core
     return Certificate(
-        *_core.verify(
-            text, name, plants, sweeps, of, uncertainty, min_damping, hold_included, fixed_point, single
-        )
+        *_core.verify(text, name, plants, sweeps, of, uncertainty, min_damping, hold_included, fixed_point, single)
     )

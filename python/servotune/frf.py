@@ -8,12 +8,10 @@ import numpy as np
 
 from servotune import _core
 from servotune.document import PathLike, write
-from servotune.result import picture
-
-WORDS = "track", "V"
+from servotune.machine import WORDS, Machine
 
 
-class Frf:
+class Frf(Machine):
     """A frequency response, position over command.
 
     frequency_hz : n ascending frequencies (Hz)
@@ -21,7 +19,7 @@ class Frf:
     relative_std : n standard deviations of the values over their sizes, where they are known
     """
 
-    __slots__ = ("_core",)
+    __slots__ = ()
 
     def __init__(
         self,
@@ -89,16 +87,6 @@ class Frf:
         return np.degrees(np.angle(self.response))
 
     @property
-    def position_unit(self) -> str:
-        """Unit of position."""
-        return self._core.position_unit
-
-    @property
-    def command_unit(self) -> str:
-        """Unit of the command."""
-        return self._core.command_unit
-
-    @property
     def unstable_poles(self) -> int:
         """Poles of the plant in the right half-plane, as stated: no sweep shows them."""
         return self._core.unstable_poles
@@ -132,12 +120,6 @@ class Frf:
 
     def __len__(self) -> int:
         return len(self._core)
-
-    def __repr__(self) -> str:
-        return repr(self._core)
-
-    def _repr_html_(self) -> str | None:
-        return picture(self._core.svg())
 
 
 def read_frf(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import math
+from pathlib import Path
 from typing import Any
 
 from servotune import _core
 from servotune.document import PathLike, read
 from servotune.result import Result
-from pathlib import Path
 
 
 class Classified(Result):

@@ -9,8 +9,9 @@ import numpy as np
 
 from servotune import _core
 from servotune.document import PathLike, text_of, write
-from servotune.frf import WORDS, sweep_of
-from servotune.result import Result, picture
+from servotune.frf import sweep_of
+from servotune.machine import WORDS, Machine
+from servotune.result import Result
 
 
 class Sampled(NamedTuple):
@@ -32,10 +33,10 @@ class Sampled(NamedTuple):
         return control.ss(self.a, self.b, self.c, self.d, self.sample_time_s)
 
 
-class Plant:
+class Plant(Machine):
     """A plant model, what stands in a plant.toml: P(s) = exp(-delay_s s) times a rational part, and physics beyond linear where it has any."""
 
-    __slots__ = ("_core",)
+    __slots__ = ()
 
     def __init__(self, core: Any) -> None:
         self._core = core
@@ -62,7 +63,9 @@ class Plant:
             )
         else:
             numerator, denominator = (np.atleast_1d(np.squeeze(part[0][0])) for part in (system.num, system.den))
-            body = f"numerator = {numerator.astype(float).tolist()}\ndenominator = {denominator.astype(float).tolist()}\n"
+            body = (
+                f"numerator = {numerator.astype(float).tolist()}\ndenominator = {denominator.astype(float).tolist()}\n"
+            )
         return Plant(_core.Plant.parse(head + body + delay, "python-control system"))
 
     def to_control(self, form: str = "zpk") -> Any:
@@ -82,16 +85,6 @@ class Plant:
         if path is not None:
             write(path, text)
         return text
-
-    @property
-    def position_unit(self) -> str:
-        """Unit of position."""
-        return self._core.position_unit
-
-    @property
-    def command_unit(self) -> str:
-        """Unit of the command."""
-        return self._core.command_unit
 
     @property
     def delay_s(self) -> float:
@@ -131,12 +124,6 @@ class Plant:
     def to_dict(self) -> dict[str, Any]:
         """The plant.toml as a dictionary."""
         return json.loads(self._core.json())
-
-    def __repr__(self) -> str:
-        return repr(self._core)
-
-    def _repr_html_(self) -> str | None:
-        return picture(self._core.svg())
 
 
 class IdentifiedPlant(Plant):

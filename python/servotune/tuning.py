@@ -51,7 +51,9 @@ class Tuned(Result):
     def save(self, path: PathLike, *, keep_infeasible: bool = False) -> None:
         """Writes the gain table and its certificate beside it; refused where the limits are not met, unless the compromise is asked for."""
         if not (self.tuned or keep_infeasible):
-            raise _core.TuneRefused(f"{path}: the limits are not met; expected keep_infeasible=True to write the compromise")
+            raise _core.TuneRefused(
+                f"{path}: the limits are not met; expected keep_infeasible=True to write the compromise"
+            )
         write(path, self.gains)
         beside = Path(path).with_suffix(".certificate.json")
         if self.certificate_text is not None:
@@ -90,7 +92,5 @@ def tune(
     plant = None if sweep else plant_of(plant_or_frf)._core
     of = spec_of(spec)._core
     return Tuned(
-        _core.tune(
-            plant, sweep, of, start, hold_included, certificate, uncertainty, sample_time_s, starts, settings
-        )
+        _core.tune(plant, sweep, of, start, hold_included, certificate, uncertainty, sample_time_s, starts, settings)
     )

@@ -24,6 +24,12 @@ def root() -> Path:
 
 
 @pytest.fixture(scope="session")
+def shared() -> Path:
+    """Data beside the project, there or not."""
+    return SHARED
+
+
+@pytest.fixture(scope="session")
 def practice() -> Path:
     """Practice cases beside the project."""
     folder = SHARED / "practice"
@@ -33,17 +39,27 @@ def practice() -> Path:
 
 
 @pytest.fixture(scope="session")
-def program():
-    """Runs `servotune --json` with some words: its document and its exit code."""
+def program_file() -> Path | None:
+    """The program that was built last, or the one named in SERVOTUNE."""
     named = os.environ.get("SERVOTUNE")
     built = [ROOT / "target" / kind / "servotune" for kind in ("release", "debug")]
     there = [Path(named)] if named else sorted((p for p in built if p.exists()), key=lambda p: -p.stat().st_mtime)
-    if not there:
+    return there[0].resolve() if there else None
+
+
+@pytest.fixture(scope="session")
+def program(program_file):
+    """Runs `servotune --json` with some words: its document and its exit code."""
+    if program_file is None:
         pytest.skip("the program is not built: cargo build, or name it in SERVOTUNE")
 
     def run(*words, folder=None):
         ran = subprocess.run(
-            [str(there[0]), "--json", *map(str, words)], capture_output=True, text=True, cwd=folder or ROOT, check=False
+            [str(program_file), "--json", *map(str, words)],
+            capture_output=True,
+            text=True,
+            cwd=folder or ROOT,
+            check=False,
         )
         assert ran.returncode in (0, 1), ran.stderr
         return json.loads(ran.stdout), ran.returncode

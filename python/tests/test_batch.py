@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import swept
 
 import servotune as st
-from conftest import swept
 
 pa = pytest.importorskip("pyarrow")
 from servotune import batch  # noqa: E402

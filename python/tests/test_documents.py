@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from conftest import swept
 
 import servotune as st
-from conftest import swept
 
 MACHINES = ["healthy", "tunable", "sensor_fault", "loose_pushpin"]
 CONTROLLER = "specs/controllers/nominal.toml"
@@ -80,7 +80,9 @@ def test_tune_on_a_sweep(program, healthy, nominal, easy, tmp_path):
 def test_gate(program, practice, tmp_path):
     features = tmp_path / "features.csv"
     program("features", practice / "machines", "--out", features)
-    said, _ = program("train", features, "--label", "label", "--out", tmp_path / "gate.json", "--folds", 0, "--epochs", 5)
+    said, _ = program(
+        "train", features, "--label", "label", "--out", tmp_path / "gate.json", "--folds", 0, "--epochs", 5
+    )
     gate = st.Gate.train(features, "label", folds=0, epochs=5)
     gate.write(tmp_path / "python.json")
     assert (tmp_path / "python.json").read_text() == (tmp_path / "gate.json").read_text()

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import sqlite3
+import time
+from contextlib import nullcontext
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 import servotune as st
 from servotune import floor
+from servotune.floor.task import Task
 
 SETTINGS = """
 [robust]
@@ -32,9 +38,7 @@ def fleet(program, tmp_path_factory) -> Path:
     for slot in sorted((folder / "testers/T001/slots").iterdir())[6:]:
         shutil.rmtree(slot)
     (folder / "testers/T001/slots/S02/response.bod").write_text("nothing to read")
-    names = "".join(
-        f'{key} = "{file}"\n' for key, file in [("spec", "spec.toml"), ("controller", "controller.toml")]
-    )
+    names = "".join(f'{key} = "{file}"\n' for key, file in [("spec", "spec.toml"), ("controller", "controller.toml")])
     (folder / "FLEET.toml").write_text(f'{names}[input]\ntree = "testers"\n{SETTINGS}')
     return folder / "FLEET.toml"
 
@@ -68,13 +72,55 @@ def test_threads(fleet, alone, tmp_path):
 
 
 def test_ray(fleet, alone, tmp_path, monkeypatch):
-    ray = pytest.importorskip("ray")
+    pytest.importorskip("ray")
     # Ray's own workers stand back behind everything else on a machine, which is shared here.
     monkeypatch.setenv("RAY_worker_niceness", "0")
-    try:
-        floor.run(fleet, engine="ray", out=tmp_path, name="one", workers=2, batch=2)
-    finally:
-        ray.shutdown()
+    floor.run(fleet, engine="ray", out=tmp_path, name="one", workers=2, batch=2)
+    same(tmp_path, alone)
+
+
+def test_ray_survives_dead_workers(fleet, alone, tmp_path, monkeypatch):
+    """Every batch of slots kills its worker's process at the first try."""
+    pytest.importorskip("ray")
+    monkeypatch.setenv("RAY_worker_niceness", "0")
+    traps = tmp_path / "traps"
+    traps.mkdir()
+
+    class Deadly(Task):
+        def __call__(self, places):
+            trap = traps / str(places[0])
+            if self.library is not None and not trap.exists():
+                trap.touch()
+                os.kill(os.getpid(), signal.SIGKILL)
+            return super().__call__(places)
+
+    monkeypatch.setattr(import_module("servotune.floor.run"), "Task", Deadly)
+    floor.run(fleet, engine="ray", out=tmp_path / "out", name="one", workers=2, batch=2)
+    assert len(list(traps.iterdir())) == 3
+    same(tmp_path / "out", alone)
+
+
+def test_a_slot_that_ends_every_worker(fleet, alone, tmp_path, monkeypatch):
+    """It is given up, the others are kept, and a later run needs that one only."""
+    pytest.importorskip("ray")
+    from servotune.floor import over_ray
+
+    monkeypatch.setenv("RAY_worker_niceness", "0")
+
+    class Deadly(Task):
+        def __call__(self, places):
+            if self.library is not None and 5 in places:
+                # The others have long come back.
+                time.sleep(5.0)
+                os.kill(os.getpid(), signal.SIGKILL)
+            return super().__call__(places)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(import_module("servotune.floor.run"), "Task", Deadly)
+        patch.setattr(over_ray, "TRIES", 1)
+        with pytest.raises(floor.EngineFailed, match="5 of 6 slots are done and kept"):
+            floor.run(fleet, engine="ray", out=tmp_path, name="one", workers=2, batch=1)
+    floor.run(fleet, out=tmp_path, name="one")
     same(tmp_path, alone)
 
 
@@ -84,8 +130,16 @@ def test_dask(fleet, alone, tmp_path):
     same(tmp_path, alone)
 
 
+def test_spark(fleet, alone, tmp_path):
+    pytest.importorskip("pyspark")
+    if shutil.which("java") is None:
+        pytest.skip("Spark needs Java: apt-get install default-jre-headless")
+    floor.run(fleet, engine="spark", out=tmp_path, name="one", workers=2, batch=2)
+    same(tmp_path, alone)
+
+
 def test_a_run_goes_on_where_it_ended(fleet, alone, tmp_path, monkeypatch):
-    def torn(task, batches, workers):
+    def torn(task, batches):
         """An engine that dies after one batch, and gives that one twice."""
         yield task(batches[0])
         yield task(batches[0])
@@ -97,8 +151,8 @@ def test_a_run_goes_on_where_it_ended(fleet, alone, tmp_path, monkeypatch):
     from servotune.floor import local
 
     with monkeypatch.context() as patch:
-        patch.setattr(local, "spread", torn)
-        with pytest.raises(RuntimeError, match="the node is gone"):
+        patch.setattr(local, "engine", lambda workers: nullcontext(torn))
+        with pytest.raises(floor.EngineFailed, match="the node is gone; 2 of 6 slots are done and kept"):
             floor.run(fleet, out=tmp_path, name="one", batch=2)
     said = []
     floor.run(fleet, out=tmp_path, name="one", said=said.append)
@@ -107,7 +161,7 @@ def test_a_run_goes_on_where_it_ended(fleet, alone, tmp_path, monkeypatch):
 
 
 def test_refusals(tmp_path):
-    with pytest.raises(ValueError, match="expected one of: local, ray, dask"):
+    with pytest.raises(ValueError, match="expected one of: local, ray, dask, spark"):
         floor.run("FLEET.toml", engine="abacus", out=tmp_path)
     with pytest.raises(ValueError, match="expected spec= and controller="):
         floor.run(tmp_path, out=tmp_path)

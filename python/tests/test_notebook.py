@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import base64
 
-import servotune as st
 from conftest import swept
+
+import servotune as st
 
 
 def picture(result) -> str:

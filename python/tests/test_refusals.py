@@ -34,7 +34,7 @@ def test_each_room_has_its_class(healthy, nominal, easy):
     with pytest.raises(st.MarginsRefused):
         st.margins(st.Frf([2e4, 3e4, 4e4], [1.0, 0.5, 0.2]), nominal)
     with pytest.raises(st.TuneRefused, match="sample time"):
-        st.tune(healthy, st.Spec.parse("[margins]\nphase_margin_deg = 30.0\n[objective]\nminimise = \"bandwidth\"\n"))
+        st.tune(healthy, st.Spec.parse('[margins]\nphase_margin_deg = 30.0\n[objective]\nminimise = "bandwidth"\n'))
     with pytest.raises(st.TuneRefused, match="guard"):
         st.Spec.parse('guard = 2.0\n[objective]\nminimise = "bandwidth"\n')
     with pytest.raises(st.GateRefused, match="no column|column"):

@@ -3,27 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pyarrow as pa
 
-from servotune.floor.task import Task
+from servotune.floor.task import Found, Spread, Task
+
+#: Workers that a batch may lose before it is given up; Ray Data by itself goes on for ever.
+TRIES = 10
 
 
-def spread(task: Task, batches: list[list[int]], workers: int) -> Iterator[list[tuple[int, str]]]:
-    """Results of every batch, as they come. A cluster that the process is already part of is used; else one starts on this machine."""
+@contextmanager
+def engine(workers: int) -> Iterator[Spread]:
+    """The cluster that the process is already part of; else one of so many cores on this machine, as long as the run lasts."""
     import ray
     import ray.data
 
-    if not ray.is_initialized():
+    own = not ray.is_initialized()
+    if own:
         ray.init(num_cpus=workers or None, include_dashboard=False, log_to_driver=False)
     ray.data.DataContext.get_current().enable_progress_bars = False
 
-    def work(batch: pa.Table) -> pa.Table:
-        found = task(batch.column("place").to_pylist())
-        return pa.table({"place": [place for place, _ in found], "text": [text for _, text in found]})
+    def spread(task: Task, batches: list[list[int]]) -> Iterator[Found]:
+        def work(batch: pa.Table) -> pa.Table:
+            found = task(batch.column("place").to_pylist())
+            return pa.table({"place": [place for place, _ in found], "text": [text for _, text in found]})
 
-    # Ray Data gives a task that lost its worker to another one, as often as it takes.
-    blocks = [pa.table({"place": batch}) for batch in batches]
-    slots = ray.data.from_arrow(blocks).map_batches(work, batch_format="pyarrow", batch_size=None)
-    for part in slots.iter_batches(batch_size=None, batch_format="pyarrow"):
-        yield list(zip(part.column("place").to_pylist(), part.column("text").to_pylist()))
+        blocks = [pa.table({"place": batch}) for batch in batches]
+        slots = ray.data.from_arrow(blocks).map_batches(
+            work, batch_format="pyarrow", batch_size=None, ray_remote_args_fn=lambda: {"max_retries": TRIES}
+        )
+        # Nothing is held back here: what has come is in the store when a later batch is given up.
+        for part in slots.iter_batches(batch_size=None, batch_format="pyarrow", prefetch_batches=0):
+            yield list(zip(part.column("place").to_pylist(), part.column("text").to_pylist()))
+
+    try:
+        yield spread
+    finally:
+        if own:
+            ray.shutdown()

@@ -16,10 +16,14 @@ def fleet_file(
     source = Path(source)
     if source.suffix == ".toml":
         if spec or controller or gate:
-            raise ValueError(f"{source}: a FLEET.toml names its spec, controller and gate itself; expected none beside it")
+            raise ValueError(
+                f"{source}: a FLEET.toml names its spec, controller and gate itself; expected none beside it"
+            )
         return source
     if spec is None or controller is None:
-        raise ValueError(f"{source}: a tree or a table says nothing of limits and gains; expected spec= and controller=")
+        raise ValueError(
+            f"{source}: a tree or a table says nothing of limits and gains; expected spec= and controller="
+        )
     names = {"spec": spec, "controller": controller, **({"gate": gate} if gate else {})}
     lines = [f"{key} = {quoted(path)}" for key, path in names.items()]
     if source.is_dir():
