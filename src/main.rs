@@ -21,6 +21,7 @@ mod export;
 mod export_c;
 mod export_fixed;
 mod export_matlab;
+mod export_plant;
 mod export_st;
 mod failure;
 mod features;
