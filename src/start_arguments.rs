@@ -72,6 +72,36 @@ pub(super) enum ShellWord {
     Man,
 }
 
+/// The keys of a file as a JSON schema, for editors that complete and check them
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  servotune schema spec > spec.schema.json
+  servotune schema plant > plant.schema.json
+
+The same list in words: specs/keys.md, which `servotune init` writes too.")]
+pub(super) struct SchemaArguments {
+    /// Of which file
+    #[arg(value_enum, value_name = "FILE")]
+    pub file: SchemaFile,
+}
+
+/// A file with keys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum SchemaFile {
+    /// plant.toml
+    Plant,
+    /// controller.toml, and the keys of a gain table that a person sets
+    Controller,
+    /// spec.toml
+    Spec,
+    /// profile.toml
+    Profile,
+    /// case.toml
+    Case,
+    /// FLEET.toml
+    Fleet,
+}
+
 /// A gain table as code for a firmware, a PLC or MATLAB, with a test vector; a plant for MATLAB, python-control or as JSON
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
