@@ -5,7 +5,9 @@ pub(super) use super::fleet_arguments::{FleetArguments, TwinFleetArguments};
 pub(super) use super::gate_arguments::{ClassifyArguments, TrainArguments};
 pub(super) use super::margins_arguments::MarginsArguments;
 pub(super) use super::performance_arguments::{BudgetArguments, NextSweepArguments, ParetoArguments};
-pub(super) use super::start_arguments::{CheckArguments, CompletionsArguments, ExportArguments, InitArguments};
+pub(super) use super::start_arguments::{
+    CheckArguments, CompletionsArguments, ExportArguments, InitArguments, SchemaArguments,
+};
 pub(super) use super::sweep_arguments::{MeasuredArguments, ModelArguments, ReadingArguments};
 pub(super) use super::verify_arguments::VerifyArguments;
 use super::verify_arguments::uncertainty;
@@ -55,6 +57,7 @@ pub(super) enum Command {
     Verify(Box<VerifyArguments>),
     Export(ExportArguments),
     Twin(TwinArguments),
+    Schema(SchemaArguments),
     Completions(CompletionsArguments),
 }
 

@@ -58,6 +58,7 @@ pub(super) fn kind_of(file: &Path) -> Result<FileKind, Failure> {
     match ending.as_str() {
         "toml" => of_toml(file),
         "json" => of_json(file),
+        "m" | "py" => Ok(FileKind::Plant),
         _ => of_table(file),
     }
 }
@@ -116,6 +117,12 @@ fn of_json(file: &Path) -> Result<FileKind, Failure> {
     let value: serde_json::Value = serde_json::from_str(&text)
         .map_err(|e| unknown(file, &format!("no JSON document at line {}, column {}", e.line(), e.column())))?;
     let schema = value.get("schema").and_then(serde_json::Value::as_str).unwrap_or_default();
+    let any = |keys: &[&str]| keys.iter().any(|key| value.get(key).is_some());
+    if any(&["plant", "delay_s", "InputDelay"])
+        && any(&["plant", "A", "a", "p", "poles", "poles_rad_s", "den", "denominator"])
+    {
+        return Ok(FileKind::Plant);
+    }
     for (word, kind) in [
         ("servotune.gate/", FileKind::Gate),
         ("servotune.certificate/", FileKind::Certificate),

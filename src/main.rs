@@ -21,6 +21,7 @@ mod export;
 mod export_c;
 mod export_fixed;
 mod export_matlab;
+mod export_plant;
 mod export_st;
 mod failure;
 mod features;
@@ -44,6 +45,7 @@ mod pareto;
 mod performance_arguments;
 mod proof;
 mod response;
+mod schema;
 mod screen;
 mod simulate;
 mod start_arguments;
@@ -94,6 +96,7 @@ fn main() -> ExitCode {
     let ending = match arguments.command {
         Command::Init(a) => init::run(&a, &mut screen),
         Command::Check(a) => check::run(&a, &mut screen),
+        Command::Schema(a) => schema::run(&a, &mut screen),
         Command::Completions(a) => completions::run(&a, &mut screen),
         Command::Export(a) => export::run(&a, &mut screen),
         Command::Demo(a) => demo::run(&a, &mut screen),

@@ -50,8 +50,11 @@ pub(super) fn run(a: &ParetoArguments, screen: &mut Screen) -> Result<Ending, Fa
             let proofs = machines.iter().map(|m| judge(m, c, &spec)).collect::<Result<Vec<_>, _>>()?;
             let ms = proofs.iter().map(|p| p.judged.found.max_sensitivity).fold(0.0, f64::max);
             let problem = TuningProblem::around(&machines, &spec, c)?;
-            let value = problem.score(&problem.parameters().vector(c), &mut problem.work()).objective.exp();
-            now = problem.parameters().fits(c).then_some((ms, value));
+            // A start with other filters than the search sets has no place in its space, and no mark beside the front.
+            if problem.parameters().fits(c) {
+                let value = problem.score(&problem.parameters().vector(c), &mut problem.work()).objective.exp();
+                now = Some((ms, value));
+            }
         }
         let mut provenance = vec![("program".to_owned(), format!("servotune {}", env!("CARGO_PKG_VERSION")))];
         for file in a.plant.iter().chain([&a.spec]) {

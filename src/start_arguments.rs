@@ -72,18 +72,51 @@ pub(super) enum ShellWord {
     Man,
 }
 
-/// A gain table as code for a firmware, a PLC or MATLAB, with a test vector
+/// The keys of a file as a JSON schema, for editors that complete and check them
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  servotune schema spec > spec.schema.json
+  servotune schema plant > plant.schema.json
+
+The same list in words: specs/keys.md, which `servotune init` writes too.")]
+pub(super) struct SchemaArguments {
+    /// Of which file
+    #[arg(value_enum, value_name = "FILE")]
+    pub file: SchemaFile,
+}
+
+/// A file with keys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum SchemaFile {
+    /// plant.toml
+    Plant,
+    /// controller.toml, and the keys of a gain table that a person sets
+    Controller,
+    /// spec.toml
+    Spec,
+    /// profile.toml
+    Profile,
+    /// case.toml
+    Case,
+    /// FLEET.toml
+    Fleet,
+}
+
+/// A gain table as code for a firmware, a PLC or MATLAB, with a test vector; a plant for MATLAB, python-control or as JSON
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   servotune export gains.toml --as c --out controller.h
   servotune export gains.toml --as fixed --word-length 24 --plant plant.toml --out controller_fixed.h
   servotune export gains.toml --as st --out controller.st
   servotune export gains.toml --as matlab --out controller.m
+  servotune export plant.toml --as matlab --out plant.m
+  servotune export plant.toml --as python --out plant.py
 
-fixed rounds every coefficient to a word and measures what that does: to the controller's response, to its command, and with --plant to the margins.")]
+fixed rounds every coefficient to a word and measures what that does: to the controller's response, to its command, and with --plant to the margins.
+A plant goes out as matlab, python, zpk, tf or ss, and is read back before it is said to be right; every command takes these files as a plant too.")]
 pub(super) struct ExportArguments {
-    /// Gain table or controller (gains.toml, controller.toml)
-    #[arg(value_name = "GAINS")]
+    /// Gain table, controller or plant (gains.toml, controller.toml, plant.toml)
+    #[arg(value_name = "FILE")]
     pub gains: PathBuf,
     /// What to write
     #[arg(long = "as", value_enum, value_name = "FORM")]
@@ -91,9 +124,9 @@ pub(super) struct ExportArguments {
     /// File to write
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Name of the controller in the code
-    #[arg(long, value_name = "NAME", default_value = "servo", value_parser = identifier)]
-    pub name: String,
+    /// Name in the code; servo for a controller and P for a plant where absent
+    #[arg(long, value_name = "NAME", value_parser = identifier)]
+    pub name: Option<String>,
     /// Bits of a coefficient, for --as fixed
     #[arg(long, value_name = "BITS", default_value_t = 32, value_parser = clap::value_parser!(u32).range(12..=32))]
     pub word_length: u32,
@@ -114,8 +147,16 @@ pub(super) enum ExportForm {
     Fixed,
     /// IEC 61131-3 structured text
     St,
-    /// MATLAB function
+    /// MATLAB function of a controller, MATLAB script of a plant (zpk)
     Matlab,
+    /// Plant for python-control (state space)
+    Python,
+    /// Plant as JSON: zeros, poles, gain
+    Zpk,
+    /// Plant as JSON: numerator and denominator
+    Tf,
+    /// Plant as JSON: A, B, C, D
+    Ss,
 }
 
 /// A name that C, structured text and MATLAB all take.

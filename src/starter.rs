@@ -34,7 +34,8 @@ enum Swept {
 }
 
 /// Pages that say what every key means.
-const PAGES: [(&str, &str); 9] = [
+const PAGES: [(&str, &str); 10] = [
+    ("specs/keys.md", include_str!("../specs/keys.md")),
     ("specs/files.md", include_str!("../specs/files.md")),
     ("specs/tuning.md", include_str!("../specs/tuning.md")),
     ("specs/frf.md", include_str!("../specs/frf.md")),

@@ -45,7 +45,7 @@ pub(super) struct ReadingArguments {
     /// Columns by name: frequency=F,real=R,imaginary=I or frequency=F,magnitude=M,phase=P; also std=, coherence=
     #[arg(long, value_name = "LIST", value_parser = columns)]
     columns: Option<ColumnChoice>,
-    /// Which response of a universal file, counted from 1
+    /// Which response of a universal, MATLAB or Touchstone file, counted from 1
     #[arg(long, value_name = "N")]
     dataset: Option<usize>,
     /// Band that the sweep was meant to cover (Hz), as LOW:HIGH; an early stop is then refused

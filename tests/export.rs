@@ -138,3 +138,63 @@ fn an_export_never_takes_the_place_of_its_gains() {
     let ran = servotune(&["export", &gains, "--as", "c", "--out", dir.join("x.h").to_str().unwrap(), "--name", "9x"]);
     assert!(ran.code == 2 && ran.err.contains("a letter"), "{}", ran.err);
 }
+
+/// Every form read again by the program gives the same margins; the text of python-control is run by it where it is installed.
+#[test]
+fn a_plant_goes_out_and_comes_back() {
+    let dir = folder("export_plant");
+    let plant = "specs/machines/healthy.toml";
+    let margins = |plant: &str| -> Value {
+        let ran = servotune(&["margins", "--plant", plant, "--controller", NOMINAL, "--json"]);
+        serde_json::from_str(&ran.out).unwrap_or_else(|e| panic!("{e}: {}", ran.err))
+    };
+    let truth = margins(plant);
+    for (form, ending) in [("matlab", "m"), ("python", "py"), ("zpk", "json"), ("ss", "json"), ("tf", "json")] {
+        let out = dir.join(format!("plant_{form}.{ending}"));
+        let words = ["export", plant, "--as", form, "--out", out.to_str().unwrap(), "--json"];
+        let ran = servotune(&words);
+        if form == "tf" && ran.code == 2 {
+            // Twenty poles: coefficients may lose them, and then it says so.
+            assert!(ran.err.contains("loses digits"), "{}", ran.err);
+            continue;
+        }
+        assert_eq!(ran.code, 0, "{form}: {}", ran.err);
+        let said: Value = serde_json::from_str(&ran.out).unwrap();
+        assert!(said["response_deviation"].as_f64().unwrap() < 1e-6);
+        let found = margins(out.to_str().unwrap());
+        for key in ["phase_margin_deg", "gain_margin_db", "max_sensitivity", "gain_crossover_hz"] {
+            let (a, b) = (truth[key].as_f64().unwrap(), found[key].as_f64().unwrap());
+            assert!((a / b - 1.0).abs() < 1e-5, "{form} {key}: {a} {b}");
+        }
+        assert_eq!(servotune(&["check", out.to_str().unwrap()]).code, 0, "{form}");
+    }
+    let small = dir.join("small.toml");
+    let text = "position_unit = \"um\"\ncommand_unit = \"A\"\n[plant]\ngain = 8.0\nzeros_rad_s = [-900]\npoles_rad_s = [0, -40, [-100, 5000]]\ndelay_s = 1e-4\n";
+    std::fs::write(&small, text).unwrap();
+    for (form, ending) in [("tf", "json"), ("python", "py")] {
+        let out = dir.join(format!("small_{form}.{ending}"));
+        let words = ["export", small.to_str().unwrap(), "--as", form, "--out", out.to_str().unwrap()];
+        assert_eq!(servotune(&words).code, 0, "{form}");
+    }
+    // (j w + 900) 8/(j w (j w + 40) (...)) at 1000 rad/s, by numpy's own solver of the states.
+    let script = "exec(open('small_python.py').read())\ns = 1000j\nwant = 8*(s+900)/(s*(s+40)*((s+100)**2+25e6))\nassert abs(P(s)/want-1) < 1e-9, (P(s), want)\nprint('same')\n";
+    match Command::new("python3").args(["-c", script]).current_dir(&dir).output() {
+        Ok(ran) if ran.status.success() => assert_eq!(String::from_utf8_lossy(&ran.stdout), "same\n"),
+        Ok(ran) if String::from_utf8_lossy(&ran.stderr).contains("No module named") => {
+            eprintln!("skipped: python-control is not installed (pip install control)");
+        }
+        Ok(ran) => panic!("{}", String::from_utf8_lossy(&ran.stderr)),
+        Err(_) => eprintln!("skipped: no python3"),
+    }
+}
+
+#[test]
+fn forms_of_plants_and_of_controllers_are_told_apart() {
+    let dir = folder("export_forms");
+    let out = dir.join("x.txt");
+    let out = out.to_str().unwrap();
+    let ran = servotune(&["export", "specs/machines/healthy.toml", "--as", "c", "--out", out]);
+    assert!(ran.code == 2 && ran.err.contains("forms of a controller"), "{}", ran.err);
+    let ran = servotune(&["export", NOMINAL, "--as", "ss", "--out", out]);
+    assert!(ran.code == 2 && ran.err.contains("forms of a plant"), "{}", ran.err);
+}

@@ -140,7 +140,8 @@ fn figures() -> Vec<(&'static str, Figure)> {
         ),
         (
             "sensitivity",
-            sensitivity("Sensitivity", "Where the loop amplifies disturbances.", &dense, &s, &t, Some(2.2)).unwrap(),
+            sensitivity("Sensitivity", "Where the loop amplifies disturbances.", &dense, &s, &t, Some(2.2), None)
+                .unwrap(),
         ),
         (
             "time",

@@ -6,6 +6,8 @@ use servotune::frf::Sweep;
 use servotune::lti::Plant;
 use servotune::tune::{Machine, Outcome, Reached, Route, Tuned, Work, judge, ranges};
 use servotune_fleet::{Context, OwnTable, SlotRow, SlotSource, gain_table_of};
+use servotune_report::page::Block;
+use servotune_report::table::Verdict;
 
 /// Where the page of a slot lies beside the fleet's page.
 pub(super) fn file(row: &SlotRow) -> String {
@@ -55,16 +57,17 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
         provenance: provenance(&table),
         physics: None,
     })?;
-    let mut text = page.html();
-    if !proved.passes {
-        // The page's verdict is that of the response as measured; the fleet asks for more.
-        let says = format!(
+    let mut page = page;
+    // The page's verdict is that of the response as measured; the fleet asks for more, and its badge with it.
+    let notice = page.sections.first_mut().and_then(|s| s.blocks.first_mut());
+    if let (false, Some(Block::Notice(verdict, text))) = (proved.passes, notice) {
+        *verdict = Verdict::Fail;
+        *text = format!(
             "In the worst case ({}) {} is missed by {:.1} %.",
             if proved.case.is_empty() { "as measured" } else { &proved.case },
             proved.limit,
             100.0 * proved.worst
         );
-        text = text.replacen("Every limit is met.", &says, 1);
     }
-    Ok(Some(text))
+    Ok(Some(page.html()))
 }

@@ -16,6 +16,7 @@ mod physics;
 mod proof;
 mod simulated;
 pub mod slot;
+mod steps;
 mod sweep;
 mod tuned;
 

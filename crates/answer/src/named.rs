@@ -3,7 +3,7 @@
 use super::AnswerError;
 use servotune::controller::Controller;
 use servotune::document::parse_toml;
-use servotune::lti::{Plant, PlantFile};
+use servotune::lti::{Plant, PlantFile, imported_plant};
 use servotune::pes::Profile;
 use servotune::tune::GainTable;
 use std::path::Path;
@@ -26,9 +26,12 @@ impl<T> Clone for Named<'_, T> {
 
 impl<T> Copy for Named<'_, T> {}
 
-/// The plant in a text, its physics entries not looked at yet.
+/// The plant in a text, its physics entries not looked at yet: plant.toml, or by the file's ending another program's text or JSON.
 pub fn plant(file: &Path, text: &str) -> Result<Plant, AnswerError> {
-    let read: PlantFile = parse_toml(file, text).map_err(|e| e.expecting(PlantFile::EXPECTED))?;
+    let read: PlantFile = match imported_plant(file, text) {
+        Some(read) => read?,
+        None => parse_toml(file, text).map_err(|e| e.expecting(PlantFile::EXPECTED))?,
+    };
     Plant::try_from(read).map_err(|source| AnswerError::Plant { file: file.into(), source })
 }
 

@@ -1,6 +1,7 @@
 //! One slot tuned: what `tune` and `demo` share, from the machine to the gain table and the page.
 
 use super::AnswerError;
+use super::steps::step_responses;
 use servotune::controller::Controller;
 use servotune::feedback::{ModelLoop, OpenLoop, confirmed_margins};
 use servotune::frf::Sweep;
@@ -83,23 +84,29 @@ fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Res
         }
         None => None,
     };
+    let (l_stable, crossover) = (judged_margins.stable, judged_margins.gain_crossover_hz);
     Ok(LoopView {
         name: name.to_owned(),
         open_loop: w.iter().map(|&w| l.at(w)).collect(),
         hz: w.into_iter().map(|w| w / TAU).collect(),
         margins: judged_margins,
         write: write.map(|(figures, write)| (write, figures)),
+        steps: l_stable.then(|| step_responses(&sampled, c, &sections.chain, crossover)),
         judged: Some(judged),
     })
 }
 
 /// Said under the verdict where the limits were judged on the measured response.
-const JUDGED_ON_RESPONSE: &str = "The limits in this table are judged on the measured response, noise as expected power. The cards above and the curves \
-                                  below are those of the identified model, noise as the profile's draw; the last section sets both side by side.";
+const JUDGED_ON_RESPONSE: &str = "Cards and table are judged on the measured response, noise as expected power. The curves below are those of the identified \
+                                  model, noise as the profile's draw.";
+
+/// The same where both ways of tuning are compared.
+const JUDGED_BOTH_WAYS: &str = "Cards and table are judged on the measured response, noise as expected power. The curves below are those of the identified \
+                                model, noise as the profile's draw; the section \"Model or measured response\" sets both side by side.";
 
 /// Said under the verdict where the plant has physics.
-const JUDGED_WITH_PHYSICS: &str = "The limits in this table are judged with the physics of the plant file: margins at the worst amplitude, the write simulated \
-                                   with every effect. The cards and curves of L are those of the linear plant, the write is the one with physics.";
+const JUDGED_WITH_PHYSICS: &str = "Cards and table are judged with the physics of the plant file: margins at the worst amplitude, the write simulated \
+                                   with every effect. The curves of L and the steps are those of the linear plant, the write is the one with physics.";
 
 /// Draws of the identified plant for the intervals of the margins, and their seed.
 const DRAWS: usize = 200;
@@ -121,7 +128,10 @@ pub fn page(slot: &Slot<'_>) -> Result<Page, AnswerError> {
     let view = SlotView {
         name: slot.name,
         verdict: slot.physics.map_or_else(|| verdict(slot.outcome), |(_, t)| physical_verdict(t)),
-        judged_on: slot.physics.map(|_| JUDGED_WITH_PHYSICS).or(slot.sweep.map(|_| JUDGED_ON_RESPONSE)),
+        judged_on: slot
+            .physics
+            .map(|_| JUDGED_WITH_PHYSICS)
+            .or(slot.sweep.map(|_| if slot.over_model.is_some() { JUDGED_BOTH_WAYS } else { JUDGED_ON_RESPONSE })),
         plant: [plant_sections(slot)?, physical_sections(slot, before.as_ref(), &after)?].concat(),
         before: before.as_ref(),
         after: &after,

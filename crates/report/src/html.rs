@@ -22,6 +22,7 @@ pub(super) fn figure(figure: &Figure, number: usize, wide: Size) -> Markup {
             figcaption {
                 b { "Figure " (number) ". " (figure.title) "." } " " (figure.caption)
                 " " button.reset type="button" hidden { "Whole view" }
+                " " button.csv type="button" hidden { "CSV" }
             }
             script.plot-data type="application/json" { (PreEscaped(data(figure, wide))) }
         }
@@ -39,7 +40,12 @@ pub(super) fn style() -> String {
 
 /// The script of a page with figures.
 pub(super) fn script() -> String {
-    let parts = [include_str!("assets/ticks.js"), include_str!("assets/plot.js"), include_str!("assets/readout.js")];
+    let parts = [
+        include_str!("assets/ticks.js"),
+        include_str!("assets/plot.js"),
+        include_str!("assets/readout.js"),
+        include_str!("assets/tables.js"),
+    ];
     format!("(function () {{\n\"use strict\";\n{}}})();", parts.concat())
 }
 

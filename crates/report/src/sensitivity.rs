@@ -9,6 +9,9 @@ use super::figure::{Axis, Figure, Ink, Kind, Mark, Note, Panel, RuleLine, Series
 use super::number::NumberFormat;
 use nalgebra::Complex;
 
+/// S of another loop on its own grid, drawn behind: name, frequencies (Hz), values.
+pub type Behind<'a> = (&'a str, &'a [f64], &'a [Complex<f64>]);
+
 /// S and T in dB; the peak of S on the grid is marked, the limit is a line.
 pub fn sensitivity(
     title: &str,
@@ -17,6 +20,7 @@ pub fn sensitivity(
     s: &[Complex<f64>],
     t: &[Complex<f64>],
     max_sensitivity_limit: Option<f64>,
+    behind: Option<Behind<'_>>,
 ) -> Result<Figure, ReportError> {
     let mut panel = Panel::new(Axis::frequency(), Axis::decibels("Magnitude"));
     panel.marks.push(RuleLine::horizontal(0.0, "", Ink::Plain));
@@ -35,6 +39,10 @@ pub fn sensitivity(
     }
     let s_db: Vec<f64> = s.iter().map(|&v| decibels(v)).collect();
     let t_db: Vec<f64> = t.iter().map(|&v| decibels(v)).collect();
+    if let Some((name, hz, values)) = behind {
+        let db: Vec<f64> = values.iter().map(|&v| decibels(v)).collect();
+        panel.marks.push(Series::new(&format!("S {name}"), Ink::Muted, Kind::Solid, hz, &db)?.into());
+    }
     panel.marks.push(Series::new("sensitivity S", Ink::Data(0), Kind::Solid, frequency_hz, &s_db)?.into());
     panel.marks.push(Series::new("complementary T", Ink::Data(1), Kind::Dashed, frequency_hz, &t_db)?.into());
     let peak = (0..s_db.len()).filter(|&i| s_db[i].is_finite()).max_by(|&a, &b| s_db[a].total_cmp(&s_db[b]));
@@ -60,7 +68,7 @@ mod tests {
         let hz = [10.0, 100.0, 1000.0];
         let s = [Complex::new(0.1, 0.0), Complex::new(0.0, 2.0), Complex::new(1.0, 0.0)];
         let t: Vec<Complex<f64>> = s.iter().map(|s| 1.0 - s).collect();
-        let figure = sensitivity("t", "c", &hz, &s, &t, Some(2.2)).unwrap();
+        let figure = sensitivity("t", "c", &hz, &s, &t, Some(2.2), None).unwrap();
         let notes: Vec<&Note> = figure.panels[0]
             .marks
             .iter()
@@ -69,7 +77,7 @@ mod tests {
         assert_eq!(notes.len(), 1);
         // 20 log10 2, exactly as the series is made.
         assert_eq!((notes[0].at, notes[0].text.as_str()), ((100.0, 20.0 * 2f64.log10()), "peak of S 2.00 at 100 Hz"));
-        let refused = sensitivity("t", "c", &hz, &s, &t, Some(f64::NAN));
+        let refused = sensitivity("t", "c", &hz, &s, &t, Some(f64::NAN), None);
         assert!(matches!(refused, Err(ReportError::Domain { figure: "sensitivity plot", .. })), "{refused:?}");
     }
 }

@@ -4,20 +4,21 @@
 
 use super::ReportError;
 use super::bode::{BodeCurve, BodeMarks, bode};
-use super::figure::{Figure, Ink};
+use super::figure::{Figure, Ink, Kind, Region, Series};
 use super::margins::margins_table;
-use super::number::NumberFormat;
+use super::number::{MISSING, NumberFormat};
 use super::nyquist::{NyquistMarks, nyquist};
 use super::page::{Block, Card, Page, Section};
 use super::sensitivity::sensitivity;
 use super::spectrum_bars::{SpectrumBars, spectrum_bars};
+use super::steps::{StepLimits, StepResponses};
 use super::table::Verdict;
 use super::time::{CurveKind, TimeCurve, TimePanel, time};
-use super::tuned::{Units, limits_table};
+use super::tuned::{Units, figure_words, limits_table};
 use nalgebra::Complex;
-use servotune::feedback::Margins;
+use servotune::feedback::{CurveSide, Magnitude, Margins};
 use servotune::pes::{ClosedLoop, PesFigures, Profile};
-use servotune::tune::{Judged, Spec};
+use servotune::tune::{Judged, MET, Side, Spec};
 
 /// One controller on one machine, with all that is drawn of it.
 #[derive(Clone, Debug)]
@@ -32,6 +33,8 @@ pub struct LoopView {
     pub margins: Margins,
     /// The write; none where the loop is unstable.
     pub write: Option<(ClosedLoop, PesFigures)>,
+    /// Its steps; none where the loop is unstable.
+    pub steps: Option<StepResponses>,
     /// The limits, judged; none where there is no spec.
     pub judged: Option<Judged>,
 }
@@ -86,41 +89,82 @@ pub fn slot_page(view: &SlotView<'_>) -> Result<Page, ReportError> {
     })
 }
 
+/// Most cards.
+const CARDS: usize = 6;
+
+/// The limits as they were judged, so that cards and table are of one mind; margins that nothing is asked of fill the row.
 fn cards(view: &SlotView<'_>) -> Vec<Card> {
-    let m = &view.after.margins;
     let short = NumberFormat::Significant(3);
-    let judged = |good: bool| Some(if good { Verdict::Ok } else { Verdict::Fail });
-    let wanted = &view.spec.margins;
-    let card = |label: &str, value: Option<f64>, unit: &str, note: String, verdict| Card {
-        label: label.into(),
-        value: value.map_or_else(|| super::number::MISSING.to_owned(), |v| short.page(v)),
-        unit: unit.into(),
-        note,
-        verdict,
-    };
-    let at_least = |found: Option<f64>, limit: Option<f64>| match (found, limit) {
-        (Some(f), Some(l)) => (format!("at least {l}"), judged(f >= l)),
-        _ => (String::new(), None),
-    };
-    let at_most = |found: Option<f64>, limit: Option<f64>| match (found, limit) {
-        (Some(f), Some(l)) => (format!("at most {l}"), judged(f <= l)),
-        _ => (String::new(), None),
-    };
-    let figures = view.after.write.as_ref().map(|(_, f)| f);
-    let low = figures.and_then(|f| f.dft_low);
-    let high = figures.and_then(|f| f.dft_high);
-    let (pm_note, pm) = at_least(m.phase_margin_deg, wanted.phase_margin_deg);
-    let (gm_note, gm) = at_least(m.gain_margin_db, wanted.gain_margin_db);
-    let (ms_note, ms) = at_most(Some(m.max_sensitivity), wanted.max_sensitivity);
-    let (low_note, low_verdict) = at_most(low, view.spec.limits.dft_low);
-    let (high_note, high_verdict) = at_most(high, view.spec.limits.dft_high);
-    vec![
-        card("Phase margin", m.phase_margin_deg, "deg", pm_note, pm),
-        card("Gain margin", m.gain_margin_db, "dB", gm_note, gm),
-        card("Sensitivity peak Ms", Some(m.max_sensitivity), "", ms_note, ms),
-        card("DFT 600-1500 Hz", low, view.units.position, low_note, low_verdict),
-        card("DFT 1500-3000 Hz", high, view.units.position, high_note, high_verdict),
-    ]
+    let page = |v: f64| short.page(v);
+    let limits = view.after.judged.as_ref().map_or(&[][..], |j| &j.limits);
+    let mut all: Vec<Card> = limits
+        .iter()
+        .map(|l| {
+            let (label, unit) = figure_words(l.wanted.what, view.units);
+            let side = if l.wanted.side == Side::AtLeast { "at least" } else { "at most" };
+            Card {
+                label: first_upper(&label),
+                value: l.found.map_or_else(|| MISSING.to_owned(), page),
+                unit: if unit == "ratio" { String::new() } else { unit.to_owned() },
+                note: format!("{side} {}", page(l.wanted.limit)),
+                verdict: Some(if l.violation > MET { Verdict::Fail } else { Verdict::Ok }),
+            }
+        })
+        .collect();
+    // A range stands in one card.
+    all.dedup_by(|b, a| {
+        let range = a.label == b.label && a.note.starts_with("at least") && b.note.starts_with("at most");
+        if range {
+            a.note = format!("{} to {}", &a.note["at least ".len()..], &b.note["at most ".len()..]);
+            a.verdict = if b.verdict == Some(Verdict::Fail) { b.verdict } else { a.verdict };
+        }
+        range
+    });
+    // What is missed is never behind the last card.
+    all.sort_by_key(|c| c.verdict == Some(Verdict::Ok));
+    all.truncate(CARDS);
+    let m = &view.after.margins;
+    let asked = |label: &str| all.iter().any(|c| c.label == label);
+    let plain = [
+        ("Phase margin", m.phase_margin_deg, "deg"),
+        ("Gain margin", m.gain_margin_db, "dB"),
+        ("Max sensitivity Ms", Some(m.max_sensitivity), ""),
+        ("Gain crossover", m.gain_crossover_hz, "Hz"),
+    ];
+    let more: Vec<Card> = plain
+        .into_iter()
+        .filter(|(label, ..)| !asked(label))
+        .map(|(label, value, unit)| Card {
+            label: label.into(),
+            value: value.map_or_else(|| MISSING.to_owned(), page),
+            unit: unit.into(),
+            note: "of the model".into(),
+            verdict: None,
+        })
+        .collect();
+    let room = CARDS - all.len();
+    all.extend(more.into_iter().take(room));
+    all
+}
+
+fn first_upper(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |c| c.to_uppercase().collect::<String>() + letters.as_str())
+}
+
+/// The curves that the spec asks of this magnitude, as lines of the limit, and the band of the crossover.
+fn requirements(figure: &mut Figure, view: &SlotView<'_>, of: &[Magnitude]) -> Result<(), ReportError> {
+    let Some(panel) = figure.panels.first_mut() else { return Ok(()) };
+    for (i, c) in view.spec.limits.curve.iter().enumerate().filter(|(_, c)| of.contains(&c.of)) {
+        let side = if c.side == CurveSide::AtLeast { "at least" } else { "at most" };
+        let name = format!("curve {}: |{:?}| {side}", i + 1, c.of);
+        panel.marks.push(Series::new(&name, Ink::Limit, Kind::Solid, &c.hz, &c.db)?.into());
+    }
+    if let Some([low, high]) = view.spec.margins.gain_crossover_hz.filter(|_| of.contains(&Magnitude::L)) {
+        let label = format!("crossover {low} to {high} Hz");
+        panel.marks.insert(0, Region::of_x(low, high, &label, Ink::Muted));
+    }
+    Ok(())
 }
 
 fn loop_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
@@ -135,22 +179,32 @@ fn loop_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
         phase_margin: m.gain_crossover_hz.zip(m.phase_margin_deg),
         gain_margin: m.phase_crossover_hz.zip(m.gain_margin_db),
     };
-    let open = bode("Open loop", "The marked margins are those after tuning.", &curves, &marks)?;
+    let mut open = bode("Open loop", "The marked margins are those after tuning.", &curves, &marks)?;
+    requirements(&mut open, view, &[Magnitude::L])?;
     let limit = view.spec.margins.max_sensitivity;
     let disk_margin = (m.disk_margin > 0.0 && m.disk_margin < 2.0).then_some(m.disk_margin);
     let nyquist_marks = NyquistMarks { max_sensitivity_limit: limit, disk_margin, points: vec![] };
     let one = Complex::new(1.0, 0.0);
     let s: Vec<_> = after.open_loop.iter().map(|l| one / (one + l)).collect();
     let t: Vec<_> = after.open_loop.iter().map(|l| l / (one + l)).collect();
-    let mut blocks = vec![
-        Block::Figure(open),
-        Block::Pair(
-            nyquist("Nyquist curve", "", &after.hz, &after.open_loop, &nyquist_marks)?,
-            sensitivity("Sensitivity functions", "", &after.hz, &s, &t, limit)?,
-        ),
-        Block::Table(margins_table(m)?),
-        Block::Details("All crossings".into(), vec![Block::Table(super::margins::crossings_table(m)?)]),
-    ];
+    let s_before: Option<Vec<_>> = view.before.map(|b| b.open_loop.iter().map(|l| one / (one + l)).collect());
+    let behind = view.before.zip(s_before.as_ref()).map(|(b, s)| (b.name.as_str(), &b.hz[..], &s[..]));
+    let mut gang = sensitivity("Sensitivity functions", "", &after.hz, &s, &t, limit, behind)?;
+    requirements(&mut gang, view, &[Magnitude::S, Magnitude::T])?;
+    let curve = nyquist("Nyquist curve", "", &after.hz, &after.open_loop, &nyquist_marks)?;
+    let mut blocks = vec![Block::Figure(open), Block::Figure(gang)];
+    let mut steps: Vec<(&str, &StepResponses)> = after.steps.iter().map(|s| (after.name.as_str(), s)).collect();
+    if steps.is_empty() {
+        blocks.push(Block::Figure(curve));
+    } else {
+        steps.extend(view.before.and_then(|b| b.steps.as_ref().map(|s| (b.name.as_str(), s))));
+        let l = &view.spec.limits;
+        let asked = StepLimits { overshoot_percent: l.overshoot_percent, settling_s: l.settling_s };
+        let drawn = super::steps::steps(&steps, asked, [view.units.position, view.units.command])?;
+        blocks.push(Block::Pair(curve, drawn));
+    }
+    blocks.push(Block::Table(margins_table(m)?));
+    blocks.push(Block::Details("All crossings".into(), vec![Block::Table(super::margins::crossings_table(m)?)]));
     if let Some(before) = view.before {
         let table = Block::Table(margins_table(&before.margins)?);
         blocks.push(Block::Details("Margins before tuning".into(), vec![table]));
@@ -190,6 +244,10 @@ fn pes_section(view: &SlotView<'_>, profile: &Profile) -> Result<Section, Report
     let spectrum = spectrum_bars("DFT of the window", "Amplitude |X_k|/N of each harmonic.", &bars)?;
     let mut blocks =
         vec![Block::Figure(record_figure(view, profile, write, before.map(|(w, _)| w))?), Block::Figure(spectrum)];
+    let mut spectra = vec![("after", figures)];
+    spectra.extend(before.map(|(_, f)| ("before", f)));
+    let rate = profile.pes.sample_rate_hz;
+    blocks.push(Block::Figure(super::cumulative::cumulative_spectrum(&spectra, rate, view.units.position)?));
     blocks.push(Block::Table(super::pes::pes_table(figures, view.units.position)?));
     let harmonics = super::pes::harmonics_table(figures, 24, view.units.position)?;
     blocks.push(Block::Details("Harmonics".into(), vec![Block::Table(harmonics)]));

@@ -221,9 +221,9 @@ impl Table {
                             tr {
                                 @for (index, (cell, column)) in row.iter().zip(&self.columns).enumerate() {
                                     @if index == 0 {
-                                        th scope="row" class=(column.class()) { (cell.markup(column.format)) }
+                                        th scope="row" class=(column.class()) data-v=[cell.number()] { (cell.markup(column.format)) }
                                     } @else {
-                                        td class=(column.class()) { (cell.markup(column.format)) }
+                                        td class=(column.class()) data-v=[cell.number()] { (cell.markup(column.format)) }
                                     }
                                 }
                             }
@@ -265,6 +265,11 @@ impl Cell {
             None => Value::Text(words.to_owned()),
         };
         Cell { value, flag: None }
+    }
+
+    /// The number to sort by, where there is one.
+    fn number(&self) -> Option<f64> {
+        if let Value::Number(x) = self.value { x.is_finite().then_some(x) } else { None }
     }
 
     fn plain(&self, format: NumberFormat) -> String {

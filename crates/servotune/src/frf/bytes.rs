@@ -67,9 +67,6 @@ pub(crate) fn text<'a>(file: &str, bytes: &'a [u8], notes: &mut Vec<Note>) -> Re
     if bytes.starts_with(b"PK\x03\x04") {
         return refuse(NotText::Zip);
     }
-    if bytes.starts_with(b"\x89HDF") || bytes.starts_with(b"MATLAB 5.0") {
-        return refuse(NotText::Matlab);
-    }
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return refuse(NotText::Utf16);
     }

@@ -42,8 +42,8 @@ pub enum NotText {
     Utf16,
     /// A zip archive or a spreadsheet.
     Zip,
-    /// An HDF5 or MATLAB file.
-    Matlab,
+    /// An HDF5 file, which MATLAB 7.3 writes too.
+    Hdf5,
     /// Gzip inside gzip.
     GzipTwice,
     /// Control bytes that no text holds.
@@ -55,7 +55,9 @@ impl fmt::Display for NotText {
         f.write_str(match self {
             NotText::Utf16 => "UTF-16 text; save it as UTF-8",
             NotText::Zip => "a zip archive or spreadsheet; export it as CSV",
-            NotText::Matlab => "an HDF5 or MATLAB file; export it as CSV",
+            NotText::Hdf5 => {
+                "an HDF5 file, as MATLAB writes it with -v7.3; in MATLAB save it with '-v7', elsewhere export it as CSV"
+            }
             NotText::GzipTwice => "gzip inside gzip; unpack it once",
             NotText::Binary => "binary data",
         })
@@ -81,6 +83,8 @@ pub enum Doubt {
         /// Largest phase as written.
         high: f64,
     },
+    /// The file names no unit where both are usual.
+    NoUnit,
     /// The ends of the sweep are round numbers in the other unit only.
     RoundEnds {
         /// Lower end in the other unit.
@@ -106,6 +110,7 @@ impl fmt::Display for Doubt {
             ),
             Doubt::Value { value } => write!(f, "the value {value} cannot be in that unit"),
             Doubt::PhaseRange { low, high } => write!(f, "all phases lie from {low} to {high}, as if in radians"),
+            Doubt::NoUnit => f.write_str("no unit stands beside the frequencies, and both are usual in such a file"),
             Doubt::RoundEnds { low, high } => {
                 write!(f, "the ends are round numbers only after division by 2 pi, {low:.6} and {high:.6}")
             }
@@ -236,6 +241,30 @@ pub enum FrfError {
         "{file}, dataset {dataset}, line {line}: {found} bytes are left and no closing -1 stands where the data should end; expected {expected} data bytes"
     )]
     DatasetBytes { file: String, dataset: usize, line: u64, found: usize, expected: usize },
+    #[error(
+        "{file}: element {number} of the MATLAB file is damaged or cut short; expected {expected}: copy the file again, or save it again with '-v7'"
+    )]
+    MatDamaged { file: String, number: usize, expected: &'static str },
+    #[error(
+        "{file}: found no frequency response among {}; expected a structure with Frequency and ResponseData, vectors such as f and H or f, mag and phase, or a matrix of three columns. An frd or idfrd object is saved as a structure: S = struct('ResponseData', G.ResponseData, 'Frequency', G.Frequency, 'FrequencyUnit', G.FrequencyUnit); --columns frequency=NAME,real=NAME,imaginary=NAME chooses by name",
+        list(found)
+    )]
+    MatNoResponse { file: String, found: Vec<String> },
+    #[error(
+        "{file}: {}; choose one with --dataset N: {}",
+        wanted.map_or_else(|| format!("found {} responses", responses.len()), |n| format!("no response {n}")),
+        list(responses)
+    )]
+    ResponseChoice { file: String, wanted: Option<usize>, responses: Vec<String> },
+    #[error(
+        "{file}: {name} = `{}` is no unit of frequency known here; expected Hz, kHz, rad/s or another of MATLAB's words (--frequency hertz or --frequency rad_per_s says what the numbers are)",
+        quoted(found)
+    )]
+    MatUnit { file: String, name: String, found: String },
+    #[error("{file}: {name} is {found}; expected a vector of {expected} numbers, as many as there are frequencies")]
+    MatLength { file: String, name: String, found: String, expected: usize },
+    #[error("{file}, line {line}: found `{}` in a Touchstone file; expected {expected}", quoted(found))]
+    Touchstone { file: String, line: u64, found: String, expected: &'static str },
     #[error("{file}: {source}")]
     Shape { file: String, source: FrfShapeError },
     #[error(

@@ -14,7 +14,7 @@ use super::outlier;
 use super::response::Frf;
 use super::settings::{DeviationScale, MagnitudeScale, Outliers, ReadSettings};
 use super::table::table;
-use super::uff;
+use super::{mat, mat_columns, touchstone, uff};
 use crate::document::size_limits::PHASE_DEG;
 use nalgebra::Complex;
 use std::f64::consts::{LN_10, PI, TAU};
@@ -35,7 +35,8 @@ pub struct Sweep {
     pub source_digest: String,
 }
 
-/// Reads a sweep from a file: `.bod`, CSV, TSV or text, gzip or not, or a universal file with dataset 58.
+/// Reads a sweep from a file: `.bod`, CSV, TSV or text, gzip or not, a universal file
+/// with dataset 58, a MATLAB file of version 5 to 7.2, or Touchstone with one or two ports.
 pub fn read_file(path: &Path, settings: &ReadSettings) -> Result<Sweep, FrfError> {
     let bytes = load(path, settings)?;
     read_bytes(&path.display().to_string(), &bytes, settings)
@@ -57,10 +58,16 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &ReadSettings) -> Result<S
     let mut notes = Vec::new();
     let (columns, declared) = if uff::is_universal(&inside) {
         (uff::columns(name, &inside, settings, &mut notes)?, Declared::default())
+    } else if mat::is_mat(name, &inside)? {
+        (mat_columns::columns(name, &inside, settings, &mut notes)?, Declared::default())
     } else {
         let text = text(name, &inside, &mut notes)?;
-        let table = table(name, &text)?;
-        (columns(name, &table, settings, &mut notes)?, declared(&table.preamble))
+        if touchstone::is_touchstone(name, &text) {
+            (touchstone::columns(name, &text, settings, &mut notes)?, Declared::default())
+        } else {
+            let table = table(name, &text)?;
+            (columns(name, &table, settings, &mut notes)?, declared(&table.preamble))
+        }
     };
     let (frf, coherence) = assemble(name, &columns, declared, settings, &mut notes)?;
     Ok(Sweep { frf, coherence, notes, rows_read: columns.line.len(), source_digest })

@@ -213,7 +213,7 @@ pub struct ReadSettings {
     pub deviation: DeviationScale,
     /// Which columns to read; `None` finds them from the header or the contract's order.
     pub columns: Option<ColumnChoice>,
-    /// Which dataset of a universal file to read, counted from 1; `None` demands that there is only one response.
+    /// Which response of a universal, MATLAB or Touchstone file to read, counted from 1; `None` demands that there is only one response.
     pub dataset: Option<usize>,
     /// Lowest and highest frequency that the sweep was meant to cover (Hz); an early stop is then an error.
     pub expected_hz: Option<(f64, f64)>,

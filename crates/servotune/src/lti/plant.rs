@@ -180,6 +180,17 @@ impl Plant {
         body + 2 * self.modes.len()
     }
 
+    /// All but the delay by poles and zeros: body, resonance gain and modes. Effects beyond linear are left out.
+    pub fn rational(&self) -> Rational {
+        let mut all = self.body.rational();
+        all.gain *= self.resonance_gain;
+        for m in &self.modes {
+            all.zeros.extend(quadratic_roots(m.zero_rad_s, m.zero_damping_ratio));
+            all.poles.extend(quadratic_roots(m.pole_rad_s, m.pole_damping_ratio));
+        }
+        all
+    }
+
     /// The same plant with as much of a rational body as possible in resonance pairs: each complex pair of zeros goes with the pair of
     /// poles in the left half-plane that lies nearest to it in ln of frequency. A body of two poles and no zeros takes its plain form.
     pub fn paired(&self) -> Plant {

@@ -1,0 +1,43 @@
+//! The answer of a loop to a step of its reference and to a step of load at the plant's input, as the firmware runs it.
+//!
+//! In: a sampled plant, a controller, its sections. Out: positions at the controller's samples. Units: the plant's; the reference steps by one
+//! position_unit, the load by one command_unit. From rest; `output_limit` and feed-forward are left out, so that a step's size does not matter.
+
+use servotune::controller::Controller;
+use servotune::lti::{DiscretePlant, PlantState, Section, step_chain};
+use servotune_report::steps::StepResponses;
+use std::f64::consts::TAU;
+
+/// Samples that are shown at least and at most.
+const FEWEST: usize = 100;
+const MOST: usize = 20_000;
+
+/// Both steps, long enough for the loop's crossover and for its integrator to settle.
+pub(super) fn step_responses(
+    plant: &DiscretePlant,
+    c: &Controller,
+    chain: &[Section],
+    crossover_hz: Option<f64>,
+) -> StepResponses {
+    // Eight time constants of the crossover; of the integral action, kp/ki, four where it has any.
+    let crossover = crossover_hz.map_or(0.0, |hz| 8.0 / (TAU * hz));
+    let integral = if c.pid.ki_per_s > 0.0 { (4.0 * c.pid.kp / c.pid.ki_per_s).abs() } else { 0.0 };
+    let samples = ((crossover + integral.min(4.0 * crossover)) / c.sample_time_s).ceil();
+    let samples = (samples as usize).clamp(FEWEST, MOST);
+    let run = |reference: f64, load: f64| {
+        let (mut state, mut memory) = (PlantState::at_rest(plant), vec![[0.0; 2]; chain.len()]);
+        let step = |_| {
+            let position = state.position();
+            let command = step_chain(chain, &mut memory, reference - position);
+            state.command(command + load);
+            state.advance(plant);
+            position
+        };
+        (0..samples).map(step).collect::<Vec<f64>>()
+    };
+    StepResponses {
+        time_s: (0..samples).map(|k| k as f64 * c.sample_time_s).collect(),
+        reference: run(1.0, 0.0),
+        load: run(0.0, 1.0),
+    }
+}
