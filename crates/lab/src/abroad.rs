@@ -5,6 +5,7 @@
 
 use super::abroad_records::{guide, motor_bench, oscillator, pulley};
 use super::foreign_case::{Foretold, foretold};
+use super::foreign_stage::{BARE, Stage};
 use super::{Study, StudyError};
 use serde::{Deserialize, Serialize};
 use servotune::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
@@ -54,6 +55,42 @@ fn foreign(f: &Foretold) -> Result<Row, StudyError> {
     Ok(row(f.id, f.what, &expected, "track", &d, seconds))
 }
 
+/// The slow stage: what acts, what is expected, and the size of the multisine that the given model was fitted to.
+fn stages() -> Vec<(&'static str, &'static str, &'static str, Stage, Option<f64>)> {
+    let friction = |level: f64, rise: f64| Stage { friction: [level, rise, 2.0, 6e-3, 1e-3], ..BARE };
+    vec![
+        ("stage_sound", "stage in mm and A at 2 kHz, nothing", "no finding", BARE, None),
+        (
+            "stage_friction",
+            "the same, dry friction of 0.3 A, a fifth more at rest, model fitted under it at the large multisine",
+            "coulomb_friction",
+            friction(0.3, 0.2),
+            Some(0.8),
+        ),
+        (
+            "stage_dead_band",
+            "the same, dead band of 0.1 A, model fitted under it at the small multisine",
+            "dead_band",
+            Stage { dead_band: 0.1, ..BARE },
+            Some(0.25),
+        ),
+        (
+            "stage_friction_small",
+            "the same, dry friction of 0.12 A, model fitted under it at the small multisine",
+            "coulomb_friction",
+            friction(0.12, 0.0),
+            Some(0.25),
+        ),
+    ]
+}
+
+fn staged(id: &str, what: &str, expected: &str, stage: &Stage, size: Option<f64>) -> Result<Row, StudyError> {
+    let (case, plant, controller) = stage.made(id, size)?;
+    let began = Instant::now();
+    let d = diagnose(&case, &plant, Some(&controller), &DiagnoseSettings::default(), |_| {})?.diagnosis;
+    Ok(row(id, what, expected, "mm", &d, began.elapsed().as_secs_f64()))
+}
+
 /// Three digits, and never seventy.
 fn figure(v: f64) -> String {
     if v >= 1e6 || (v > 0.0 && v < 1e-4) {
@@ -65,9 +102,9 @@ fn figure(v: f64) -> String {
 
 fn page(rows: &[Row], before: &[Row]) -> String {
     let mut text = String::from(
-        "# Away from home\n\nMade by `lab abroad --data ../shared/data --out results`: machines of another make (`src/study/foreign.rs`: other forms of the laws, another integrator) and real recordings, each \
+        "# Away from home\n\nMade by `lab abroad --data ../shared/data --out results`: machines of another make (`crates/lab/src/foreign.rs`, `foreign_stage.rs`: other forms of the laws, other integrators) and real recordings, each \
          with a linear model. Figures are the reported simulation of held-out rows: given model, linear refit, with findings; floor is what repeats differ by. *Before* is the same command on the program as \
-         it was (`src/study/abroad_before.json`).\n\n| case | expected | before | after | before: given / refit / findings | after: given / refit / findings | floor | s before | s after |\n|---|---|---|---|---|---|---|---|---|\n",
+         it was (`crates/lab/src/abroad_before.json`); `--cases` makes single lines again.\n\n| case | expected | before | after | before: given / refit / findings | after: given / refit / findings | floor | s before | s after |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     for r in rows {
         let b = before.iter().find(|b| b.id == r.id);
@@ -93,12 +130,33 @@ fn page(rows: &[Row], before: &[Row]) -> String {
     text
 }
 
-/// Makes the page.
-pub fn abroad(data: &Path, say: &mut dyn FnMut(&str)) -> Result<Study, StudyError> {
+/// Makes the page, of the cases that are asked for or of all; those that are not keep their lines of `known`, the page's last figures.
+pub fn abroad(
+    data: &Path,
+    asked: &[String],
+    known: Option<&str>,
+    say: &mut dyn FnMut(&str),
+) -> Result<Study, StudyError> {
+    let known: Vec<Row> = known.map(serde_json::from_str).transpose()?.unwrap_or_default();
     let mut rows = Vec::new();
+    let mut keep = |rows: &mut Vec<Row>, id: &str| {
+        let made_now = asked.is_empty() || asked.iter().any(|a| a == id);
+        if made_now {
+            say(id);
+        } else {
+            rows.extend(known.iter().find(|r| r.id == id).cloned());
+        }
+        !made_now
+    };
     for f in &foretold() {
-        say(f.id);
-        rows.push(foreign(f)?);
+        if !keep(&mut rows, f.id) {
+            rows.push(foreign(f)?);
+        }
+    }
+    for (id, what, expected, stage, size) in stages() {
+        if !keep(&mut rows, id) {
+            rows.push(staged(id, what, expected, &stage, size)?);
+        }
     }
     type Make = fn(&Path) -> Result<(Case, Plant), StudyError>;
     let real: [(&str, &str, Make); 4] = [
@@ -108,7 +166,9 @@ pub fn abroad(data: &Path, say: &mut dyn FnMut(&str)) -> Result<Study, StudyErro
         ("silverbox", "electronic Duffing oscillator, real", oscillator),
     ];
     for (id, what, make) in real {
-        say(id);
+        if keep(&mut rows, id) {
+            continue;
+        }
         let (case, plant) = make(data)?;
         let began = Instant::now();
         let d = diagnose(&case, &plant, None, &DiagnoseSettings::default(), |_| {})?.diagnosis;

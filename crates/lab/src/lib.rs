@@ -18,6 +18,7 @@ mod fleet_reliability;
 mod fleet_study;
 mod foreign;
 mod foreign_case;
+mod foreign_stage;
 mod free_form;
 mod gate;
 mod gate_seeds;

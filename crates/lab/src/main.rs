@@ -31,6 +31,9 @@ struct StudyArguments {
     /// Changed files (study `reliability-readers`)
     #[arg(long, value_name = "N", default_value_t = 12_000)]
     runs: usize,
+    /// Cases to make again, all unless told; the others keep their lines (study `abroad`)
+    #[arg(long, value_name = "ID,ID,...", value_delimiter = ',')]
+    cases: Vec<String>,
     /// Folder with the measured records (studies `mirror`, `motor`, `hdd`)
     #[arg(long, value_name = "DIR", default_value = "../shared/data")]
     data: PathBuf,
@@ -128,7 +131,10 @@ fn run(a: &StudyArguments, say: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>, St
             files.push(both_halves(&a.out)?);
             Files(files)
         }
-        StudyName::Abroad => Pages(study::abroad(&a.data, say)?),
+        StudyName::Abroad => {
+            let known = std::fs::read_to_string(a.out.join("mismatch/abroad.json")).ok();
+            Pages(study::abroad(&a.data, &a.cases, known.as_deref(), say)?)
+        }
         StudyName::Classes => Pages(study::classes()?),
         StudyName::FreeForm => Pages(study::free_form(&a.data)?),
         StudyName::Gate => Pages(study::gate()?),

@@ -1,10 +1,12 @@
 //! A step of the search in which no law comes near the noise along the recorded motion, and pushes that come with the clock of the record.
 
 use super::bench::Bench;
+use super::leftover::in_simulation;
+use super::refit::Chosen;
 use super::scan::{Candidate, Ground};
 use super::select::{Model, Step};
 use super::simulated::simulated;
-use crate::physics::Effect;
+use crate::physics::{Effect, Port};
 
 /// Standard deviations of excess from which no law of a step is near, and below which a simulated model leaves nothing.
 pub(super) const DEEP: f64 = 30.0;
@@ -39,6 +41,33 @@ pub(super) fn by_simulation_first(bench: &Bench, step: &mut Step) {
     }
 }
 
+/// Laws that are tried beside a model that stands by simulation: each takes as long as the last fit of all.
+pub(super) const FELT: usize = 2;
+
+/// The scan of what a model leaves in simulation.
+pub(super) fn felt_scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
+    let mut candidates = in_simulation(bench, library, model);
+    candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    Step { before: model.evidence, candidates, tried: Vec::new(), taken: None }
+}
+
+/// A model with one law more, all of it fitted by simulation; none where nothing is won.
+pub(super) fn felt_trial(bench: &Bench, model: &Model, chosen: Vec<Chosen>) -> Option<Model> {
+    let numbers = |c: &[Chosen]| -> usize {
+        let strengths = |c: &Chosen| if c.effect.facts().fixed { 0 } else { c.setting.strengths.len() };
+        c.iter().map(|c| strengths(c) + c.continuous.iter().filter(|c| **c).count()).sum()
+    };
+    let mut start = model.clone();
+    // Errors of numbers that are new come from the fit.
+    let count = start.refitted.p.len() + numbers(&chosen);
+    start.refitted.directions = vec![vec![0.0; count]];
+    start.freedom -= (numbers(&chosen) - numbers(&model.chosen)) as f64;
+    start.chosen = chosen;
+    let s = simulated(bench, &start).filter(|s| s.cost < model.cost && s.possible())?;
+    let evidence = model.evidence + s.cost - model.cost;
+    Some(Model { evidence, ..s })
+}
+
 /// Whether a push has one strength in the records of several moves: it comes with the clock of the record, and not with a move.
 pub(super) fn together(c: &Candidate) -> bool {
     let s = &c.setting.strengths;
@@ -57,3 +86,22 @@ pub(super) fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Mo
     candidates.iter_mut().for_each(|c| c.gain += ahead.min(0.0));
     candidates
 }
+
+/// The scan around where the model stands, and around the given plant where the refit may have bent what is looked for.
+pub(super) fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
+    let mut candidates = scan_at(bench, library, model, &model.refitted.p);
+    // A law without a strength of its own (a lag, a limit), or a vibration that a known mode has moved to stand in for, is not straight
+    // in the linear parameters: it is looked for around the given plant too.
+    if model.chosen.is_empty() && model.excess_sigma() > CROOKED {
+        // Where the refit is far from the noise, any law may have bent it.
+        let far = model.excess_sigma() > DEEP;
+        let crooked = |e: &&'static dyn Effect| far || e.facts().fixed || e.facts().port == Port::Structure;
+        let apart: Vec<&'static dyn Effect> = library.iter().copied().filter(crooked).collect();
+        candidates.extend(scan_at(bench, &apart, model, &vec![0.0; model.refitted.p.len()]));
+    }
+    candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    Step { before: model.evidence, candidates, tried: Vec::new(), taken: None }
+}
+
+/// Standard deviations of excess above which a linear refit is taken to hide something.
+const CROOKED: f64 = 3.0;

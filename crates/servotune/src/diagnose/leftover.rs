@@ -2,8 +2,9 @@
 //! could take.
 
 use super::bench::Bench;
+use super::deep::scan;
 use super::scan::{Candidate, Ground};
-use super::select::{Model, Step, hums, scan};
+use super::select::{Model, Step, hums};
 use super::simulated::simulation_error;
 use crate::physics::Effect;
 use serde::Serialize;
@@ -62,7 +63,7 @@ pub(super) fn leftover(
 }
 
 /// The scan of the simulation's error.
-fn in_simulation(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Vec<Candidate> {
+pub(super) fn in_simulation(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Vec<Candidate> {
     let fit = bench.fit(model.chosen.clone());
     let (_, basis) = fit.screen_basis(&model.refitted.p);
     let mut error = simulation_error(bench, model);

@@ -8,6 +8,7 @@ mod answers;
 mod bench;
 mod bootstrap;
 mod bump;
+mod cleared;
 mod clock;
 mod columns;
 mod confirm;

@@ -9,10 +9,9 @@ use super::corrected::{Corrected, corrected};
 use super::judge::{Judged, errors, floor, rms, size};
 use super::run::Run;
 use super::select::{Model, Selection};
-use super::simulation_problem::Problem;
+use super::simulation_problem::descended;
 use crate::controller::Law;
 use crate::lti::Plant;
-use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
 use crate::recording::Role;
 
 /// Share by which two simulations may differ without one being worse, and the same over the root of the samples.
@@ -22,9 +21,6 @@ const SAMPLING: f64 = 2.0;
 const FAR: f64 = 3.0;
 /// Share of the refit's error that a fit by simulation must take to stand in its place.
 const BETTER: f64 = 0.95;
-/// Jacobians of a fit by the reported error, and the relative fall at which it ends.
-const ITERATIONS: usize = 15;
-const TOLERANCE: f64 = 1e-5;
 /// Stretches that records are cut into where there are fewer of them.
 const STRETCHES: usize = 4;
 /// Shortest stretch (samples).
@@ -105,27 +101,9 @@ impl<'a> Reporting<'a> {
         self.runs.iter().filter(|r| r.role == role && !r.bumped).collect()
     }
 
-    /// The model fitted by the plain error from where it stands, on these runs: its numbers and the root of its mean square.
+    /// The model fitted by the reported error, where the logs are sound.
     fn descended(&self, model: &Model, runs: &[(&Run, usize)]) -> Option<Model> {
-        if !self.sound {
-            return None;
-        }
-        let mut problem = Problem::plain_error(self.bench, model, self.closed, runs);
-        let mut x = problem.start();
-        let before = size(&problem.settle(&x));
-        if !before.is_finite() {
-            return None;
-        }
-        let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
-        minimise(&mut problem, &mut x, &settings, &mut Workspace::default());
-        let after = size(&problem.settle(&x));
-        let (p, chosen) = problem.unpack(&x);
-        let possible = after < before && chosen.iter().all(|c| c.effect.possible(&c.setting, &[]));
-        let mut moved = model.clone();
-        if possible {
-            (moved.refitted.plant, moved.refitted.p, moved.chosen) = (self.bench.form.plant(&p), p, chosen);
-        }
-        Some(moved)
+        if self.sound { descended(self.bench, model, self.closed, runs) } else { None }
     }
 
     /// Root mean square over the fit records, each simulated by a model that was fitted without it, beside that of the given plant.

@@ -121,6 +121,12 @@ fn classes(grid: &[Vec<f64>]) -> Vec<Vec<usize>> {
     all
 }
 
+/// Which inner numbers of a point of a grid may be refined, and their ranges.
+pub(super) fn freedom(grid: &[Vec<f64>], inner: &[f64]) -> (Vec<bool>, Vec<[f64; 2]>) {
+    let own = classes(grid).into_iter().find(|class| class.iter().any(|&i| grid[i] == inner));
+    own.map_or_else(Default::default, |class| (continuous(grid, &class), range(grid, &class)))
+}
+
 /// A scan's ground: the error that is left, and what fits have used up.
 pub struct Ground<'a, 'f> {
     fit: &'a Fit<'f>,

@@ -2,7 +2,7 @@
 
 use super::bench::Bench;
 use super::bootstrap::{Bootstrap, bootstrap};
-use super::deep::{DEEP, SPENT, by_simulation_first, deep, scan_at, together};
+use super::deep::{DEEP, FELT, SPENT, by_simulation_first, deep, felt_scan, felt_trial, scan, together};
 use super::fitted::{fitted, fitted_from_both, refit, settled, taken_by_last};
 use super::leftover::{Leftover, leftover};
 use super::locked::follows_motion;
@@ -12,7 +12,7 @@ use super::rival::{Rival, by_simulation, numbers as free_numbers};
 use super::scan::{Candidate, log_tail};
 use super::settle::{exchange, prune, spare};
 use super::simulated::simulated;
-use crate::physics::{Effect, Port, Setting};
+use crate::physics::{Effect, Setting};
 
 /// How the search decides.
 #[derive(Clone, Debug, PartialEq)]
@@ -195,10 +195,12 @@ pub fn select(
     });
     let mut model = baseline.clone();
     let (mut steps, mut retraced) = (Vec::new(), 0);
+    // Whether the model stands by simulation: along a noisy motion its laws fall far short of themselves.
+    let mut felt = false;
     let limit = settings.false_alarm.ln();
     while model.chosen.len() < settings.most {
         progress(&format!("scan of {} effects for finding {}", library.len(), model.chosen.len() + 1));
-        let mut step = scan(bench, library, &model);
+        let mut step = if felt { felt_scan(bench, library, &model) } else { scan(bench, library, &model) };
         let concealed = if model.excess_sigma() < SETTLED { NEARLY_ALL } else { CONCEALED };
         let price = (bench.stack.total as f64).ln();
         // Two forms of the leading effect, one of each other: the one that is worth its numbers most. Each number of a law is paid for (Schwarz
@@ -235,11 +237,18 @@ pub fn select(
                 worth.push(i);
             }
         }
+        if felt {
+            worth.truncate(FELT);
+        }
         for &i in &worth {
             progress(&format!("refit with {}", step.candidates[i].effect.facts().name));
             let c = &step.candidates[i];
             let mut chosen = model.chosen.clone();
             chosen.push(c.chosen(steps.len()));
+            if felt {
+                step.tried.extend(felt_trial(bench, &model, chosen).map(|m| (i, m)));
+                continue;
+            }
             let mut tried = fitted_from_both(bench, &chosen, &model.refitted.p, settings.iterations);
             if !bench.levels.from_repeats {
                 tried = settled(bench, tried, settings.iterations);
@@ -280,7 +289,7 @@ pub fn select(
             step.taken = None;
         }
         // A gain that the linear parameters alone would have made is none of the law's: the model without it had not come to its end.
-        if let Some(next) = accepted.as_ref().filter(|_| retraced < AGAIN) {
+        if let Some(next) = accepted.as_ref().filter(|_| retraced < AGAIN && !felt) {
             let mut without = fitted(bench, model.chosen.clone(), &next.refitted.p, settings.iterations);
             if !bench.levels.from_repeats {
                 without = settled(bench, without, settings.iterations);
@@ -302,20 +311,27 @@ pub fn select(
                     bench.renew(&next.refitted.p, &next.chosen);
                 }
                 model = fitted(bench, next.chosen.clone(), &next.refitted.p, settings.iterations);
-                // Simulated it explains all; what its column along a noisy motion falls short by is nobody's.
-                if to_the_end.is_some() && next.excess_sigma() < SPENT && model.cost > next.cost {
-                    break;
+                // What its column along a noisy motion falls short by is nobody's: from here on simulation tells.
+                if (felt || to_the_end.is_some()) && model.cost > next.cost {
+                    (model, felt) = (next, true);
+                    if model.excess_sigma() < SPENT {
+                        break;
+                    }
                 }
             }
             None => break,
         }
     }
-    prune(bench, &mut model, baseline.cost, settings.iterations);
+    if !felt {
+        prune(bench, &mut model, baseline.cost, settings.iterations);
+    }
     progress("rivals of the findings");
     let mut rivals = exchange(bench, &mut model, &steps, settings.iterations);
     // A law that has found its place may do what another was there for.
     let before = model.chosen.len();
-    prune(bench, &mut model, baseline.cost, settings.iterations);
+    if !felt {
+        prune(bench, &mut model, baseline.cost, settings.iterations);
+    }
     if model.chosen.len() < before {
         rivals = exchange(bench, &mut model, &steps, settings.iterations);
     }
@@ -375,21 +391,3 @@ pub(super) fn strongest(bench: &Bench, library: &[&'static dyn Effect], model: &
     let possible = step.candidates.iter().filter(|c| c.effect.possible(&c.setting, &[]) && c.concealed < CONCEALED);
     possible.map(|c| c.log_p_value(library.len())).fold(0.0, f64::min)
 }
-
-pub(super) fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
-    let mut candidates = scan_at(bench, library, model, &model.refitted.p);
-    // A law without a strength of its own (a lag, a limit), or a vibration that a known mode has moved to stand in for, is not straight
-    // in the linear parameters: it is looked for around the given plant too.
-    if model.chosen.is_empty() && model.excess_sigma() > CROOKED {
-        // Where the refit is far from the noise, any law may have bent it.
-        let far = model.excess_sigma() > DEEP;
-        let crooked = |e: &&'static dyn Effect| far || e.facts().fixed || e.facts().port == Port::Structure;
-        let apart: Vec<&'static dyn Effect> = library.iter().copied().filter(crooked).collect();
-        candidates.extend(scan_at(bench, &apart, model, &vec![0.0; model.refitted.p.len()]));
-    }
-    candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    Step { before: model.evidence, candidates, tried: Vec::new(), taken: None }
-}
-
-/// Standard deviations of excess above which a linear refit is taken to hide something.
-const CROOKED: f64 = 3.0;

@@ -5,6 +5,7 @@
 
 use super::bench::Bench;
 use super::corrected::corrected;
+use super::judge::size;
 use super::judge::{Begun, Judged, Started};
 use super::linear::Knob;
 use super::lines::Line;
@@ -13,7 +14,7 @@ use super::run::Run;
 use super::select::Model;
 use super::stack::{Basis, Segment};
 use crate::controller::Law;
-use crate::numeric::levenberg::{Limit, Residuals};
+use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
 use crate::physics::Effect;
 use rayon::prelude::*;
 
@@ -332,4 +333,28 @@ pub(super) fn places(free: &Free, model: &Model) -> Vec<usize> {
         knobs + all + before + moving(e, i)
     };
     free.knobs.iter().copied().chain(free.strengths.iter().map(strength)).chain(free.inner.iter().map(inner)).collect()
+}
+
+/// Jacobians of a fit by the plain error, and the relative fall at which it ends.
+const ITERATIONS: usize = 15;
+const TOLERANCE: f64 = 1e-5;
+
+/// The model fitted by the plain error from where it stands, on these runs, each with the number of records that it stands for.
+pub(super) fn descended(bench: &Bench, model: &Model, law: Option<&Law>, runs: &[(&Run, usize)]) -> Option<Model> {
+    let mut problem = Problem::plain_error(bench, model, law, runs);
+    let mut x = problem.start();
+    let before = size(&problem.settle(&x));
+    if !before.is_finite() {
+        return None;
+    }
+    let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
+    minimise(&mut problem, &mut x, &settings, &mut Workspace::default());
+    let after = size(&problem.settle(&x));
+    let (p, chosen) = problem.unpack(&x);
+    let possible = after < before && chosen.iter().all(|c| c.effect.possible(&c.setting, &[]));
+    let mut moved = model.clone();
+    if possible {
+        (moved.refitted.plant, moved.refitted.p, moved.chosen) = (bench.form.plant(&p), p, chosen);
+    }
+    Some(moved)
 }

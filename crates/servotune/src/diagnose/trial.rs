@@ -75,7 +75,6 @@ impl Trial<'_> {
     fn made(&self, mut bench: Bench, progress: &mut dyn FnMut(&str)) -> Result<(Diagnosed, Errors), DiagnoseError> {
         let mut remarks = self.remarks.to_vec();
         let unrest = unrest(&bench);
-        remarks.extend(unrest.as_ref().map(|u| u.says(&self.given.command_unit)));
         // Records whose samples slipped hold nothing that a model could be fitted to.
         // A log that slipped or is in other units is no ground for the long way.
         let sound = self.hygiene.finding.is_none();
@@ -83,6 +82,9 @@ impl Trial<'_> {
         let selection = select(&mut bench, library(), &search_settings, &mut *progress);
         progress("simulating all records");
         let last = selection.last();
+        // Where commands bend, repeats differ by more than a linear arm answers: no sign of a push.
+        let unrest = unrest.filter(|_| !last.chosen.iter().any(|c| c.effect.bends()));
+        remarks.extend(unrest.as_ref().map(|u| u.says(&self.given.command_unit)));
         // What the search found, whether or not it is offered.
         let fixed = corrected(&bench.form, &last.refitted.p, &last.chosen, &bench.scene);
         let refitted = corrected(&bench.form, &selection.baseline.refitted.p, &[], &bench.scene);

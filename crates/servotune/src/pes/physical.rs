@@ -8,8 +8,8 @@
 use super::Profile;
 use super::simulation::{ClosedLoop, PesError, Scene};
 use crate::controller::Controller;
-use crate::lti::{DiscretePlant, Intersample, step_chain};
-use crate::physics::{Context, Machine, Restored};
+use crate::lti::{DiscretePlant, step_chain};
+use crate::physics::{Context, Machine, Reading, Restored};
 use std::f64::consts::TAU;
 
 /// What a profile and a controller say of the motion.
@@ -38,10 +38,7 @@ pub fn simulate_physical(
     let mut machine = Machine::new(&physics.scene.plant, &physics.effects(), &physics.scene)?;
     let sampled = DiscretePlant::of(&physics.scene.plant, t)?;
     let scene = Scene::new(profile, &sampled)?;
-    let torque_readings: Vec<Intersample> = {
-        let direct = machine.plants()[1];
-        scene.servo.iter().map(|s| direct.intersample(s.offset_s)).collect()
-    };
+    let readings: Vec<Reading> = scene.servo.iter().map(|s| machine.reading(s.offset_s)).collect();
     let ticks = scene.reference.len();
     let mut run = ClosedLoop {
         pes: vec![0.0; scene.servo.len()],
@@ -69,7 +66,7 @@ pub fn simulate_physical(
         run.position[k] = y;
         machine.command(u + scene.windage[k]);
         while let Some(s) = scene.servo.get(j).filter(|s| s.controller_sample == k) {
-            run.pes[j] = s.target - machine.between([&s.reading, &torque_readings[j]]);
+            run.pes[j] = s.target - machine.between(&readings[j]);
             j += 1;
         }
     }

@@ -103,6 +103,13 @@ impl Effect for CoulombFriction {
         true
     }
 
+    fn stiffness(&self, setting: &Setting) -> f64 {
+        // A creeping drag holds by its speed, and is no spring.
+        let held = setting.inner.first().copied().filter(|l| *l > 0.0);
+        let rise = 1.0 + setting.inner.get(2).copied().unwrap_or(0.0);
+        held.map_or(0.0, |l| rise * setting.strengths.first().copied().unwrap_or(0.0).abs() / l)
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         let mut all = vec![
             Parameter::new("level_command", setting.strengths[0], Unit::Command),

@@ -320,6 +320,12 @@ pub trait Effect: Sync {
         false
     }
 
+    /// Steepest torque over position of a law that the motion meets (command_unit per position_unit); 0 where it is no stiffer than a machine.
+    /// It decides how finely a simulation steps.
+    fn stiffness(&self, _setting: &Setting) -> f64 {
+        0.0
+    }
+
     /// Share by which a number may be off because no machine follows a law to the letter; long records make intervals narrower than that.
     fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
         FORM

@@ -1,7 +1,8 @@
 //! A machine in motion: the exactly sampled plant with effects at their places, one controller sample at a time.
 //!
 //! A torque depends on the motion that it causes: each step solves w = law(x + g w) for the mean torque w over the sample, by
-//! fixed-point steps and, where a stiff contact makes those crawl, by a bracketed secant. Second order in the sample time.
+//! fixed-point steps and, where a stiff contact makes those crawl, by a bracketed secant. Second order in the step; where a law is so stiff that
+//! arm and law swing within few samples (a dry drag that holds), a sample is made in several steps.
 
 use super::effect::{COLUMNS, Effect, Entry, Law, Port, Setting};
 use super::sample::{Sample, Scene};
@@ -27,15 +28,22 @@ impl Part {
 /// Order of calls for sample k: [`Machine::measure`], then [`Machine::command`].
 pub struct Machine {
     delayed: DiscretePlant,
+    /// The same without delay, sampled at the steps of the torque.
     direct: DiscretePlant,
     pushed: PlantState,
     torqued: PlantState,
-    /// Both as they were when the last command was taken, for instants before the next sample.
-    held: [PlantState; 2],
+    /// As they were when the last command was taken, for instants before the next sample; the torque's at every step.
+    held: PlantState,
+    held_torqued: Vec<PlantState>,
+    /// Readings of the command's answer at the steps between two samples.
+    steps_between: Vec<Intersample>,
     /// What the position effects add at the head at this sample.
     offset: f64,
-    /// Position that a unit torque adds within one sample.
+    /// Position that a unit torque adds within one step.
     reach: f64,
+    /// The last two positions at steps of the torque, and the speed as the last step ended.
+    path: [f64; 2],
+    speed: f64,
     command: Vec<Part>,
     torque: Vec<Part>,
     position: Vec<Part>,
@@ -57,16 +65,54 @@ pub struct Machine {
     arm: f64,
 }
 
-/// Fixed-point steps before the secant.
-const STEPS: usize = 3;
-/// Bisections at most; each halves the bracket.
-const BISECTIONS: usize = 60;
+/// Most fixed-point rounds, and the share to which each must shrink the step for another to follow.
+const ROUNDS: usize = 12;
+const SHRINKS: f64 = 0.3;
+/// Steps of the secant at most; every third halves the bracket.
+const SECANTS: usize = 90;
+/// Farthest that arm and stiffest law swing within one step (rad), and most steps of a sample: errors go with the square of it.
+const SWING: f64 = 0.2;
+const MOST_STEPS: usize = 16;
+
+/// Where a position between two samples is read: see [`Machine::reading`].
+#[derive(Clone, Debug)]
+pub struct Reading {
+    command: Intersample,
+    torque: Intersample,
+    /// The step of the torque that it falls into.
+    step: usize,
+}
+
+/// Steps of a sample that a plant needs with these effects; a power of two, so that few changes of their numbers change it.
+fn steps(plant: &Plant, effects: &[(&dyn Effect, &Setting)], t: f64) -> Result<usize, LtiError> {
+    let stiffest = effects.iter().map(|(e, s)| e.stiffness(s)).fold(0.0f64, f64::max);
+    if stiffest <= 0.0 {
+        return Ok(1);
+    }
+    let direct = DiscretePlant::of(&Plant { delay_s: 0.0, ..plant.clone() }, t)?;
+    // A unit torque moves a free arm by b T²/2 within a sample.
+    let swing = (2.0 * stiffest * reach(&direct).abs()).sqrt();
+    let mut steps = 1;
+    while steps < MOST_STEPS && swing > SWING * steps as f64 {
+        steps *= 2;
+    }
+    Ok(steps)
+}
+
+/// Position that a unit torque adds within one sample of a plant.
+fn reach(direct: &DiscretePlant) -> f64 {
+    let mut unit = PlantState::at_rest(direct);
+    unit.command(1.0);
+    unit.advance(direct);
+    unit.position()
+}
 
 impl Machine {
     /// The same machine, at rest at `origin` under a standing command, springs and cables in balance, instead of at 0.
     pub fn started_at(mut self, origin: f64, command: f64) -> Machine {
         self.origin = origin;
         self.x = [origin; 3];
+        self.path = [origin; 2];
         let still = Sample { x: origin, u: command, i: command, ..Sample::default() };
         (self.last, self.now) = (still, still);
         let value = |parts: &[Part], at: &Sample| parts.iter().map(|p| p.value(at, at)).sum::<f64>();
@@ -97,6 +143,9 @@ impl Machine {
         if let [first, second, ..] = free[..] {
             // The positions before the first sample, for the speed there.
             self.x = [0.0, 1.0, 2.0].map(|k| self.x[0] + first + k * (first - second));
+            let step = (first - second) / self.held_torqued.len() as f64;
+            self.path = [self.x[0], self.x[0] + step];
+            self.speed = -step / self.direct.sample_time_s();
         }
         self.free = free;
         self
@@ -110,12 +159,10 @@ impl Machine {
     /// A machine with these effects; `scene` says what the laws need to know of it.
     pub fn new(plant: &Plant, effects: &[(&dyn Effect, &Setting)], scene: &Scene) -> Result<Machine, LtiError> {
         let t = scene.sample_time_s;
+        let steps = steps(plant, effects, t)?;
         let delayed = DiscretePlant::of(plant, t)?;
-        let direct = DiscretePlant::of(&Plant { delay_s: 0.0, ..plant.clone() }, t)?;
+        let direct = DiscretePlant::of(&Plant { delay_s: 0.0, ..plant.clone() }, t / steps as f64)?;
         let (pushed, torqued) = (PlantState::at_rest(&delayed), PlantState::at_rest(&direct));
-        let mut unit = torqued.clone();
-        unit.command(1.0);
-        unit.advance(&direct);
         let (mut command, mut torque, mut position) = (Vec::new(), Vec::new(), Vec::new());
         for (effect, setting) in effects {
             let part = Part {
@@ -131,8 +178,12 @@ impl Machine {
         }
         let history = vec![0.0; delayed.whole_delay_samples() + 2];
         Ok(Machine {
-            reach: unit.position(),
-            held: [pushed.clone(), torqued.clone()],
+            reach: reach(&direct),
+            path: [0.0; 2],
+            speed: 0.0,
+            held: pushed.clone(),
+            held_torqued: vec![torqued.clone(); steps],
+            steps_between: (1..steps).map(|j| delayed.intersample(t * j as f64 / steps as f64)).collect(),
             offset: 0.0,
             delayed,
             direct,
@@ -181,16 +232,19 @@ impl Machine {
         self.offset
     }
 
-    /// The plant as the command meets it, and without its delay, as a torque does: what [`Machine::between`] is read with.
-    pub fn plants(&self) -> [&DiscretePlant; 2] {
-        [&self.delayed, &self.direct]
+    /// How [`Machine::between`] reads the position `offset_s` after a sample, 0 <= offset < T.
+    pub fn reading(&self, offset_s: f64) -> Reading {
+        let step_s = self.direct.sample_time_s();
+        let step = ((offset_s / step_s) as usize).min(self.held_torqued.len() - 1);
+        let torque = self.direct.intersample(offset_s - step as f64 * step_s);
+        Reading { command: self.delayed.intersample(offset_s), torque, step }
     }
 
-    /// Position of the arm between the last sample and the next, after [`Machine::command`]; readings of [`Machine::plants`].
+    /// Position of the arm between the last sample and the next, after [`Machine::command`].
     ///
-    /// Exact for the command. The torque is taken at its mean over the interval: second order in the sample time.
-    pub fn between(&self, at: [&Intersample; 2]) -> f64 {
-        self.origin + self.held[0].between(at[0]) + self.held[1].between(at[1])
+    /// Exact for the command. The torque is taken at its mean over each step: second order in it.
+    pub fn between(&self, at: &Reading) -> f64 {
+        self.origin + self.held.between(&at.command) + self.held_torqued[at.step].between(&at.torque)
     }
 
     /// Takes the command of this sample (controller plus excitation) and moves on to the next.
@@ -207,64 +261,94 @@ impl Machine {
         let share = self.delayed.fractional_delay_s() / self.delayed.sample_time_s();
         self.now.i = share * self.history[0] + (1.0 - share) * self.history[1];
         self.pushed.command(acting - self.standing[0]);
-        self.held[0].clone_from(&self.pushed);
+        self.held.clone_from(&self.pushed);
         self.pushed.advance(&self.delayed);
-        if !self.torque.is_empty() {
-            self.w = self.solve();
-        }
-        self.torqued.command(self.w - self.standing[1]);
-        self.held[1].clone_from(&self.torqued);
-        self.torqued.advance(&self.direct);
-        if !self.torque.is_empty() {
-            let to = self.ahead(self.origin + self.pushed.position() + self.torqued.position() + self.free(self.k + 1));
-            let (from, to) = (self.now.scaled(self.arm), to.scaled(self.arm));
-            for part in &mut self.torque {
-                part.law.commit(&from, &to);
-            }
+        if self.torque.is_empty() {
+            self.torqued.command(self.w - self.standing[1]);
+            self.held_torqued[0].clone_from(&self.torqued);
+            self.torqued.advance(&self.direct);
+        } else {
+            self.turn();
         }
         self.last = self.now;
         self.k += 1;
     }
 
-    /// The next sample, if the arm goes to `x`.
-    fn ahead(&self, x: f64) -> Sample {
-        let t = self.delayed.sample_time_s();
-        let (after, session) = (self.now.t + t, self.now.session + t);
-        Sample { t: after, session, x, v: (3.0 * x - 4.0 * self.x[0] + self.x[1]) / (2.0 * t), ..self.now }
+    /// Moves on to the next sample under the torques, step by step.
+    fn turn(&mut self) {
+        let steps = self.held_torqued.len();
+        let mut from = self.now;
+        if steps > 1 {
+            from.v = self.speed;
+        }
+        self.path = [self.x[0], if steps > 1 { self.path[1] } else { self.x[1] }];
+        for j in 0..steps {
+            let share = (j + 1) as f64 / steps as f64;
+            let answer = self.steps_between.get(j).map_or(self.pushed.position(), |at| self.held.between(at));
+            let (before, after) = (self.free(self.k), self.free(self.k + 1));
+            let carried = self.origin + answer + before + share * (after - before);
+            self.w = self.solve(&from, carried);
+            self.torqued.command(self.w - self.standing[1]);
+            self.held_torqued[j].clone_from(&self.torqued);
+            self.torqued.advance(&self.direct);
+            let to = self.ahead(&from, carried + self.torqued.position());
+            let (one, other) = (from.scaled(self.arm), to.scaled(self.arm));
+            for part in &mut self.torque {
+                part.law.commit(&one, &other);
+            }
+            self.path = [to.x, self.path[0]];
+            self.speed = to.v;
+            from = to;
+        }
     }
 
-    fn solve(&self) -> f64 {
-        let torqued = self.torqued.after(&self.direct, -self.standing[1]);
-        let free = self.origin + self.pushed.position() + torqued + self.free(self.k + 1);
-        let from = self.now.scaled(self.arm);
+    /// The end of the step, if the arm goes to `x`.
+    fn ahead(&self, from: &Sample, x: f64) -> Sample {
+        let t = self.direct.sample_time_s();
+        let (after, session) = (from.t + t, from.session + t);
+        Sample { t: after, session, x, v: (3.0 * x - 4.0 * self.path[0] + self.path[1]) / (2.0 * t), ..*from }
+    }
+
+    /// The mean torque over a step that leads to `carried` without it.
+    fn solve(&self, from: &Sample, carried: f64) -> f64 {
+        let free = carried + self.torqued.after(&self.direct, -self.standing[1]);
+        let one = from.scaled(self.arm);
         let law = |w: f64| {
-            let to = self.ahead(free + self.reach * w).scaled(self.arm);
-            self.torque.iter().map(|p| p.value(&from, &to)).sum::<f64>()
+            let to = self.ahead(from, free + self.reach * w).scaled(self.arm);
+            self.torque.iter().map(|p| p.value(&one, &to)).sum::<f64>()
         };
-        let mut w = self.w;
-        for _ in 0..STEPS {
+        let (mut w, mut moved) = (self.w, f64::INFINITY);
+        for _ in 0..ROUNDS {
             let next = law(w);
-            if (next - w).abs() <= 1e-9 * (next.abs() + w.abs()) {
-                return next;
-            }
+            let by = (next - w).abs();
             w = next;
+            if by <= 1e-9 * (next.abs() + (next - by).abs()) {
+                return w;
+            }
+            if by > SHRINKS * moved {
+                break;
+            }
+            moved = by;
         }
         // w - law(w) rises with w for every law that resists motion: bracket its root and close in.
         let off = |w: f64| w - law(w);
         let size = w.abs().max(law(0.0).abs()).max(f64::MIN_POSITIVE);
         let (mut low, mut high) = (-4.0 * size, 4.0 * size);
-        if !(off(low) < 0.0 && off(high) > 0.0) {
+        let (mut under, mut over) = (off(low), off(high));
+        if !(under < 0.0 && over > 0.0) {
             return w;
         }
-        for _ in 0..BISECTIONS {
-            let middle = 0.5 * (low + high);
-            if off(middle) > 0.0 {
-                high = middle
-            } else {
-                low = middle
+        for i in 0..SECANTS {
+            // Laws have kinks, on which a secant may stand still: every third step halves.
+            let middle = if i % 3 == 2 { 0.5 * (low + high) } else { (low * over - high * under) / (over - under) };
+            let here = off(middle);
+            if here.abs() <= 1e-10 * size || high - low <= 1e-10 * size {
+                return middle;
             }
-            if high - low <= 1e-10 * size {
-                break;
+            if here > 0.0 {
+                (high, over) = (middle, here);
+            } else {
+                (low, under) = (middle, here);
             }
         }
         0.5 * (low + high)

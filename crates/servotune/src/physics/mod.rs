@@ -61,7 +61,7 @@ pub use describing::describing;
 pub use effect::{COLUMNS, Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
 pub use free_form::CurvePort;
 pub use library::{curves, data_facts, effect, facts, library};
-pub use machine::Machine;
+pub use machine::{Machine, Reading};
 pub use restored::{Context, Restored};
 pub use sample::{Sample, Scene, logarithmic};
 pub use share::Share;

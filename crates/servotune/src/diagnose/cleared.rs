@@ -1,0 +1,286 @@
+//! A plant cleared of what acted while it was fitted: body, delay and one law together, by the balance of torques.
+//!
+//! In: records and the given plant, of which nothing but its modes is used: where it was fitted under dry friction or a dead band, gain and delay may be
+//! anything. Out: the plant from which the search sets out. x'' = b (u + w) - c x' - k x is linear in all strengths along the recorded motion, whatever the
+//! plant was; both sides are smoothed alike (filtered equation error). What explains most is fitted by plain simulation and kept only where it
+//! simulates far better than the best linear plant. It names nothing: the search begins anew from the plant alone.
+
+use super::bench::Bench;
+use super::columns::columns_along;
+use super::fitted::refit;
+use super::judge::size;
+use super::refit::Chosen;
+use super::run::Run;
+use super::select::Model;
+use super::simulation_problem::{Problem, descended};
+use crate::lti::{Body, Plant};
+use crate::numeric::least_squares::Qr;
+use crate::physics::{Effect, Entry, Sample, Scene, Setting, library};
+use rayon::prelude::*;
+
+/// Standard deviations of the smoothing (samples): wide for slow machines, narrow for fast ones.
+const SMOOTHINGS: [f64; 3] = [3.0, 8.0, 20.0];
+/// The later of the two commands whose shares make any delay between them (samples).
+const LATER: usize = 4;
+/// Share of the linear plant's equation error that a law must leave less than to be tried by simulation.
+const TELLS: f64 = 0.7;
+/// Laws that are tried by simulation, as they stand and fitted.
+const TRIED: usize = 6;
+const FITTED: usize = 2;
+/// Error of the simulation with the law over that of the linear refit below which the plant is taken.
+const FAR_BETTER: f64 = 0.5;
+/// Error of the linear refit over the sensor's noise from which it is far off at all.
+const FAR: f64 = 3.0;
+/// Smoothings between rows of the balance.
+const ROWS: f64 = 0.5;
+
+/// A record's mean run, smoothed: its motion and what stands on both sides of the balance.
+struct Smoothed {
+    samples: Vec<Sample>,
+    acceleration: Vec<f64>,
+    /// Rows that are used.
+    rows: Vec<usize>,
+}
+
+/// Weights of a Gaussian, from its middle on.
+fn weights(width: f64) -> Vec<f64> {
+    let raw: Vec<f64> =
+        (0..=(3.5 * width).ceil() as usize).map(|i| (-0.5 * (i as f64 / width).powi(2)).exp()).collect();
+    let sum = raw[0] + 2.0 * raw[1..].iter().sum::<f64>();
+    raw.into_iter().map(|w| w / sum).collect()
+}
+
+/// A series smoothed at one place; its ends go on as they are.
+fn smooth(x: &[f64], k: usize, weights: &[f64]) -> f64 {
+    let at = |i: isize| x[i.clamp(0, x.len() as isize - 1) as usize];
+    let both = |(j, w): (usize, &f64)| w * (at(k as isize + j as isize) + at(k as isize - j as isize));
+    weights[0] * x[k] + weights.iter().enumerate().skip(1).map(both).sum::<f64>()
+}
+
+impl Smoothed {
+    fn of(run: &Run, t: f64, width: f64, spindle_rad_s: f64) -> Smoothed {
+        let (weights, n) = (weights(width), run.len());
+        let x: Vec<f64> = (0..n).map(|k| smooth(&run.position, k, &weights)).collect();
+        let beside = |k: usize| [x[k.saturating_sub(1)], x[k], x[(k + 1).min(n - 1)]];
+        let sample = |k: usize| {
+            let [before, here, after] = beside(k);
+            Sample {
+                t: k as f64 * t,
+                session: run.began_s + k as f64 * t,
+                x: here,
+                v: (after - before) / (2.0 * t),
+                u: run.input[k],
+                i: run.input[k],
+                spindle_rad: run.spindle_rad.as_ref().map_or(spindle_rad_s * k as f64 * t, |s| s[k]),
+                temperature: run.temperature.as_ref().map_or(0.0, |c| c[k]),
+            }
+        };
+        let bent = |k: usize| {
+            let [before, here, after] = beside(k);
+            (after - 2.0 * here + before) / (t * t)
+        };
+        let edge = weights.len() + LATER + 1;
+        let stride = (ROWS * width).max(1.0) as usize;
+        Smoothed {
+            samples: (0..n).map(sample).collect(),
+            acceleration: (0..n).map(bent).collect(),
+            rows: (edge..n.saturating_sub(edge)).step_by(stride).collect(),
+        }
+    }
+}
+
+/// The balance of all mean runs at one smoothing.
+struct Balance<'a> {
+    bench: &'a Bench,
+    width: f64,
+    parts: Vec<Smoothed>,
+}
+
+/// What a balance comes to: the plant, the law's strengths, and the square of what is left.
+struct Balanced {
+    plant: Plant,
+    law: Option<Chosen>,
+    left: f64,
+}
+
+impl<'a> Balance<'a> {
+    fn of(bench: &'a Bench, width: f64) -> Balance<'a> {
+        let t = bench.scene.sample_time_s;
+        let spindle = std::f64::consts::TAU * bench.scene.spindle_hz.unwrap_or(0.0);
+        Balance { bench, width, parts: bench.means.par_iter().map(|m| Smoothed::of(m, t, width, spindle)).collect() }
+    }
+
+    /// Columns that a command held between samples puts into the balance, early and late: what acts around a sample is the mean of the two beside it.
+    fn commanded(&self, part: &Smoothed, u: &[f64], weights: &[f64]) -> [Vec<f64>; 2] {
+        let acts: Vec<f64> = (0..u.len()).map(|k| 0.5 * (u[k] + u[k.saturating_sub(1)])).collect();
+        [0, LATER].map(|lag| part.rows.iter().map(|&k| smooth(&acts, k - lag, weights)).collect())
+    }
+
+    /// The balance with a law, or without.
+    fn solved(&self, law: Option<(&'static dyn Effect, &[f64])>) -> Option<Balanced> {
+        let scene: &Scene = &self.bench.scene;
+        let weights = weights(self.width);
+        let facts = law.map(|(e, _)| e.facts());
+        let own = facts.map_or(0, |f| if f.fixed { 0 } else { f.columns });
+        let free_body = matches!(self.bench.form.given.body, Body::FreeInertia { .. });
+        let count = 4 + own + self.parts.len();
+        let total: usize = self.parts.iter().map(|p| p.rows.len()).sum();
+        if total < 4 * count {
+            return None;
+        }
+        let (mut columns, mut target) = (vec![vec![0.0; total]; count], Vec::with_capacity(total));
+        let mut from = 0;
+        for (r, (part, run)) in self.parts.iter().zip(&self.bench.means).enumerate() {
+            let to = from + part.rows.len();
+            let raw = law.map_or(Vec::new(), |(e, inner)| columns_along(e, inner, scene, &part.samples));
+            let mut u = run.input.clone();
+            let enters = facts.map(|f| (f.entry, f.fixed));
+            if let Some((Entry::Command, true)) = enters {
+                raw.iter().for_each(|c| u.iter_mut().zip(c).for_each(|(u, c)| *u += c));
+            }
+            let mut put = |i: usize, values: &[f64]| columns[i][from..to].copy_from_slice(values);
+            let [early, late] = self.commanded(part, &u, &weights);
+            put(0, &early);
+            put(1, &late);
+            put(2, &part.rows.iter().map(|&k| -part.samples[k].v).collect::<Vec<_>>());
+            if !free_body {
+                put(3, &part.rows.iter().map(|&k| run.origin - part.samples[k].x).collect::<Vec<_>>());
+            }
+            if own > 0 {
+                for (j, c) in raw.iter().enumerate().take(own) {
+                    // A torque over an interval stands between its two samples.
+                    let mean: Vec<f64> = (0..c.len()).map(|k| 0.5 * (c[k] + c[k.saturating_sub(1)])).collect();
+                    put(4 + j, &part.rows.iter().map(|&k| smooth(&mean, k, &weights)).collect::<Vec<_>>());
+                }
+            }
+            put(4 + own + r, &vec![1.0; part.rows.len()]);
+            target.extend(part.rows.iter().map(|&k| part.acceleration[k]));
+            from = to;
+        }
+        let mut qr = Qr::default();
+        qr.factor(total, count, |a| a.chunks_exact_mut(total).zip(&columns).for_each(|(a, c)| a.copy_from_slice(c)));
+        let numbers = qr.solve(&mut target.clone());
+        let left: f64 = (0..total)
+            .map(|i| (target[i] - columns.iter().zip(&numbers).map(|(c, n)| c[i] * n).sum::<f64>()).powi(2))
+            .sum();
+        let gain = numbers[0] + numbers[1];
+        if !(left.is_finite() && gain.is_normal()) {
+            return None;
+        }
+        let plant = self.plant(gain, LATER as f64 * numbers[1] / gain, numbers[2], numbers[3]);
+        let law = law.map(|(effect, inner)| {
+            let strengths = match facts.is_some_and(|f| f.fixed) {
+                true => vec![1.0],
+                false => numbers[4..4 + own].iter().map(|s| s / gain).collect(),
+            };
+            let setting = Setting { inner: inner.to_vec(), strengths };
+            let (continuous, range) = super::scan::freedom(&effect.grid(scene), inner);
+            Chosen { effect, setting, continuous, range, step: 0 }
+        });
+        if law.as_ref().is_some_and(|l| !l.effect.possible(&l.setting, &[])) {
+            return None;
+        }
+        Some(Balanced { plant, law, left })
+    }
+
+    /// The given plant with another body and delay; a spring or a damper that pushes is none.
+    fn plant(&self, gain: f64, delay_samples: f64, viscous: f64, stiffness: f64) -> Plant {
+        let given = &self.bench.form.given;
+        let t = self.bench.scene.sample_time_s;
+        let over = given.resonance_gain / self.bench.scene.arm_over_record();
+        let gain = gain / over;
+        let body = match given.body {
+            Body::FreeInertia { .. } => {
+                Body::FreeInertia { acceleration_gain: gain, viscous_rate_per_s: viscous.max(0.0) }
+            }
+            _ => {
+                // A spring too weak for these records to show still makes a body of second order.
+                let slowest = (std::f64::consts::PI / self.bench.scene.duration_s.max(t)).powi(2);
+                let k = stiffness.max(1e-2 * slowest);
+                let damping_ratio = (0.5 * viscous / k.sqrt()).max(1e-3);
+                Body::SecondOrder { dc_gain: gain / k, natural_frequency_rad_s: k.sqrt(), damping_ratio }
+            }
+        };
+        Plant { body, delay_s: (delay_samples * t).clamp(0.0, 3.0 * LATER as f64 * t), ..given.clone() }
+    }
+
+    /// The best point of every law that bends or drags, where it explains what no linear plant does.
+    fn laws(&self) -> Vec<(f64, Balanced)> {
+        let Some(linear) = self.solved(None) else { return Vec::new() };
+        let bends = |e: &&&'static dyn Effect| {
+            (e.bends() || e.drag()) && !e.facts().per_record && e.facts().entry != Entry::Position
+        };
+        let effects: Vec<&'static dyn Effect> = library().iter().filter(bends).copied().collect();
+        let best = |e: &&'static dyn Effect| -> Option<(f64, Balanced)> {
+            let grid = e.grid(&self.bench.scene);
+            let all = grid.iter().filter_map(|inner| self.solved(Some((*e, inner))));
+            let best = all.min_by(|a, b| a.left.total_cmp(&b.left))?;
+            let share = best.left / linear.left;
+            (share < TELLS).then_some((share, best))
+        };
+        effects.par_iter().filter_map(best).collect()
+    }
+}
+
+/// The plant to set out from, where the given one conceals what acts; none where the given one, or a refit of it, does.
+pub(super) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str)) -> Option<Plant> {
+    let mut laws: Vec<(f64, Balanced)> = SMOOTHINGS.iter().flat_map(|&w| Balance::of(bench, w).laws()).collect();
+    if laws.is_empty() {
+        return None;
+    }
+    let mut own = bench.clone();
+    let linear = refit(&mut own, iterations);
+    let whole: Vec<(&Run, usize)> = own.means.iter().zip(&own.stack.segments).map(|(m, s)| (m, s.runs.len())).collect();
+    let mut given = linear.clone();
+    given.refitted.p.fill(0.0);
+    let plain = |b: &Bench, m: &Model| {
+        let mut problem = Problem::plain_error(b, m, None, &whole);
+        let x = problem.start();
+        size(&problem.settle(&x))
+    };
+    let samples: f64 = whole.iter().map(|(r, n)| (r.len() * n) as f64).sum();
+    let least =
+        [plain(&own, &linear), plain(&own, &given)].into_iter().filter(|v| v.is_finite()).fold(f64::MAX, f64::min);
+    // Sums of squares count in the sensor's noise.
+    if least < FAR * FAR * samples {
+        return None;
+    }
+    say("a plant cleared of what bends it");
+    laws.sort_by(|a, b| a.0.total_cmp(&b.0));
+    laws.truncate(TRIED);
+    let model_of = |b: &Balanced| -> Option<(Bench, Model)> {
+        let ground = around(&own, &b.plant);
+        let zero = vec![0.0; ground.form.knobs.len()];
+        let mut model = linear.clone();
+        model.chosen = b.law.iter().cloned().collect();
+        (model.refitted.p, model.refitted.plant) = (zero, b.plant.clone());
+        Some((ground, model))
+    };
+    let mut tried: Vec<(f64, Bench, Model)> = Vec::new();
+    for (_, b) in &laws {
+        if let Some((ground, model)) = model_of(b) {
+            let left = plain(&ground, &model);
+            if left.is_finite() {
+                tried.push((left, ground, model));
+            }
+        }
+    }
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut best: Option<(f64, Plant)> = None;
+    for (left, ground, model) in tried.into_iter().take(FITTED) {
+        let fitted = descended(&ground, &model, None, &whole).unwrap_or(model);
+        let after = plain(&ground, &fitted).min(left);
+        if best.as_ref().is_none_or(|(b, _)| after < *b) {
+            best = Some((after, ground.form.plant(&fitted.refitted.p)));
+        }
+    }
+    best.filter(|(left, _)| *left < FAR_BETTER * FAR_BETTER * least).map(|(_, plant)| plant)
+}
+
+/// The same ground around another plant, for simulations of plain errors: its noise and its motion stay.
+fn around(bench: &Bench, plant: &Plant) -> Bench {
+    let mut ground = bench.clone();
+    ground.form = super::linear::LinearForm::new(plant, bench.scene.sample_time_s);
+    ground.scene.plant = plant.clone();
+    ground
+}
