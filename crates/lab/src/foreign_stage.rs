@@ -142,6 +142,7 @@ impl Stage {
             pid: Pid { kp, ki_per_s, kd_s, derivative_filter_s },
             lowpass: vec![],
             notch: vec![],
+            biquad: vec![],
             feedforward: None,
         };
         Ok((case, self.plant(size)?, controller))
