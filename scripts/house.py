@@ -1,0 +1,161 @@
+#!/usr/bin/env python3
+"""results/house.md: what the house weighs, before and now, counted from the files of two revisions.
+
+python3 scripts/house.py [--before 947496e] [--out results/house.md]
+
+Counts are of text, not of a compiler: rustfmt's layout is relied on.
+"""
+
+import argparse
+import io
+import re
+import subprocess
+import tarfile
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PUBLIC = re.compile(r"^\s*pub (?:const fn|fn|struct|enum|trait|const|type|static|unsafe fn) ", re.M)
+FUNCTION = re.compile(r"^( *)(?:pub(?:\([a-z]+\))? )?(?:const )?fn (\w+)")
+LONG_FUNCTION, LONG_SENTENCE = 80, 40
+
+
+def without_tests(text: str) -> str:
+    """A file up to its unit tests."""
+    return text.split("#[cfg(test)]\nmod ", 1)[0]
+
+
+def installed(root: Path) -> dict[str, str]:
+    """Rust files of what `cargo install` compiles: no studies, no tests."""
+    folders = [p for p in [root / "src", *sorted(root.glob("crates/*/src"))] if p.is_dir() and p.parent.name != "lab"]
+    files = [f for folder in folders for f in sorted(folder.rglob("*.rs"))]
+    return {str(f.relative_to(root)): f.read_text() for f in files if "study" not in f.relative_to(root).parts}
+
+
+def functions(text: str) -> list[tuple[int, str]]:
+    """(lines, name) of every function, from its first line to the brace that closes it at the same indentation."""
+    lines, found = text.splitlines(), []
+    for i, line in enumerate(lines):
+        m = FUNCTION.match(line)
+        if m and not line.rstrip().endswith(";"):
+            end = next((j for j in range(i, len(lines)) if lines[j] == m.group(1) + "}"), i)
+            found.append((end - i + 1, m.group(2)))
+    return found
+
+
+def circles(root: Path) -> int:
+    """Files that import one another in a circle within their folder."""
+    count = 0
+    for folder in {f.parent for f in root.rglob("*.rs") if "target" not in f.parts and "tests" not in f.parts}:
+        names = {f.stem for f in folder.glob("*.rs")} - {"mod", "lib", "main"}
+        edges = {
+            n: {
+                m
+                for use in re.findall(r"^use super::(.*?);", without_tests((folder / f"{n}.rs").read_text()), re.M | re.S)
+                for m in re.findall(r"\b(\w+)(?=::|\b)", use)
+                if m in names and m != n
+            }
+            for n in names
+        }
+
+        def reached(start: str) -> set[str]:
+            seen, todo = set(), [start]
+            while todo:
+                for m in edges[todo.pop()] - seen:
+                    seen.add(m)
+                    todo.append(m)
+            return seen
+
+        count += sum(n in reached(n) for n in names)
+    return count
+
+
+def sentences(text: str) -> list[str]:
+    """Sentences of prose: no code, no tables, no headings."""
+    text = re.sub(r"```.*?```", "", text, flags=re.S)
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith(("|", "#"))]
+    prose = re.sub(r"`[^`]*`", "code", " ".join(re.sub(r"^\s*[-\d.]+\s", ". ", line) for line in lines))
+    return [s for s in re.split(r"(?<=[.!?:;])\s+", prose) if s.strip(". ")]
+
+
+def effects(files: dict[str, str]) -> int:
+    """String literals with the name of an effect, outside the room that defines them."""
+    names = set()
+    for path, text in files.items():
+        if "/physics/" in path:
+            names |= set(re.findall(r'^\s+name: "(\w+)",$', text, re.M))
+    literal = re.compile('"(?:' + "|".join(sorted(names)) + ')"') if names else None
+    outside = (without_tests(t) for p, t in files.items() if "/physics/" not in p)
+    return sum(len(literal.findall(t)) for t in outside) if literal else 0
+
+
+def crates(root: Path, words: list[str]) -> str:
+    """Crates that a build compiles, from the lock file."""
+    line = ["cargo", "tree", "--offline", "--edges", "normal", "--prefix", "none", *words]
+    run = subprocess.run(line, cwd=root, capture_output=True, text=True, check=False)
+    names = {w.split(" (")[0] for w in run.stdout.splitlines() if w.strip()}
+    return str(len(names)) if run.returncode == 0 else "-"
+
+
+def figures(root: Path) -> list[tuple[str, str]]:
+    """Rows of the page for one revision."""
+    files = installed(root)
+    code = {p: without_tests(t) for p, t in files.items()}
+    lines = sum(len(t.splitlines()) for t in code.values())
+    all_functions = sorted((n, name, p) for p, t in code.items() for n, name in functions(t))
+    long = [f for f in all_functions if f[0] > LONG_FUNCTION]
+    longest = all_functions[-1]
+    tests = sum(len(f.read_text().splitlines()) for f in (root / "tests").rglob("*.rs"))
+    unit = sum(len(t.splitlines()) for t in files.values()) - lines
+    pages = [f.read_text() for f in (root / "specs").rglob("*.md")]
+    said = [s for page in pages for s in sentences(page)]
+    size = sum(f.stat().st_size for f in (root / "results").rglob("*") if f.is_file())
+    library = ["-p", "servotune"] if (root / "crates/servotune").is_dir() else []
+    program = ["-p", "servotune-cli"] if library else []
+    return [
+        ("lines of the installed product, tests left out", f"{lines}"),
+        ("files", f"{len(files)}"),
+        ("public items", f"{sum(len(PUBLIC.findall(t)) for t in code.values())}"),
+        ("files in circles of imports within their folder", f"{circles(root)}"),
+        ("longest function, lines", f"{longest[0]} (`{longest[1]}`, {longest[2]})"),
+        (f"functions above {LONG_FUNCTION} lines", f"{len(long)}"),
+        ("of these in `diagnose`", f"{sum('/diagnose/' in f[2] for f in long)}"),
+        ("names of effects as text outside `physics`", f"{effects(files)}"),
+        ("named thresholds (numeric constants) in `diagnose`", str(thresholds(code))),
+        ("words of `specs/`", f"{sum(len(p.split()) for p in pages)}"),
+        (f"sentences above {LONG_SENTENCE} words", f"{sum(len(s.split()) > LONG_SENTENCE for s in said)}"),
+        ("longest sentence, words", f"{max(len(s.split()) for s in said)}"),
+        ("crates of the library alone", crates(root, library)),
+        ("crates of the program", crates(root, program)),
+        ("size of `results/`, kB", f"{size / 1000:.0f}"),
+        ("test lines per 100 lines of code", f"{100 * (tests + unit) / lines:.0f}"),
+    ]
+
+
+def thresholds(code: dict[str, str]) -> int:
+    """Constants with a number in the room of the diagnosis."""
+    const = re.compile(r"^(?:pub(?:\(\w+\))? )?const \w+: (?:f64|usize|\[f64; \d+\])", re.M)
+    return sum(len(const.findall(t)) for p, t in code.items() if "/diagnose/" in p)
+
+
+def main() -> None:
+    """Writes the page."""
+    a = argparse.ArgumentParser(description=__doc__)
+    a.add_argument("--before", default="947496e")
+    a.add_argument("--out", type=Path, default=ROOT / "results/house.md")
+    w = a.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        archive = subprocess.run(["git", "archive", w.before], cwd=ROOT, capture_output=True, check=True).stdout
+        tarfile.open(fileobj=io.BytesIO(archive)).extractall(folder, filter="data")
+        before = figures(Path(folder))
+    now = figures(ROOT)
+    rows = "\n".join(f"| {name} | {old} | {new} |" for (name, old), (_, new) in zip(before, now, strict=True))
+    w.out.write_text(
+        "# The house\n\n"
+        f"Made by `python3 scripts/house.py`: counted from the text of commit {w.before} and of the files as they stand. Studies, tests and Python are left out where the product is counted.\n\n"
+        f"| | before | now |\n|---|---|---|\n{rows}\n"
+    )
+
+
+if __name__ == "__main__":
+    main()
