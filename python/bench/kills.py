@@ -39,7 +39,12 @@ def workers(engine: str) -> list[int]:
     from distributed import default_client
 
     # Those that have joined: Dask gives a place up whose process dies while it starts.
-    return list(default_client().run(os.getpid, on_error="ignore").values())
+    client = default_client()
+    try:
+        return list(client.sync(client._run, os.getpid, on_error="ignore", callback_timeout=5).values())
+    except TimeoutError:
+        # It asked one that had just been killed.
+        return []
 
 
 class Killer(threading.Thread):
@@ -58,6 +63,7 @@ class Killer(threading.Thread):
             try:
                 os.kill(self.random.choice(there), signal.SIGKILL)
                 self.kills += 1
+                print("killed", self.kills, flush=True)
             except ProcessLookupError:
                 # It had just ended by itself.
                 continue
@@ -111,7 +117,7 @@ def killed_workers(engine: str, kills: int, fleet: Path, alone: Path, folder: Pa
 
         floor.run(fleet, engine=engine, out=out, name="one", workers=2, batch=4, pages=0, said=said)
         killer.over.set()
-        killer.join()
+        killer.join(30)
         count.add(out, alone, killer.kills, time.time() - begun)
         print(engine, count.line(""), flush=True)
     return count
