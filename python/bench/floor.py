@@ -20,7 +20,7 @@ from pathlib import Path
 from machine import ROOT, busy, children, fleet_file, program_file
 
 #: Few, so that the stage before the slots is short; it is not what is measured.
-PILOTS = 8
+PILOTS = 4
 #: Files that say nothing of the time of the run.
 FILES = ("slots.csv", "slots.jsonl", "coverage.csv", "shared.json", "work_list.csv", "untunable.json")
 

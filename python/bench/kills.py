@@ -14,6 +14,7 @@ import sqlite3
 import tempfile
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 
 from machine import ROOT, busy, children, fleet_file, program
@@ -32,9 +33,18 @@ def workers(engine: str) -> list[int]:
         # A worker of Ray names what it works on.
         return [pid for pid, _, words in found if words.startswith("ray::") and "work" in words]
     if engine == "spark":
-        daemons = {pid for pid, _, words in found if "pyspark.daemon" in words}
-        return [pid for pid, parent, words in found if parent in daemons and pid not in daemons]
-    return [pid for pid, _, words in found if "spawn_main" in words]
+        # The daemon forks its workers, which keep its name.
+        family = {pid for pid, _, words in found if "pyspark.daemon" in words}
+        return [pid for pid, parent, _ in found if pid in family and parent in family]
+    from distributed import default_client
+
+    # Those that have joined: Dask gives a place up whose process dies while it starts.
+    client = default_client()
+    try:
+        return list(client.sync(client._run, os.getpid, on_error="ignore", callback_timeout=5).values())
+    except TimeoutError:
+        # It asked one that had just been killed.
+        return []
 
 
 class Killer(threading.Thread):
@@ -53,6 +63,7 @@ class Killer(threading.Thread):
             try:
                 os.kill(self.random.choice(there), signal.SIGKILL)
                 self.kills += 1
+                print("killed", self.kills, flush=True)
             except ProcessLookupError:
                 # It had just ended by itself.
                 continue
@@ -106,7 +117,7 @@ def killed_workers(engine: str, kills: int, fleet: Path, alone: Path, folder: Pa
 
         floor.run(fleet, engine=engine, out=out, name="one", workers=2, batch=4, pages=0, said=said)
         killer.over.set()
-        killer.join()
+        killer.join(30)
         count.add(out, alone, killer.kills, time.time() - begun)
         print(engine, count.line(""), flush=True)
     return count
@@ -123,20 +134,17 @@ def lost_nodes(losses: int, fleet: Path, alone: Path, folder: Path) -> Count:
         node = {"num_cpus": 1, "object_store_memory": 200_000_000}
         nodes = [cluster.add_node(**node) for _ in range(2)]
         ray.init(address=cluster.address, log_to_driver=False)
-        done, out, begun, lost = threading.Event(), folder / f"node{count.runs}", time.time(), [0]
+        out, begun, lost = folder / f"node{count.runs}", time.time(), 0
 
-        def lose(cluster=cluster, node=node, nodes=nodes, done=done, lost=lost) -> None:
-            while count.kills + lost[0] < losses and not done.wait(chance.uniform(6.0, 14.0)):
+        with ThreadPoolExecutor(1) as pool:
+            # Nodes are added by the main thread only.
+            ran = pool.submit(floor.run, fleet, engine="ray", out=out, name="one", batch=4, pages=0)
+            while not wait([ran], chance.uniform(6.0, 14.0)).done and count.kills + lost < losses:
                 cluster.remove_node(nodes.pop(0), allow_graceful=False)
                 nodes.append(cluster.add_node(**node))
-                lost[0] += 1
-
-        killer = threading.Thread(target=lose, daemon=True)
-        killer.start()
-        floor.run(fleet, engine="ray", out=out, name="one", batch=4, pages=0)
-        done.set()
-        killer.join()
-        count.add(out, alone, lost[0], time.time() - begun)
+                lost += 1
+            ran.result()
+        count.add(out, alone, lost, time.time() - begun)
         ray.shutdown()
         cluster.shutdown()
         print("node", count.line(""), flush=True)

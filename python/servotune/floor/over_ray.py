@@ -15,13 +15,15 @@ TRIES = 10
 
 @contextmanager
 def engine(workers: int) -> Iterator[Spread]:
-    """The cluster that the process is already part of; else one of so many cores on this machine, as long as the run lasts."""
+    """The cluster that the process is already part of; else a new one of so many cores on this machine, or of 0 the one that Ray finds or starts."""
     import ray
     import ray.data
 
     own = not ray.is_initialized()
     if own:
-        ray.init(num_cpus=workers or None, include_dashboard=False, log_to_driver=False)
+        # A number of workers asks for a cluster of that size, whatever else runs on this machine.
+        asked = {"address": "local", "num_cpus": workers, "include_dashboard": False} if workers else {}
+        ray.init(**asked, log_to_driver=False)
     ray.data.DataContext.get_current().enable_progress_bars = False
 
     def spread(task: Task, batches: list[list[int]]) -> Iterator[Found]:
