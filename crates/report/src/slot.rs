@@ -89,6 +89,20 @@ pub fn slot_page(view: &SlotView<'_>) -> Result<Page, ReportError> {
     })
 }
 
+/// The page of a loop that nothing is asked of: margins, curves, steps.
+pub fn loop_page(view: &SlotView<'_>) -> Result<Page, ReportError> {
+    let mut verdict = vec![Block::Notice(view.verdict.0, view.verdict.1.clone())];
+    verdict.extend(view.judged_on.map(|said| Block::Prose(said.to_owned())));
+    let sections = vec![Section { heading: "Verdict".into(), blocks: verdict }, loop_section(view)?];
+    Ok(Page {
+        title: format!("Margins: {}", view.name),
+        subtitle: "The open loop, its sensitivity functions, its steps".into(),
+        cards: cards(view),
+        sections,
+        provenance: view.provenance.clone(),
+    })
+}
+
 /// Most cards.
 const CARDS: usize = 6;
 
