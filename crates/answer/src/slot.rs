@@ -67,7 +67,9 @@ pub(super) fn linear_view(name: &str, plant: &Plant, c: &Controller) -> Result<L
     let sampled = DiscretePlant::of(plant, c.sample_time_s)?;
     let l = ModelLoop::new(&sampled, &sections)?;
     let margins = confirmed_margins(&l)?;
-    let (from, to) = (TAU * 10.0, l.end_rad_s());
+    // From a decade below the slowest crossing on, 10 Hz at most.
+    let crossings = [margins.gain_crossover_hz, margins.phase_crossover_hz].into_iter().flatten();
+    let (from, to) = (TAU * crossings.fold(10.0, |low: f64, hz| low.min(0.1 * hz)), l.end_rad_s());
     let n = (DRAWN_PER_DECADE * (to / from).log10()).ceil() as usize;
     let mut w: Vec<f64> = (0..=n).map(|i| from * (to / from).powf(i as f64 / n as f64)).collect();
     w.extend(l.grid().into_iter().filter(|w| *w > from));

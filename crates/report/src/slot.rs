@@ -193,7 +193,11 @@ fn loop_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
         phase_margin: m.gain_crossover_hz.zip(m.phase_margin_deg),
         gain_margin: m.phase_crossover_hz.zip(m.gain_margin_db),
     };
-    let mut open = bode("Open loop", "The marked margins are those after tuning.", &curves, &marks)?;
+    let caption = match view.before {
+        Some(_) => "The marked margins are those after tuning.",
+        None => "The marked margins are the smallest.",
+    };
+    let mut open = bode("Open loop", caption, &curves, &marks)?;
     requirements(&mut open, view, &[Magnitude::L])?;
     let limit = view.spec.margins.max_sensitivity;
     let disk_margin = (m.disk_margin > 0.0 && m.disk_margin < 2.0).then_some(m.disk_margin);
