@@ -1,6 +1,6 @@
 //! Every page in a real browser (headless Chromium): nothing wider than its card, nothing cut, no label over another, no script error, at three
 //! widths, in light and in dark. Skipped with a message where no Chromium is installed; `.ci/run` installs it.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
 mod program_common;
 
