@@ -101,6 +101,9 @@ pub(super) struct IdentifyArguments {
     /// Plant model to write
     #[arg(long, value_name = "PLANT")]
     pub out: PathBuf,
+    /// HTML page to write: response, model, parameters
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
     /// Replace what stands at the place of the output; it is kept under another name, which is said
     #[arg(long)]
     pub force: bool,

@@ -3,27 +3,40 @@
 use super::arguments::IdentifyArguments;
 use super::outputs::Outputs;
 use super::{Ending, Failure, Screen, load};
-use servotune::document::write_text;
+use servotune::document::FileSet;
 use servotune::identify::{Hold, Identified, identify};
 use servotune::lti::PlantFile;
-use servotune_answer::IdentifiedDocument;
+use servotune_answer::{IdentifiedDocument, identified_page};
 use servotune_report::identified::{identified_sentences, ladder_table, order_table, parameter_table};
 use std::path::PathBuf;
 
 pub(super) fn run(a: &IdentifyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     let inputs = [Some(a.frf.clone()), a.controller.clone(), a.taken.measured_with.clone()];
     let inputs: Vec<PathBuf> = inputs.into_iter().flatten().collect();
-    let outputs = Outputs::new(&[&a.out], &inputs, a.force)?;
+    let written: Vec<&PathBuf> = [Some(&a.out), a.report.as_ref()].into_iter().flatten().collect();
+    let outputs = Outputs::new(&written, &inputs, a.force)?;
     let hold_included = a.model.settings().hold != Hold::NotIncluded;
     let taken = load::Taken { how: &a.taken, unstable_poles: 0, hold_included, controller: a.controller.as_deref() };
     let sweep = load::sweep(&a.frf, &a.reading, &taken, screen)?;
     let id = identify(&sweep.frf, &a.model.settings())
         .map_err(|source| Failure::Identify { file: a.frf.clone(), source })?;
     let text = toml::to_string(&PlantFile::from(&id.plant)).map_err(|source| Failure::Toml { source })?;
-    outputs.keep_old(screen)?;
-    write_text(&a.out, &text)?;
-    screen.say(&format!("wrote {}", a.out.display()));
     let document = IdentifiedDocument::of(&sweep, &id);
+    let mut files = FileSet::default();
+    files.write(&a.out, text);
+    if let Some(report) = &a.report {
+        let name = a.frf.display().to_string();
+        let provenance = vec![
+            ("program".to_owned(), format!("servotune {}", env!("CARGO_PKG_VERSION"))),
+            (name.clone(), sweep.source_digest.clone()),
+        ];
+        files.write(report, identified_page(&name, &sweep, &id, document.accepted(), provenance)?.html());
+    }
+    outputs.keep_old(screen)?;
+    files.commit()?;
+    for file in written {
+        screen.say(&format!("wrote {}", file.display()));
+    }
     screen.result(&document, &text_of(&id)?)?;
     Ok(if document.accepted() { Ending::Accepted } else { Ending::Rejected })
 }

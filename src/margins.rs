@@ -1,13 +1,15 @@
 //! `servotune margins`: one loop judged, of a model or of a measured response.
 
 use super::arguments::MarginsArguments;
+use super::outputs::Outputs;
 use super::{Ending, Failure, Screen, load};
 use servotune::controller::Controller;
+use servotune::document::{read_text, sha256_hex, write_text};
 use servotune::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
-use servotune_answer::{ModelMargins, Named, model_margins};
+use servotune_answer::{ModelMargins, Named, margins_page, model_margins};
 use servotune_report::margins::{margins_text, measured_text};
 use servotune_report::physical::{amplitude_table, limit_cycle_sentences};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, Failure> {
     let controller = load::controller(&a.controller)?;
@@ -17,7 +19,11 @@ pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, F
     let stable = match (&a.plant, &a.frf) {
         (Some(file), _) => {
             let amplitudes = Amplitudes { low: a.amplitudes.0, high: a.amplitudes.1, ..Amplitudes::default() };
-            of_model(file, Named { file: &a.controller, value: &controller }, &amplitudes, screen)?
+            let controller = Named { file: &a.controller, value: &controller };
+            if let Some(report) = &a.report {
+                page(report, a.force, file, controller, screen)?;
+            }
+            of_model(file, controller, &amplitudes, screen)?
         }
         (None, Some(file)) => {
             let taken = load::Taken {
@@ -37,6 +43,26 @@ pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, F
         (None, None) => false,
     };
     Ok(if stable { Ending::Accepted } else { Ending::Rejected })
+}
+
+fn page(
+    report: &PathBuf,
+    force: bool,
+    file: &Path,
+    controller: Named<'_, Controller>,
+    screen: &mut Screen,
+) -> Result<(), Failure> {
+    let outputs = Outputs::new(&[report], &[file.to_owned(), controller.file.to_owned()], force)?;
+    let plant = load::plant(file)?;
+    let mut provenance = vec![("program".to_owned(), format!("servotune {}", env!("CARGO_PKG_VERSION")))];
+    for input in [file, controller.file] {
+        provenance.push((input.display().to_string(), sha256_hex(read_text(input)?.as_bytes())));
+    }
+    let text = margins_page(Named { file, value: &plant }, controller, provenance)?.html();
+    outputs.keep_old(screen)?;
+    write_text(report, &text)?;
+    screen.say(&format!("wrote {}", report.display()));
+    Ok(())
 }
 
 fn of_model(

@@ -26,6 +26,12 @@ pub(super) struct MarginsArguments {
     /// Controller (controller.toml) or gain table (gains.toml)
     #[arg(long, value_name = "CONTROLLER")]
     pub controller: PathBuf,
+    /// HTML page to write: the loop of a model, its sensitivity functions, its steps
+    #[arg(long, value_name = "FILE", conflicts_with = "frf")]
+    pub report: Option<PathBuf>,
+    /// Replace what stands at the place of the page; it is kept under another name, which is said
+    #[arg(long)]
+    pub force: bool,
     /// Amplitudes of the position at which physics beyond linear is described (position_unit)
     #[arg(long, value_name = "LOW:HIGH", default_value = "0.15:15", value_parser = amplitudes, conflicts_with = "frf")]
     pub amplitudes: (f64, f64),

@@ -1,5 +1,5 @@
 //! Exported code gives the library's commands: to the last bit in C, to the bit in integers.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stderr)]
 
 mod program_common;
 

@@ -1,6 +1,6 @@
 //! Every page in a real browser (headless Chromium): nothing wider than its card, nothing cut, no label over another, no script error, at three
 //! widths, in light and in dark. Skipped with a message where no Chromium is installed; `.ci/run` installs it.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
 mod program_common;
 
@@ -129,7 +129,19 @@ fn the_program_s_pages_fit_every_width() {
         assert!(ran.code <= 1, "{words:?}: {}{}", ran.out, ran.err);
     };
     assert_eq!(servotune(&["init", "motor", dir.to_str().unwrap()]).code, 0);
-    run(&["identify", "sweep.csv", "--position-unit", "rad", "--command-unit", "A", "--out", "plant.toml"]);
+    run(&[
+        "identify",
+        "sweep.csv",
+        "--position-unit",
+        "rad",
+        "--command-unit",
+        "A",
+        "--out",
+        "plant.toml",
+        "--report",
+        "identified.html",
+    ]);
+    run(&["margins", "--plant", "plant.toml", "--controller", "controller.toml", "--report", "margins.html"]);
     let search = ["--spec", "spec.toml", "--controller", "controller.toml"];
     run(&[&["tune", "--plant", "plant.toml", "--out", "gains.toml", "--report", "model.html"][..], &search].concat());
     run(&[&["tune", "--frf", "sweep.csv", "--out", "direct.toml", "--report", "sweep.html"][..], &search].concat());
@@ -140,7 +152,7 @@ fn the_program_s_pages_fit_every_width() {
         .filter(|p: &PathBuf| p.extension().is_some_and(|e| e == "html"))
         .map(|p| (p.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read_to_string(&p).unwrap()))
         .collect();
-    assert_eq!(pages.len(), 3);
+    assert_eq!(pages.len(), 5);
     let open: Vec<(String, String)> =
         pages.into_iter().map(|(n, p)| (n, p.replace("<details>", "<details open>"))).collect();
     hold(browser, &open, &dir);

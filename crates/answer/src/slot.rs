@@ -61,39 +61,48 @@ pub fn units(plant: &Plant) -> Units<'_> {
 /// Points of the drawn curves for each decade.
 const DRAWN_PER_DECADE: f64 = 400.0;
 
-/// All that is drawn of one controller on the model.
-fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Result<LoopView, AnswerError> {
+/// Loop, margins and steps of one controller on the linear model; without a write and without limits.
+pub(super) fn linear_view(name: &str, plant: &Plant, c: &Controller) -> Result<LoopView, AnswerError> {
     let sections = c.sections().map_err(servotune::tune::TuneError::from)?;
-    let sampled = DiscretePlant::of(slot.plant, c.sample_time_s)?;
+    let sampled = DiscretePlant::of(plant, c.sample_time_s)?;
     let l = ModelLoop::new(&sampled, &sections)?;
-    let judged_margins = confirmed_margins(&l)?;
-    let (from, to) = (TAU * 10.0, l.end_rad_s());
+    let margins = confirmed_margins(&l)?;
+    // From a decade below the slowest crossing on, 10 Hz at most.
+    let crossings = [margins.gain_crossover_hz, margins.phase_crossover_hz].into_iter().flatten();
+    let (from, to) = (TAU * crossings.fold(10.0, |low: f64, hz| low.min(0.1 * hz)), l.end_rad_s());
     let n = (DRAWN_PER_DECADE * (to / from).log10()).ceil() as usize;
     let mut w: Vec<f64> = (0..=n).map(|i| from * (to / from).powf(i as f64 / n as f64)).collect();
     w.extend(l.grid().into_iter().filter(|w| *w > from));
     w.sort_by(f64::total_cmp);
     w.dedup();
-    let write = match &slot.spec.profile {
-        Some(profile) => {
-            let write = match slot.physics {
-                Some((physics, _)) => simulate_physical(physics, c, profile)?,
-                None => simulate(slot.plant, c, profile)?,
-            };
-            let stable = judged_margins.stable && write.pes.iter().all(|p| p.is_finite());
-            stable.then(|| (figures(&write.pes, profile), write))
-        }
-        None => None,
-    };
-    let (l_stable, crossover) = (judged_margins.stable, judged_margins.gain_crossover_hz);
+    let steps = margins.stable.then(|| step_responses(&sampled, c, &sections.chain, margins.gain_crossover_hz));
     Ok(LoopView {
         name: name.to_owned(),
         open_loop: w.iter().map(|&w| l.at(w)).collect(),
         hz: w.into_iter().map(|w| w / TAU).collect(),
-        margins: judged_margins,
-        write: write.map(|(figures, write)| (write, figures)),
-        steps: l_stable.then(|| step_responses(&sampled, c, &sections.chain, crossover)),
-        judged: Some(judged),
+        margins,
+        write: None,
+        steps,
+        judged: None,
     })
+}
+
+/// All that is drawn of one controller on the model.
+fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Result<LoopView, AnswerError> {
+    let mut view = linear_view(name, slot.plant, c)?;
+    if let Some(profile) = &slot.spec.profile {
+        let write = match slot.physics {
+            Some((physics, _)) => simulate_physical(physics, c, profile)?,
+            None => simulate(slot.plant, c, profile)?,
+        };
+        let stable = view.margins.stable && write.pes.iter().all(|p| p.is_finite());
+        view.write = stable.then(|| {
+            let figures = figures(&write.pes, profile);
+            (write, figures)
+        });
+    }
+    view.judged = Some(judged);
+    Ok(view)
 }
 
 /// Said under the verdict where the limits were judged on the measured response.
@@ -236,13 +245,8 @@ fn physical_sections(
     Ok(vec![Section { heading: "Physics".into(), blocks }])
 }
 
-fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, AnswerError> {
-    let sampled = DiscretePlant::of(slot.plant, slot.outcome.controller().sample_time_s)?;
-    let table = Block::Table(sampled_table(&sampled)?);
-    let eq31 = Block::Details("Sampled plant, exact (counterpart of the paper's eq. 31)".into(), vec![table]);
-    let (Some((sweep, _)), Some(id)) = (slot.sweep, slot.identified) else {
-        return Ok(vec![Section { heading: "Plant".into(), blocks: vec![eq31] }]);
-    };
+/// The model beside its sweep: in words, as a figure, its ladder and its parameters.
+pub(super) fn identified_blocks(sweep: &Sweep, id: &Identified) -> Result<Vec<Block>, AnswerError> {
     let mut blocks = vec![
         Block::Prose(identified_sentences(id).join(" ")),
         Block::Figure(identified_figure(&sweep.frf, id, "Measured response and model")?),
@@ -252,16 +256,30 @@ fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, AnswerError> {
         blocks.push(Block::Details("Choice of the order".into(), vec![Block::Table(order_table(id)?)]));
     }
     blocks.push(Block::Details("Parameters with 95 % intervals".into(), vec![Block::Table(parameter_table(id)?)]));
+    Ok(blocks)
+}
+
+/// What the reader of the sweep decided, folded.
+pub(super) fn decided(sweep: &Sweep) -> Option<Block> {
+    let notes: Vec<Block> = sweep.notes.iter().map(|n| Block::Prose(n.to_string())).collect();
+    (!notes.is_empty()).then(|| Block::Details("What the reader decided about the sweep file".into(), notes))
+}
+
+fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, AnswerError> {
+    let sampled = DiscretePlant::of(slot.plant, slot.outcome.controller().sample_time_s)?;
+    let table = Block::Table(sampled_table(&sampled)?);
+    let eq31 = Block::Details("Sampled plant, exact (counterpart of the paper's eq. 31)".into(), vec![table]);
+    let (Some((sweep, _)), Some(id)) = (slot.sweep, slot.identified) else {
+        return Ok(vec![Section { heading: "Plant".into(), blocks: vec![eq31] }]);
+    };
+    let mut blocks = identified_blocks(sweep, id)?;
     let controller = slot.outcome.controller();
     if let Some((named, intervals)) = margin_intervals(id, controller, DRAWS, DRAW_SEED)? {
         let caption = "Margins after tuning over the uncertainty of the model (95 %)";
         blocks.push(Block::Table(interval_table(caption, &named, &intervals)?));
     }
     blocks.push(eq31);
-    if !sweep.notes.is_empty() {
-        let notes = sweep.notes.iter().map(|n| Block::Prose(n.to_string())).collect();
-        blocks.push(Block::Details("What the reader decided about the sweep file".into(), notes));
-    }
+    blocks.extend(decided(sweep));
     Ok(vec![Section { heading: "Plant".into(), blocks }])
 }
 

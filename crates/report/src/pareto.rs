@@ -9,31 +9,35 @@ use servotune::tune::ParetoPoint;
 /// The points, tightest margin first.
 pub fn pareto_table(points: &[ParetoPoint], objective: (&str, &str), unit: &str) -> Result<Table, ReportError> {
     let digits = NumberFormat::Significant(4);
-    let mut table = Table::new(
-        "Margin against objective",
-        vec![
-            Column::numbers("Ms allowed", "ratio", digits),
-            Column::words("limits"),
-            Column::words("on the front"),
-            Column::numbers("Ms found", "ratio", digits),
-            Column::numbers("phase margin", "deg", digits),
-            Column::numbers("DFT, low band", unit, digits),
-            Column::numbers("DFT, high band", unit, digits),
-            Column::numbers(objective.0, objective.1, digits),
-        ],
-    );
+    // Without a write there is no DFT to show.
+    let dft = points.iter().any(|p| p.dft_low.is_some() || p.dft_high.is_some());
+    let mut columns = vec![
+        Column::numbers("Ms allowed", "ratio", digits),
+        Column::words("limits"),
+        Column::words("on the front"),
+        Column::numbers("Ms found", "ratio", digits),
+        Column::numbers("phase margin", "deg", digits),
+    ];
+    if dft {
+        columns.push(Column::numbers("DFT, low band", unit, digits));
+        columns.push(Column::numbers("DFT, high band", unit, digits));
+    }
+    columns.push(Column::numbers(objective.0, objective.1, digits));
+    let mut table = Table::new("Margin against objective", columns);
     for p in points {
         let met = if p.feasible { Cell::from("met") } else { Cell::from("missed").flagged(Verdict::Fail, "missed") };
-        table.push(vec![
+        let mut row = vec![
             p.allowed.into(),
             met,
             if p.on_front { "yes" } else { "" }.into(),
             p.max_sensitivity.into(),
             p.phase_margin_deg.into(),
-            p.dft_low.into(),
-            p.dft_high.into(),
-            p.objective.into(),
-        ])?;
+        ];
+        if dft {
+            row.extend([p.dft_low.into(), p.dft_high.into()]);
+        }
+        row.push(p.objective.into());
+        table.push(row)?;
     }
     Ok(table)
 }
@@ -63,6 +67,13 @@ pub fn pareto_figure(
         panel.marks.push(Series::new("today", Ink::Data(1), Kind::Points, &[ms], &[value])?.into());
         panel.marks.push(RuleLine::vertical(ms, "", Ink::Muted));
     }
+    // Air beside the first and the last marker, which the frame would cut in half.
+    let all = panel.series().flat_map(|s| s.x.iter().copied()).filter(|x| x.is_finite());
+    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    if low <= high {
+        let air = 0.04 * (high - low).max(0.01 * high.abs());
+        panel.x.range = Some((low - air, high + air));
+    }
     Ok(Figure { title: title.to_owned(), caption: caption.to_owned(), share_x: true, panels: vec![panel] })
 }
 
@@ -78,7 +89,11 @@ pub fn pareto_page(
     let figure = pareto_figure("What a margin costs", caption, points, now, objective)?;
     Ok(Page {
         title: "Margin against objective".into(),
-        subtitle: String::new(),
+        subtitle: format!(
+            "{} of {} tables meet every limit",
+            points.iter().filter(|p| p.feasible).count(),
+            points.len()
+        ),
         cards: vec![],
         sections: vec![page::Section {
             heading: "Front".into(),

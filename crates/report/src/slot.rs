@@ -89,6 +89,20 @@ pub fn slot_page(view: &SlotView<'_>) -> Result<Page, ReportError> {
     })
 }
 
+/// The page of a loop that nothing is asked of: margins, curves, steps.
+pub fn loop_page(view: &SlotView<'_>) -> Result<Page, ReportError> {
+    let mut verdict = vec![Block::Notice(view.verdict.0, view.verdict.1.clone())];
+    verdict.extend(view.judged_on.map(|said| Block::Prose(said.to_owned())));
+    let sections = vec![Section { heading: "Verdict".into(), blocks: verdict }, loop_section(view)?];
+    Ok(Page {
+        title: format!("Margins: {}", view.name),
+        subtitle: "The open loop, its sensitivity functions, its steps".into(),
+        cards: cards(view),
+        sections,
+        provenance: view.provenance.clone(),
+    })
+}
+
 /// Most cards.
 const CARDS: usize = 6;
 
@@ -179,7 +193,11 @@ fn loop_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
         phase_margin: m.gain_crossover_hz.zip(m.phase_margin_deg),
         gain_margin: m.phase_crossover_hz.zip(m.gain_margin_db),
     };
-    let mut open = bode("Open loop", "The marked margins are those after tuning.", &curves, &marks)?;
+    let caption = match view.before {
+        Some(_) => "The marked margins are those after tuning.",
+        None => "The marked margins are the smallest.",
+    };
+    let mut open = bode("Open loop", caption, &curves, &marks)?;
     requirements(&mut open, view, &[Magnitude::L])?;
     let limit = view.spec.margins.max_sensitivity;
     let disk_margin = (m.disk_margin > 0.0 && m.disk_margin < 2.0).then_some(m.disk_margin);

@@ -26,6 +26,7 @@
 //!     pid: Pid { kp: 0.27, ki_per_s: 60.0, kd_s: 3.7e-4, derivative_filter_s: 12e-6 },
 //!     lowpass: vec![],
 //!     notch: vec![],
+//!     biquad: vec![],
 //!     feedforward: None,
 //! };
 //! let (sampled, sections) = (DiscretePlant::of(&plant, 39.6e-6)?, controller.sections()?);

@@ -55,12 +55,16 @@ pub(super) fn is_mat(file: &str, bytes: &[u8]) -> Result<bool, FrfError> {
     Ok(matches!(version, [0, 1, b'I', b'M'] | [1, 0, b'M', b'I']))
 }
 
-/// The elements of the file, compressed ones inflated, and whether their numbers have the low byte first.
-pub(super) fn elements<'a>(
-    file: &str,
-    bytes: &'a [u8],
-    settings: &ReadSettings,
-) -> Result<(Vec<Cow<'a, [u8]>>, bool), FrfError> {
+/// The elements of a file.
+pub(super) struct Elements<'a> {
+    /// Compressed ones inflated.
+    all: Vec<Cow<'a, [u8]>>,
+    /// Whether their numbers have the low byte first.
+    little: bool,
+}
+
+/// The elements of the file.
+pub(super) fn elements<'a>(file: &str, bytes: &'a [u8], settings: &ReadSettings) -> Result<Elements<'a>, FrfError> {
     let little = bytes[126] == b'I';
     let mut rest = Cursor { bytes: &bytes[HEADER..], little };
     let mut left = settings.inflated_limit_bytes;
@@ -82,17 +86,14 @@ pub(super) fn elements<'a>(
             .ok_or(FrfError::InflatedTooLarge { file: file.to_owned(), limit_bytes: settings.inflated_limit_bytes })?;
         out.push(Cow::Owned(all));
     }
-    Ok((out, little))
+    Ok(Elements { all: out, little })
 }
 
 /// The variables in those elements; what has no name belongs to MATLAB itself.
-pub(super) fn variables<'a>(
-    file: &str,
-    elements: &'a [Cow<'a, [u8]>],
-    little: bool,
-) -> Result<Vec<Variable<'a>>, FrfError> {
+pub(super) fn variables<'a>(file: &str, elements: &'a Elements<'_>) -> Result<Vec<Variable<'a>>, FrfError> {
+    let little = elements.little;
     let mut out = Vec::new();
-    for (i, element) in elements.iter().enumerate() {
+    for (i, element) in elements.all.iter().enumerate() {
         let mut cursor = Cursor { bytes: element, little };
         let found = match cursor.element() {
             Some((MATRIX, inside)) => matrix(inside, little, DEEPEST),

@@ -53,8 +53,8 @@ pub(super) fn columns(
     settings: &ReadSettings,
     notes: &mut Vec<Note>,
 ) -> Result<Columns, FrfError> {
-    let (elements, little) = elements(file, bytes, settings)?;
-    let variables = variables(file, &elements, little)?;
+    let elements = elements(file, bytes, settings)?;
+    let variables = variables(file, &elements)?;
     let mut found = Found::default();
     for (name, value) in variables {
         found.sort_in("", name, value);

@@ -245,7 +245,7 @@ mod tests {
     fn one_plant_in_every_text_is_the_same_plant() {
         let im = (25e6f64 - 1e4).sqrt();
         let texts = [
-            ("p.m", format!("% a stage\nclear all\nnum = [3e9 2.7e12]; den = [1, 240 25008e3 ... goes on\n 1e9 0];\nP = tf(num, den, 'InputDelay', 1e-4);\n")),
+            ("p.m", "% a stage\nclear all\nnum = [3e9 2.7e12]; den = [1, 240 25008e3 ... goes on\n 1e9 0];\nP = tf(num, den, 'InputDelay', 1e-4);\n".to_owned()),
             ("p.m", format!("P = zpk(-900, [0; -40; -100+{im}i; -100-{im}i], 3e9);\nP.InputDelay = 2*50e-6;\n")),
             ("p.m", "A = [0 1 0 0\n 0 0 1 0\n 0 0 0 1\n 0 -1e9 -25008e3 -240];\nB = [0 0 0 1]'; C = [2.7e12 3e9 0 0]; D = 0;\nsys = ss(A,B,C,D);\ndelay_s = 1e-4;".into()),
             ("p.py", format!("import control as ct\nimport numpy as np\nP = ct.zpk([-900], [0, -40, -100+{im}j, -100 - {im}j], gain=3e9)\ndelay_s = 1e-4 # s\n")),

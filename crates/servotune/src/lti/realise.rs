@@ -132,7 +132,8 @@ mod tests {
         let both = |all: &[Complex<f64>]| -> Vec<Complex<f64>> {
             all.iter().flat_map(|r| if r.im == 0.0 { vec![*r] } else { vec![*r, r.conj()] }).collect()
         };
-        let cases: [(&[Complex<f64>], &[Complex<f64>]); 5] = [
+        type Roots<'a> = &'a [Complex<f64>];
+        let cases: [(Roots<'_>, Roots<'_>); 5] = [
             (&[c(-30.0, 7e3), c(-90.0, 3e4)], &[c(-80.0, 360.0), c(-40.0, 7.5e3), c(-100.0, 3.2e4)]),
             (&[c(900.0, 0.0)], &[c(0.0, 0.0), c(0.0, 0.0), c(-6e3, 0.0), c(-40.0, 7e3)]),
             (&[], &[c(250.0, 0.0), c(-250.0, 0.0), c(-6e3, 0.0)]),

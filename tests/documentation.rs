@@ -1,0 +1,136 @@
+//! The documents: links lead somewhere, every page of the site is in its list, commands are understood, and the first tutorial runs as written.
+#![allow(clippy::unwrap_used)]
+
+mod program_common;
+
+use program_common::{folder, root, servotune, servotune_with};
+use std::path::{Path, PathBuf};
+
+fn markdown(dir: &str) -> Vec<PathBuf> {
+    let mut all: Vec<PathBuf> = std::fs::read_dir(root(dir)).unwrap().map(|e| e.unwrap().path()).collect();
+    all.retain(|p| p.extension().is_some_and(|e| e == "md"));
+    all.sort();
+    all
+}
+
+/// Every file with words for a reader.
+fn documents() -> Vec<PathBuf> {
+    let mut all = vec![root("README.md"), root("examples/README.md")];
+    for dir in ["specs", "specs/decisions", "results", "book/src", "examples/stage", "examples/galvo", "examples/vcm"] {
+        all.extend(markdown(dir));
+    }
+    all
+}
+
+/// Targets of `[words](target)`, code left out.
+fn links(text: &str) -> Vec<String> {
+    let mut fenced = false;
+    let mut found = Vec::new();
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+        }
+        if fenced {
+            continue;
+        }
+        // Inside backticks nothing is a link.
+        let plain: String = line.split('`').step_by(2).collect();
+        for part in plain.split("](").skip(1) {
+            if let Some((target, _)) = part.split_once(')') {
+                found.push(target.to_owned());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn every_link_and_every_include_leads_to_a_file() {
+    let (mut wrong, mut seen) = (Vec::new(), 0);
+    for file in documents() {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let beside = file.parent().unwrap();
+        let includes = text.split("{{#include ").skip(1).filter_map(|s| s.split_once("}}").map(|(p, _)| p.to_owned()));
+        for target in links(&text).into_iter().chain(includes) {
+            let path = target.split('#').next().unwrap();
+            if path.is_empty() || path.contains("://") || path.starts_with("mailto:") {
+                continue;
+            }
+            seen += 1;
+            if !beside.join(path).exists() {
+                wrong.push(format!("{}: {target}", file.display()));
+            }
+        }
+    }
+    assert!(seen > 60, "{seen} links");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_page_of_the_site_is_in_its_list() {
+    let list = std::fs::read_to_string(root("book/src/SUMMARY.md")).unwrap();
+    for page in markdown("book/src") {
+        let name = page.file_name().unwrap().to_string_lossy().into_owned();
+        assert!(name == "SUMMARY.md" || list.contains(&format!("({name})")), "{name}");
+    }
+}
+
+/// The commands of a document, words as a shell would cut them where nothing is quoted; comments behind them are left out.
+fn commands(file: &Path) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(file).unwrap();
+    let mut all: Vec<String> = Vec::new();
+    let mut fenced = false;
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+        } else if fenced {
+            all.push(line.trim().to_owned());
+        } else {
+            all.extend(line.split('`').skip(1).step_by(2).map(str::to_owned));
+        }
+    }
+    let bare = |line: &String| line.strip_prefix("servotune ").map(|s| s.split(" #").next().unwrap().to_owned());
+    let whole = |line: &String| !line.contains(['|', '"', '\'', '(', ';']) && !line.contains("&&");
+    all.iter()
+        .filter(|l| whole(l))
+        .filter_map(bare)
+        .map(|l| l.split_whitespace().map(str::to_owned).collect())
+        .collect()
+}
+
+/// `--help` at the end is reached only where every word before it is one of the command's.
+#[test]
+fn every_command_in_readme_and_site_is_understood() {
+    let mut files = vec![root("README.md")];
+    files.extend(markdown("book/src"));
+    let mut seen = 0;
+    for file in files {
+        for words in commands(&file) {
+            // A command named in passing, or with placeholders for options.
+            if words.iter().any(|w| w == "..." || w == "FILE...") {
+                continue;
+            }
+            let asked: Vec<&str> = words.iter().map(String::as_str).chain(["--help"]).collect();
+            let ran = servotune(&asked);
+            assert_eq!(ran.code, 0, "{}: {}: {}", file.display(), words.join(" "), ran.err);
+            seen += 1;
+        }
+    }
+    assert!(seen > 50, "{seen} commands");
+}
+
+#[test]
+fn the_first_tutorial_runs_as_written() {
+    let dir = folder("tutorial");
+    let text = std::fs::read_to_string(root("book/src/sweep_to_table.md")).unwrap();
+    let blocks = text.split("```sh\n").skip(1).filter_map(|s| s.split_once("```").map(|(b, _)| b));
+    let mut ran_all = Vec::new();
+    for line in blocks.flat_map(str::lines).filter(|l| !l.is_empty()) {
+        let words: Vec<&str> = line.strip_prefix("servotune ").unwrap().split_whitespace().collect();
+        let ran = servotune_with(&words, Some(&dir), None);
+        assert_eq!(ran.code, 0, "{line}: {}{}", ran.out, ran.err);
+        ran_all.push(words[0].to_owned());
+    }
+    assert_eq!(ran_all, ["init", "check", "margins", "identify", "tune", "verify", "export", "export"]);
+    assert!(dir.join("gains.certificate.json").is_file() && dir.join("report.html").is_file());
+}
