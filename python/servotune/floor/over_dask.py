@@ -26,21 +26,10 @@ def engine(workers: int) -> Iterator[Spread]:
             client = stack.enter_context(Client(stack.enter_context(cluster)))
 
         def spread(task: Task, batches: list[list[int]]) -> Iterator[Found]:
-            # The library goes to every worker once. It is a task of its own, not scattered: what is scattered is gone with the workers that hold it.
-            shared = client.submit(handed, task, pure=False, retries=TRIES)
-            for future in as_completed(client.map(call, batches, task=shared, pure=False, retries=TRIES)):
+            # Each batch carries the library: a batch that waits for anything of another worker was seen to wait for ever once that worker had died.
+            for future in as_completed(client.map(task, batches, key="slots", pure=False, retries=TRIES)):
                 yield future.result()
                 # What came back is in the store: neither side keeps it.
                 future.release()
 
         yield spread
-
-
-def handed(task: Task) -> Task:
-    """The task itself."""
-    return task
-
-
-def call(batch: list[int], task: Task) -> Found:
-    """One batch on a worker."""
-    return task(batch)
