@@ -36,6 +36,36 @@ fn friction_that_the_given_model_conceals_is_named_down_to_the_noise() {
     assert!(h.rms_after < 1.5 * h.noise_floor && h.rms_after < 0.02 * h.rms_before, "{h:?}");
 }
 
+/// The model as a fit under a dead band leaves it: next to nothing of it is the machine's.
+fn hopeless() -> Plant {
+    let (b, k, c) = (30.0 * GIVEN.b, 7.0 * GIVEN.k, 200.0 * GIVEN.c);
+    let body =
+        Body::SecondOrder { dc_gain: b / k, natural_frequency_rad_s: k.sqrt(), damping_ratio: 0.5 * c / k.sqrt() };
+    Plant { body, delay_s: 0.2 * GIVEN.delay, ..plant() }
+}
+
+#[test]
+fn a_dead_band_under_which_the_given_model_was_fitted_is_named_and_the_plant_comes_back() {
+    let half = 0.004;
+    let mut dead = Vec::new();
+    for (i, (entry, r)) in records(&GIVEN).into_iter().enumerate() {
+        let u = r.command.clone();
+        let acting = move |t: f64| {
+            let held = if t < 0.0 { 0.0 } else { u[((t / T) as usize).min(N - 1)] };
+            held.signum() * (held.abs() - half).max(0.0)
+        };
+        let position = respond_to(&GIVEN, &acting, 700 + i as u64);
+        dead.push((entry, Record { position, ..r }));
+    }
+    let d = of(dead, &hopeless(), NominalNoise::default());
+    assert_eq!(d.verdict, Verdict::Named, "{:?} {:?}", d.findings, d.remarks);
+    assert_eq!((d.findings.len(), d.findings[0].effect.as_str()), (1, "dead_band"), "{:?}", d.findings);
+    let found = &d.findings[0].parameters["half_width"];
+    assert!((found.value / half - 1.0).abs() < 0.05, "{found:?}");
+    let h = d.fit.holdout.unwrap();
+    assert!(h.rms_after < 1.2 * h.noise_floor && h.rms_after < 0.01 * h.rms_before, "{h:?}");
+}
+
 #[test]
 fn what_is_offered_is_never_worse_than_what_was_given() {
     // The reading folds over, which no law of a body is like.

@@ -44,6 +44,8 @@ pub struct Bench {
     pub repeats: Vec<(usize, Vec<f64>)>,
     /// The encoder's count, where every fitted position lies on one.
     pub grid: Option<Grid>,
+    /// The law that the plant was cleared of before the search, where it was.
+    pub foretold: Option<Chosen>,
 }
 
 /// Rounding over the noise of repeats from which repeats round alike and their mean does not take it away.
@@ -238,6 +240,7 @@ impl Bench {
             scene,
             repeats,
             grid,
+            foretold: None,
         };
         bench.scene.noise = bench.levels.sensor_rms;
         bench.smooth(&carrier, &sampled, &bench.means.clone(), &vec![Vec::new(); bench.means.len()]);

@@ -10,7 +10,7 @@ use super::columns::columns_along;
 use super::fitted::refit;
 use super::judge::size;
 use super::refit::Chosen;
-use super::run::Run;
+use super::run::{Run, mean_run};
 use super::select::Model;
 use super::simulation_problem::{Problem, descended};
 use crate::lti::{Body, Plant};
@@ -25,8 +25,8 @@ const LATER: usize = 4;
 /// Share of the linear plant's equation error that a law must leave less than to be tried by simulation.
 const TELLS: f64 = 0.7;
 /// Laws that are tried by simulation, as they stand and fitted.
-const TRIED: usize = 6;
-const FITTED: usize = 2;
+const TRIED: usize = 12;
+const FITTED: usize = 3;
 /// Error of the simulation with the law over that of the linear refit below which the plant is taken.
 const FAR_BETTER: f64 = 0.5;
 /// Error of the linear refit over the sensor's noise from which it is far off at all.
@@ -89,9 +89,22 @@ impl Smoothed {
     }
 }
 
+/// White noise of the mean runs (rms): the median of what a cubic through four samples leaves.
+fn roughness(means: &[Run]) -> f64 {
+    let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
+    let mut all: Vec<f64> = means.iter().flat_map(|m| m.position.windows(4).map(third)).collect();
+    all.sort_by(f64::total_cmp);
+    // The root of 1 + 9 + 9 + 1, and the median of a normal's magnitude.
+    all.get(all.len() / 2).map_or(0.0, |m| m / (20f64.sqrt() * 0.6745))
+}
+
 /// The balance of all mean runs at one smoothing.
 struct Balance<'a> {
     bench: &'a Bench,
+    /// Mean runs as recorded: what was taken out of them around a bent plant (lines) is none of theirs.
+    means: &'a [Run],
+    /// The machine with the size of the motion as it is seen here.
+    scene: Scene,
     width: f64,
     parts: Vec<Smoothed>,
 }
@@ -104,10 +117,15 @@ struct Balanced {
 }
 
 impl<'a> Balance<'a> {
-    fn of(bench: &'a Bench, width: f64) -> Balance<'a> {
+    fn of(bench: &'a Bench, means: &'a [Run], width: f64) -> Balance<'a> {
         let t = bench.scene.sample_time_s;
         let spindle = std::f64::consts::TAU * bench.scene.spindle_hz.unwrap_or(0.0);
-        Balance { bench, width, parts: bench.means.par_iter().map(|m| Smoothed::of(m, t, width, spindle)).collect() }
+        let parts: Vec<Smoothed> = means.par_iter().map(|m| Smoothed::of(m, t, width, spindle)).collect();
+        let moving = parts.iter().flat_map(|p| p.rows.iter().map(|&k| p.samples[k].v.abs()));
+        let speed = moving.fold(0.0f64, f64::max).max(1e-12);
+        let noise = roughness(means).min(bench.levels.sensor_rms);
+        let scene = Scene { speed, noise, ..bench.scene.clone() };
+        Balance { bench, means, scene, width, parts }
     }
 
     /// Columns that a command held between samples puts into the balance, early and late: what acts around a sample is the mean of the two beside it.
@@ -118,7 +136,7 @@ impl<'a> Balance<'a> {
 
     /// The balance with a law, or without.
     fn solved(&self, law: Option<(&'static dyn Effect, &[f64])>) -> Option<Balanced> {
-        let scene: &Scene = &self.bench.scene;
+        let scene = &self.scene;
         let weights = weights(self.width);
         let facts = law.map(|(e, _)| e.facts());
         let own = facts.map_or(0, |f| if f.fixed { 0 } else { f.columns });
@@ -130,7 +148,7 @@ impl<'a> Balance<'a> {
         }
         let (mut columns, mut target) = (vec![vec![0.0; total]; count], Vec::with_capacity(total));
         let mut from = 0;
-        for (r, (part, run)) in self.parts.iter().zip(&self.bench.means).enumerate() {
+        for (r, (part, run)) in self.parts.iter().zip(self.means).enumerate() {
             let to = from + part.rows.len();
             let raw = law.map_or(Vec::new(), |(e, inner)| columns_along(e, inner, scene, &part.samples));
             let mut u = run.input.clone();
@@ -212,7 +230,7 @@ impl<'a> Balance<'a> {
         };
         let effects: Vec<&'static dyn Effect> = library().iter().filter(bends).copied().collect();
         let best = |e: &&'static dyn Effect| -> Option<(f64, Balanced)> {
-            let grid = e.grid(&self.bench.scene);
+            let grid = e.grid(&self.scene);
             let all = grid.iter().filter_map(|inner| self.solved(Some((*e, inner))));
             let best = all.min_by(|a, b| a.left.total_cmp(&b.left))?;
             let share = best.left / linear.left;
@@ -222,15 +240,23 @@ impl<'a> Balance<'a> {
     }
 }
 
+/// A plant from which the search sets out, and the law that it was cleared of.
+pub(super) struct Cleared {
+    pub plant: Plant,
+    pub law: Option<Chosen>,
+}
+
 /// The plant to set out from, where the given one conceals what acts; none where the given one, or a refit of it, does.
-pub(super) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str)) -> Option<Plant> {
-    let mut laws: Vec<(f64, Balanced)> = SMOOTHINGS.iter().flat_map(|&w| Balance::of(bench, w).laws()).collect();
+pub(super) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str)) -> Option<Cleared> {
+    let means: Vec<Run> = bench.stack.segments.iter().map(|s| mean_run(&bench.runs, &s.runs)).collect();
+    let mut laws: Vec<(f64, Balanced)> =
+        SMOOTHINGS.iter().flat_map(|&w| Balance::of(bench, &means, w).laws()).collect();
     if laws.is_empty() {
         return None;
     }
     let mut own = bench.clone();
     let linear = refit(&mut own, iterations);
-    let whole: Vec<(&Run, usize)> = own.means.iter().zip(&own.stack.segments).map(|(m, s)| (m, s.runs.len())).collect();
+    let whole: Vec<(&Run, usize)> = means.iter().zip(&own.stack.segments).map(|(m, s)| (m, s.runs.len())).collect();
     let mut given = linear.clone();
     given.refitted.p.fill(0.0);
     let plain = |b: &Bench, m: &Model| {
@@ -266,15 +292,16 @@ pub(super) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str
         }
     }
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut best: Option<(f64, Plant)> = None;
+    let mut best: Option<(f64, Cleared)> = None;
     for (left, ground, model) in tried.into_iter().take(FITTED) {
         let fitted = descended(&ground, &model, None, &whole).unwrap_or(model);
         let after = plain(&ground, &fitted).min(left);
         if best.as_ref().is_none_or(|(b, _)| after < *b) {
-            best = Some((after, ground.form.plant(&fitted.refitted.p)));
+            let law = fitted.chosen.first().cloned();
+            best = Some((after, Cleared { plant: ground.form.plant(&fitted.refitted.p), law }));
         }
     }
-    best.filter(|(left, _)| *left < FAR_BETTER * FAR_BETTER * least).map(|(_, plant)| plant)
+    best.filter(|(left, _)| *left < FAR_BETTER * FAR_BETTER * least).map(|(_, cleared)| cleared)
 }
 
 /// The same ground around another plant, for simulations of plain errors: its noise and its motion stay.

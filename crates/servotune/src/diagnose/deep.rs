@@ -68,6 +68,28 @@ pub(super) fn felt_trial(bench: &Bench, model: &Model, chosen: Vec<Chosen>) -> O
     Some(Model { evidence, ..s })
 }
 
+/// The law that the plant was cleared of, fitted by simulation as a first step; whether there is one.
+pub(super) fn foretold(bench: &Bench, model: &Model, step: &mut Step) -> bool {
+    let Some(law) = bench.foretold.clone() else { return false };
+    let mut start = model.clone();
+    start.refitted.p.fill(0.0);
+    start.refitted.plant = bench.form.given.clone();
+    let Some(found) = felt_trial(bench, &start, vec![law.clone()]) else { return false };
+    let candidate = Candidate {
+        effect: law.effect,
+        setting: found.chosen[0].setting.clone(),
+        gain: model.evidence - found.evidence,
+        concealed: 0.0,
+        points: law.effect.grid(&bench.scene).len(),
+        strengths: if law.effect.facts().fixed { 1 } else { law.setting.strengths.len() },
+        continuous: law.continuous,
+        range: law.range,
+    };
+    step.candidates.push(candidate);
+    step.tried.push((step.candidates.len() - 1, found));
+    true
+}
+
 /// Whether a push has one strength in the records of several moves: it comes with the clock of the record, and not with a move.
 pub(super) fn together(c: &Candidate) -> bool {
     let s = &c.setting.strengths;

@@ -99,13 +99,13 @@ pub fn diagnose(
         }
     }
     let sound = hygiene.finding.is_none();
-    if let Some(plant) =
-        sound.then(|| cleared(&bench, settings.select.iterations, &mut |step: &str| progress(step))).flatten()
-    {
+    let start = sound.then(|| cleared(&bench, settings.select.iterations, &mut |step: &str| progress(step))).flatten();
+    if let Some(start) = start {
         remarks.push(
             "the search set out from a plant fitted together with a law: the given one conceals what acts".into(),
         );
-        bench = Bench::new(&plant, bench.runs, sample_time_s, case.spindle_hz)?;
+        bench = Bench::new(&start.plant, bench.runs, sample_time_s, case.spindle_hz)?;
+        bench.foretold = start.law;
     }
     let bumps = set_aside(&mut bench, given, case.spindle_hz, settings.select.iterations)?;
     whole.iter_mut().zip(&bench.runs).for_each(|(w, r)| w.bumped = r.bumped);

@@ -30,6 +30,12 @@ pub struct Chosen {
     pub step: usize,
 }
 
+impl std::fmt::Debug for Chosen {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {:?}", self.effect.facts().name, self.setting)
+    }
+}
+
 impl Chosen {
     /// The strengths in one segment of the stack.
     pub fn own(&self, segment: usize) -> &[f64] {

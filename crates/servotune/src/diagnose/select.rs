@@ -2,7 +2,7 @@
 
 use super::bench::Bench;
 use super::bootstrap::{Bootstrap, bootstrap};
-use super::deep::{DEEP, FELT, SPENT, by_simulation_first, deep, felt_scan, felt_trial, scan, together};
+use super::deep::{DEEP, FELT, SPENT, by_simulation_first, deep, felt_scan, felt_trial, foretold, scan, together};
 use super::fitted::{fitted, fitted_from_both, refit, settled, taken_by_last};
 use super::leftover::{Leftover, leftover};
 use super::locked::follows_motion;
@@ -257,8 +257,11 @@ pub fn select(
                 step.tried.push((i, tried));
             }
         }
-        let to_the_end = (settings.by_simulation && model.chosen.is_empty() && deep(&step))
-            .then(|| by_simulation_first(bench, &mut step));
+        let first = settings.by_simulation && model.chosen.is_empty();
+        let to_the_end = first && (foretold(bench, &model, &mut step) || deep(&step));
+        if to_the_end && bench.foretold.is_none() {
+            by_simulation_first(bench, &mut step);
+        }
         // Repeats take part with their mean: what differs from record to record by its nature is no first thought.
         let paid = |t: &(usize, Model)| {
             let c = &step.candidates[t.0];
@@ -312,7 +315,7 @@ pub fn select(
                 }
                 model = fitted(bench, next.chosen.clone(), &next.refitted.p, settings.iterations);
                 // What its column along a noisy motion falls short by is nobody's: from here on simulation tells.
-                if (felt || to_the_end.is_some()) && model.cost > next.cost {
+                if (felt || to_the_end) && model.cost > next.cost {
                     (model, felt) = (next, true);
                     if model.excess_sigma() < SPENT {
                         break;
