@@ -317,7 +317,7 @@ pub fn select(
                 // What its column along a noisy motion falls short by is nobody's: from here on simulation tells.
                 if (felt || to_the_end) && model.cost > next.cost {
                     (model, felt) = (next, true);
-                    if model.excess_sigma() < SPENT {
+                    if model.excess_sigma() < SPENT || model.excess() < FORM * baseline.excess() {
                         break;
                     }
                 }
@@ -360,6 +360,9 @@ pub fn select(
 pub(super) fn begun(bench: &Bench, inner: &[f64], effect: &dyn Effect) -> usize {
     effect.free(inner, &bench.scene, 1).len() * bench.stack.segments.len()
 }
+
+/// Share of the linear refit's excess that may be the simulated laws' own form: what is left below it is given to no further law.
+const FORM: f64 = 0.045;
 
 /// Most times that a step is made again because the model before it was not at its best, and the fall of the sum of squares that shows it,
 /// as a number and as a share of the step's gain.
