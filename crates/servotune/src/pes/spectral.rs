@@ -222,6 +222,13 @@ impl SpectralPes {
         self.command.as_ref().map_or(0.0, |c| self.command_peak(c, chain, work))
     }
 
+    /// The command's peak alone, 0 where it is not asked for; of the bins nothing is read.
+    pub fn peak(&self, chain: &[Section], work: &mut SpectralWork) -> f64 {
+        self.lines.close(chain, &mut work.lines);
+        wide(|| self.fold(work));
+        self.command.as_ref().map_or(0.0, |c| self.command_peak(c, chain, work))
+    }
+
     /// Share of the energy in the bins that comes from lines outside the sweep, where the plant is a continuation.
     pub fn continuation_share(&self, chain: &[Section], work: &mut SpectralWork) -> f64 {
         self.write(chain, work, &mut Vec::new());

@@ -337,7 +337,7 @@ fn peak_slopes(
     out.clear();
     for slope in sections {
         moved[slope.section] = slope.around[1];
-        let there = s.write(&moved, &mut b.spectral, &mut b.drawn);
+        let there = s.peak(&moved, &mut b.spectral);
         moved[slope.section] = chain[slope.section];
         out.push((there - peak) / SECTION_STEP);
     }
