@@ -5,8 +5,8 @@
 //! Spec: `specs/certificate.md`.
 
 use super::{
-    BoxWatch, Certificate, Inputs, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, Verdict, VerifyError,
-    VerifySettings, Word, certify_watched,
+    BoxWatch, Certificate, Inputs, LEAST_DAMPING, Source, Stability, SweepAssumption, Uncertainty, Verdict,
+    VerifyError, VerifySettings, Word, certify_watched,
 };
 use crate::controller::Controller;
 use crate::frf::Sweep;
@@ -197,7 +197,9 @@ fn prove(job: &Assurance<'_>, table: &GainTable, watch: &Watched<'_>) -> Result<
 fn room(c: &Certificate, wanted: &[Requirement], guard: f64, room: &mut Vec<f64>) -> (Vec<String>, bool) {
     room.resize(wanted.len(), 0.0);
     let (mut names, mut grown) = (Vec::new(), false);
-    for case in &c.cases {
+    // What may hide between a sweep's points and leaves its stability open is for another sweep, not for more room.
+    let open = |s: Stability| c.sweep.is_some() && s != Stability::Stable;
+    for case in c.cases.iter().filter(|case| !open(case.bounds.stability)) {
         for ((limit, w), room) in case.limits.iter().zip(wanted).zip(room.iter_mut()) {
             if limit.verdict == Verdict::Proved {
                 continue;
