@@ -39,11 +39,10 @@ pub(super) fn block(x: &Exported<'_>, law: &Law<'_>) -> String {
         true => format!("Command := LIMIT({}, x, {});\n", real(-law.limit), real(law.limit)),
         false => "Command := x;\n".to_owned(),
     };
-    let ahead = if x.controller.feedforward.is_some() {
-        "    Before, Now, Next : LREAL; (* reference one sample ago, now, one sample ahead *)\n"
-    } else {
-        ""
-    };
+    let ahead = x.controller.feedforward.map_or(String::new(), |f| match f.ahead_samples {
+        0 => "    Before, Now, Next : LREAL; (* reference one sample ago, now, one sample ahead *)\n".into(),
+        n => format!("    Before, Now, Next : LREAL; (* reference {}, {n} and {} samples ahead *)\n", n - 1, n + 1),
+    });
     let rows = x.test.error.iter().zip(&x.test.command).zip(&x.test.reference);
     let rows: String = rows.map(|((e, u), r)| format!("   {} {} {}\n", real(*r), real(*e), real(*u))).collect();
     format!(

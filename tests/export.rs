@@ -36,7 +36,11 @@ fn run_header(header: &Path, main: &str) -> String {
 fn whole_controller(dir: &Path) -> String {
     let text = std::fs::read_to_string(root(NOMINAL)).unwrap();
     let file = dir.join("controller.toml");
-    std::fs::write(&file, text + "\n[feedforward]\nfactor = 0.9\nvelocity_s = 1e-3\nacceleration_s2 = 2e-6\n").unwrap();
+    std::fs::write(
+        &file,
+        text + "\n[feedforward]\nfactor = 0.9\nvelocity_s = 1e-3\nacceleration_s2 = 2e-6\nahead_samples = 3\n",
+    )
+    .unwrap();
     file.to_str().unwrap().to_owned()
 }
 

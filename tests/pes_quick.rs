@@ -81,7 +81,7 @@ fn controller(filters: usize) -> Controller {
         lowpass,
         notch: (0..filters.saturating_sub(2)).map(notch).collect(),
         biquad: vec![],
-        feedforward: Some(Feedforward { factor: 0.5, velocity_s: 1e-5, acceleration_s2: 9.8e-8 }),
+        feedforward: Some(Feedforward { factor: 0.5, velocity_s: 1e-5, acceleration_s2: 9.8e-8, ahead_samples: 0 }),
     }
 }
 
@@ -138,7 +138,7 @@ fn plain_figure(
     weights: (&[f64], &[f64]),
 ) -> f64 {
     let mut plain = scene.workspace(sampled, law.0.len());
-    let feedforward = Feedforward { factor: 1.0, velocity_s: law.1[0], acceleration_s2: law.1[1] };
+    let feedforward = Feedforward { factor: 1.0, velocity_s: law.1[0], acceleration_s2: law.1[1], ahead_samples: 0 };
     scene.run(sampled, law.0, Some(&feedforward), law.2, &mut plain);
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     dot(scene.window(&plain), weights.0) + dot(&plain.command, weights.1)
@@ -184,7 +184,7 @@ fn slopes_are_those_of_differences_of_the_plain_simulation() {
             let quick = QuickScene::new(&profile, &sampled).unwrap();
             let mut work = QuickWork::default();
             let ahead = [1e-5, 5e-8];
-            let feedforward = Feedforward { factor: 0.5, velocity_s: 2e-5, acceleration_s2: 1e-7 };
+            let feedforward = Feedforward { factor: 0.5, velocity_s: 2e-5, acceleration_s2: 1e-7, ahead_samples: 0 };
             // Every other loop meets its limit on the way.
             quick.run(&chain, Some(&feedforward), None, Asked::all(), &mut work);
             let limit = ((i + filters) % 2 == 0).then(|| 0.8 * work.peak(Record::Drawn).1);
@@ -315,7 +315,7 @@ fn the_step_sees_feed_forward_one_sample_ahead() {
     };
     let sampled = DiscretePlant::of_modal(&form, T).unwrap();
     let open = [Section { b0: 0.0, b1: 0.0, b2: 0.0, a1: 0.0, a2: 0.0 }];
-    let feedforward = Feedforward { factor: 2.0, velocity_s: 3.0, acceleration_s2: 0.0 };
+    let feedforward = Feedforward { factor: 2.0, velocity_s: 3.0, acceleration_s2: 0.0, ahead_samples: 0 };
     let mut work = StepWork::default();
     StepScene::new(&sampled, 10).run(&open, Some(&feedforward), None, 10, &mut work);
     // 6 r' with r' = 1/(2T) for the sample before the step and for its own: 3 T of it at the step, 6 from one sample later on.

@@ -32,7 +32,7 @@ fn controller() -> Controller {
         lowpass: vec![Lowpass { frequency_hz: 7000.0, damping_ratio: 0.7 }],
         notch: vec![Notch { frequency_hz: 1222.0, zero_damping_ratio: 0.05, pole_damping_ratio: 0.25 }],
         biquad: vec![],
-        feedforward: Some(Feedforward { factor: 0.5, velocity_s: 1e-5, acceleration_s2: 9.8e-8 }),
+        feedforward: Some(Feedforward { factor: 0.5, velocity_s: 1e-5, acceleration_s2: 9.8e-8, ahead_samples: 0 }),
     }
 }
 

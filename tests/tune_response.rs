@@ -25,7 +25,7 @@ fn dense() -> servotune::frf::Frf {
 fn the_spectrum_gives_the_simulated_pes() {
     let mut c = start_controller();
     c.output_limit = None;
-    c.feedforward = Some(Feedforward { factor: 0.5, velocity_s: 1e-5, acceleration_s2: 9.8e-8 });
+    c.feedforward = Some(Feedforward { factor: 0.5, velocity_s: 1e-5, acceleration_s2: 9.8e-8, ahead_samples: 0 });
     let mut profile = paper_profile();
     profile.noise = Noise { spindle_hz: 120.0, ..Noise::default() };
     profile.noise.runout = vec![Runout { order: 7, amplitude: 0.001, phase_deg: 30.0 }];

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use nalgebra::Complex;
-use servotune::controller::{Controller, Notch, Pid};
+use servotune::controller::{Controller, Feedforward, Notch, Pid};
 use servotune::document::sha256_hex;
 use servotune::feedback::{CurveLimit, CurveSide, ModelLoop, margins};
 use servotune::lti::{DiscretePlant, FrequencyResponse, Plant, PlantFile};
@@ -10,8 +10,8 @@ use servotune::numeric::random::Random;
 use servotune::tune::{GainTable, Machine, Provenance, Route, Spec, Summary, judge};
 use servotune::twin::plants::random_plant;
 use servotune::verify::{
-    Certificate, Inputs, LEAST_DAMPING, ProvenLimit, Source, SweepAssumption, Uncertainty, VerifySettings, Word,
-    certify,
+    Certificate, Inputs, LEAST_DAMPING, ProvenLimit, Source, SweepAssumption, Uncertainty, Verdict, VerifySettings,
+    Word, certify,
 };
 use std::f64::consts::TAU;
 
@@ -31,9 +31,20 @@ fn law(kp: f64, ki_per_s: f64, kd_s: f64, notch: Option<Notch>) -> Controller {
 
 /// The certificate of a controller on a plant file.
 fn proof(plant: &str, c: &Controller, spec_text: &str, uncertainty: Uncertainty) -> Certificate {
+    proof_of_write(plant, c, spec_text, None, uncertainty)
+}
+
+/// The same with the profile that the spec names.
+fn proof_of_write(
+    plant: &str,
+    c: &Controller,
+    spec_text: &str,
+    profile: Option<&str>,
+    uncertainty: Uncertainty,
+) -> Certificate {
     let read: PlantFile = servotune::document::parse_toml("plant".as_ref(), plant).unwrap();
     let model = Plant::try_from(read).unwrap();
-    let spec = Spec::parse(spec_text, None).unwrap();
+    let spec = Spec::parse(spec_text, profile).unwrap();
     let judged = judge(&Machine::Model(&model), c, &spec).unwrap();
     let provenance = Provenance {
         program: "test".into(),
@@ -51,13 +62,14 @@ fn proof(plant: &str, c: &Controller, spec_text: &str, uncertainty: Uncertainty)
     };
     let table = GainTable::new(c, None, Summary::of(&judged), provenance).unwrap();
     let source = |file: &str, text: String| Source { file: file.into(), text };
+    let profile = profile.map(|text| source("profile.toml", text.into()));
     let inputs = Inputs {
         gains: &source("gains.toml", table.text().unwrap()),
         plants: &[source("plant.toml", plant.into())],
         sweeps: &[],
         assumption: SweepAssumption { least_damping: LEAST_DAMPING, hold_included: false },
         spec: &source("spec.toml", spec_text.into()),
-        profile: None,
+        profile: profile.as_ref(),
         word: Word::Double,
         uncertainty,
     };
@@ -242,4 +254,55 @@ fn an_integrator_has_its_closed_forms() {
     let rms = limit(&certificate, "command_rms").proven;
     assert!(rms.low.unwrap() <= kp * y && kp * y <= rms.high.unwrap(), "{rms:?} {}", kp * y);
     assert!(certificate.proved);
+}
+
+/// An integrator under kp with feed-forward ahead of a move: position and error by the recursion y += T (kp e + v r'), written out here.
+#[test]
+fn the_end_of_a_move_is_that_of_an_integrator_s_recursion() {
+    let plant =
+        "position_unit = \"um\"\ncommand_unit = \"V\"\n[plant]\ngain = 1.0\ndelay_s = 0.0\npoles_rad_s = [0.0]\n";
+    let profile = "[spiral]\nvelocity = -40.0\ndistance = 0.3\nacceleration_time_s = 2e-3\nstart_s = 1e-3\nduration_s = 0.03\n\
+                   [pes]\nsample_rate_hz = 25000.0\nwindow = [10, 200]\n";
+    let (kp, velocity_s, ahead) = (700.0, 1.05, 2u32);
+    let mut c = law(kp, 0.0, 0.0, None);
+    c.feedforward = Some(Feedforward { factor: 1.0, velocity_s, acceleration_s2: 0.0, ahead_samples: ahead });
+    // Ramps of 2 ms and 5.5 ms at speed between them: 40 (5.5 + 2) 1e-3 = 0.3.
+    let end = 1e-3 + 9.5e-3;
+    let reference = |k: i64| {
+        let (since, full) = (k as f64 * T - 1e-3, 40.0);
+        let gone = match since {
+            s if s <= 0.0 => 0.0,
+            s if s <= 2e-3 => 0.5 * full / 2e-3 * s * s,
+            s if s <= 7.5e-3 => full * (s - 1e-3),
+            s if s <= 9.5e-3 => 0.3 - 0.5 * full / 2e-3 * (9.5e-3 - s).powi(2),
+            _ => 0.3,
+        };
+        -gone
+    };
+    let band = 2e-5;
+    let (mut y, mut beyond, mut last) = (0.0, 0.0f64, 0);
+    for k in 0..(0.03 / T) as i64 {
+        beyond = beyond.max(-y - 0.3);
+        if (reference(k) - y).abs() > band {
+            last = k;
+        }
+        let at = k + i64::from(ahead);
+        let speed = (reference(at + 1) - reference(at - 1)) / (2.0 * T);
+        y += T * (kp * (reference(k) - y) + velocity_s * speed);
+    }
+    let settled = (last + 1) as f64 * T - end;
+    assert!(settled > 2.0 * T && beyond > 1e-4, "{settled} {beyond}");
+    let spec = format!(
+        "profile = \"profile.toml\"\nsample_time_s = {T:?}\n[limits.move]\novershoot = {:?}\nsettling_s = {:?}\nband = {band:?}\n",
+        1.01 * beyond,
+        settled - 0.5 * T
+    );
+    let certificate = proof_of_write(plant, &c, &spec, Some(profile), Uncertainty::default());
+    let over = limit(&certificate, "move.overshoot");
+    let [low, high] = [over.proven.low.unwrap(), over.proven.high.unwrap()];
+    assert!(low <= beyond * (1.0 + 1e-9) && beyond <= high * (1.0 + 1e-9) && high - low < 1e-8 * 0.3, "{over:?}");
+    assert_eq!(over.verdict, Verdict::Proved);
+    let late = limit(&certificate, "move.settling_s");
+    assert!((late.proven.low.unwrap() - settled).abs() < 1e-9, "{late:?} {settled}");
+    assert_eq!(late.verdict, Verdict::Violated);
 }

@@ -31,6 +31,8 @@ pub(super) fn figure_words<'a>(what: What, units: Units<'a>) -> (String, &'a str
         What::Bandwidth => ("closed-loop bandwidth".into(), "Hz"),
         What::Overshoot => ("overshoot of a step".into(), "%"),
         What::Settling => ("settling of a step to 2 %".into(), "s"),
+        What::MoveOvershoot => ("beyond the end of the move".into(), units.position),
+        What::MoveSettling => ("settling after the move".into(), "s"),
         What::Curve { index } => (format!("curve {}, worst ratio", index + 1), "ratio"),
     }
 }

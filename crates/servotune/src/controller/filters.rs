@@ -24,8 +24,8 @@ pub struct Notch {
     pub pole_damping_ratio: f64,
 }
 
-/// Feed-forward from the reference, known ahead: factor (velocity_s r' + acceleration_s2 r'').
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Feed-forward from the reference, known ahead: factor (velocity_s r' + acceleration_s2 r''), by central differences.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Feedforward {
     /// The paper's FF factor, scales both terms.
@@ -37,4 +37,21 @@ pub struct Feedforward {
     /// Command per position_unit/s².
     #[serde(default)]
     pub acceleration_s2: f64,
+    /// Both derivatives are those of the reference so many samples later, which makes up for the plant's delay; at most [`Feedforward::MOST_AHEAD`].
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub ahead_samples: u32,
+}
+
+fn is_zero(samples: &u32) -> bool {
+    *samples == 0
+}
+
+impl Feedforward {
+    /// The most samples by which the derivatives may be ahead.
+    pub const MOST_AHEAD: u32 = 32;
+
+    /// Gains of both derivatives with the factor in them, and the samples they are ahead.
+    pub fn gains(&self) -> ([f64; 2], usize) {
+        ([self.factor * self.velocity_s, self.factor * self.acceleration_s2], self.ahead_samples as usize)
+    }
 }

@@ -40,10 +40,9 @@ impl<'a> Law<'a> {
     pub fn ahead(&self, reference: &[f64], k: usize) -> f64 {
         let Some(f) = &self.controller.feedforward else { return 0.0 };
         let t = self.controller.sample_time_s;
-        let (back, next) = (reference[k.saturating_sub(1)], reference[(k + 1).min(reference.len() - 1)]);
-        f.factor
-            * (f.velocity_s * (next - back) / (2.0 * t)
-                + f.acceleration_s2 * (next - 2.0 * reference[k] + back) / (t * t))
+        let (last, k) = (reference.len() - 1, k + f.ahead_samples as usize);
+        let [back, now, next] = [k.saturating_sub(1), k, k + 1].map(|k| reference[k.min(last)]);
+        f.factor * (f.velocity_s * (next - back) / (2.0 * t) + f.acceleration_s2 * (next - 2.0 * now + back) / (t * t))
     }
 
     /// The memory at the first sample under which the law gives `command` from `error`, by least squares over the first

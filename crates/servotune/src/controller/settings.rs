@@ -72,6 +72,8 @@ impl Controller {
             range("feedforward.factor", f.factor, true, "a finite number")?;
             range("feedforward.velocity_s", f.velocity_s, true, "a finite number")?;
             range("feedforward.acceleration_s2", f.acceleration_s2, true, "a finite number")?;
+            let ahead = f.ahead_samples;
+            range("feedforward.ahead_samples", f64::from(ahead), ahead <= Feedforward::MOST_AHEAD, "0 to 32 samples")?;
         }
         let gains = [("pid.kp", p.kp), ("pid.ki_per_s", p.ki_per_s), ("pid.kd_s", p.kd_s)];
         for (key, found) in gains {

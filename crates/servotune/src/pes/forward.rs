@@ -91,8 +91,9 @@ impl Loop {
                 }
             }
             if forwards {
-                let ahead = run.forward[0] * self.velocity[k] + run.forward[1] * self.acceleration[k];
-                signal.iter_mut().for_each(|s| *s += ahead);
+                let at = k + run.ahead;
+                let added = run.forward[0] * self.velocity[at] + run.forward[1] * self.acceleration[at];
+                signal.iter_mut().for_each(|s| *s += added);
             }
             let command = signal.map(|s| s.clamp(-limit, limit));
             // Written as a whole: the next sample may read it at once.

@@ -25,7 +25,7 @@ pub(super) struct Loop {
     pub readings: Vec<Reading>,
     /// Weights of the states in each reading, chunk by chunk.
     pub weights: Vec<[[f64; CHUNK]; 2]>,
-    /// Of the reference: central differences.
+    /// Of the reference: central differences, as many samples longer than the records as a feed-forward may be ahead.
     pub velocity: Vec<f64>,
     pub acceleration: Vec<f64>,
 }
@@ -78,6 +78,8 @@ pub(super) struct Run<'a> {
     pub chain: &'a [Section],
     /// Gains of the reference's velocity and acceleration.
     pub forward: [f64; 2],
+    /// Samples they are ahead.
+    pub ahead: usize,
     pub limit: f64,
     /// Samples to run.
     pub end: usize,

@@ -49,7 +49,7 @@ pub fn simulate_physical(
         limited: false,
     };
     let mut memory = vec![[0.0; 2]; sections.chain.len()];
-    let forward = controller.feedforward.map_or([0.0; 2], |f| [f.factor * f.velocity_s, f.factor * f.acceleration_s2]);
+    let (forward, ahead) = controller.feedforward.map_or(([0.0; 2], 0), |f| f.gains());
     let limit = controller.output_limit.unwrap_or(f64::INFINITY);
     // One sample more than the loop needs: the cubic's right-hand neighbour.
     let mut offsets = Vec::with_capacity(ticks + 1);
@@ -59,7 +59,7 @@ pub fn simulate_physical(
         let y = machine.measure(turn * k as f64, 0.0);
         offsets.push(machine.head_offset());
         let signal = step_chain(&sections.chain, &mut memory, scene.reference[k] - (y + scene.encoder[k]));
-        let sum = signal + forward[0] * scene.velocity[k] + forward[1] * scene.acceleration[k];
+        let sum = signal + forward[0] * scene.velocity[k + ahead] + forward[1] * scene.acceleration[k + ahead];
         let u = sum.clamp(-limit, limit);
         run.limited |= u != sum;
         run.command[k] = u;

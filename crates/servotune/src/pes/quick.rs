@@ -152,7 +152,8 @@ impl QuickScene {
         let whole = scene.reference.len();
         let ends = [readings.last().map_or(whole, |r| r.sample + 1), whole];
         let moves = |x: &[f64]| x.iter().position(|r| *r != 0.0).unwrap_or(whole);
-        let first = moves(&scene.reference).min(moves(&scene.velocity)).min(moves(&scene.acceleration));
+        let ahead = moves(&scene.velocity).min(moves(&scene.acceleration));
+        let first = moves(&scene.reference).min(ahead.saturating_sub(Feedforward::MOST_AHEAD as usize));
         let still =
             Drive { target: scene.reference.iter().map(|r| [*r]).collect(), windage: vec![[0.0]; whole], first };
         let noisy = profile.noise.encoder_rms != 0.0 || profile.noise.windage_rms != 0.0;
@@ -196,9 +197,11 @@ impl QuickScene {
         asked: Asked,
         work: &mut QuickWork,
     ) {
+        let (forward, ahead) = feedforward.map_or(([0.0; 2], 0), Feedforward::gains);
         let run = Run {
             chain,
-            forward: feedforward.map_or([0.0; 2], |f| [f.factor * f.velocity_s, f.factor * f.acceleration_s2]),
+            forward,
+            ahead,
             limit: output_limit.unwrap_or(f64::INFINITY),
             end: self.ends[usize::from(asked.whole)],
             kept: asked.slopes,

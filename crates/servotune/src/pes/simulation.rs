@@ -24,7 +24,7 @@ pub enum PesError {
 #[derive(Clone, Debug)]
 pub struct Scene {
     sample_time_s: f64,
-    /// Reference, its central differences, and the draws, at the controller's samples.
+    /// Reference, its central differences (as many samples longer as a feed-forward may be ahead), and the draws, at the controller's samples.
     pub(super) reference: Vec<f64>,
     pub(super) velocity: Vec<f64>,
     pub(super) acceleration: Vec<f64>,
@@ -124,8 +124,9 @@ impl Scene {
             let at = |i: f64| r.at((k as f64 + i) * t);
             (at(-1.0), at(0.0), at(1.0))
         };
-        let velocity = (0..ticks).map(|k| (around(k).2 - around(k).0) / (2.0 * t)).collect();
-        let acceleration = (0..ticks).map(|k| (around(k).2 - 2.0 * around(k).1 + around(k).0) / (t * t)).collect();
+        let known = ticks + Feedforward::MOST_AHEAD as usize;
+        let velocity = (0..known).map(|k| (around(k).2 - around(k).0) / (2.0 * t)).collect();
+        let acceleration = (0..known).map(|k| (around(k).2 - 2.0 * around(k).1 + around(k).0) / (t * t)).collect();
         let quiet = profile.noise.encoder_rms == 0.0 && profile.noise.windage_rms == 0.0;
         let moves = (profile.spiral.start_s / t).floor() as usize;
         Ok(Scene {
@@ -137,7 +138,7 @@ impl Scene {
             acceleration,
             servo,
             window: [start + profile.pes.window[0], start + profile.pes.window[1]],
-            first: if quiet { moves.saturating_sub(1).min(ticks) } else { 0 },
+            first: if quiet { moves.saturating_sub(1 + Feedforward::MOST_AHEAD as usize).min(ticks) } else { 0 },
         })
     }
 
@@ -170,8 +171,7 @@ impl Scene {
         state.reset();
         memory.resize(chain.len(), [0.0; 2]);
         memory.fill([0.0; 2]);
-        let (ff_velocity, ff_acceleration) =
-            feedforward.map_or((0.0, 0.0), |f| (f.factor * f.velocity_s, f.factor * f.acceleration_s2));
+        let ([ff_velocity, ff_acceleration], ahead) = feedforward.map_or(([0.0; 2], 0), Feedforward::gains);
         let limit = output_limit.unwrap_or(f64::INFINITY);
         let mut free = true;
         command[..self.first].fill(0.0);
@@ -184,7 +184,7 @@ impl Scene {
         for k in self.first..self.reference.len() {
             let y = state.position();
             let signal = step_chain(chain, memory, self.reference[k] - (y + self.encoder[k]));
-            let sum = signal + ff_velocity * self.velocity[k] + ff_acceleration * self.acceleration[k];
+            let sum = signal + ff_velocity * self.velocity[k + ahead] + ff_acceleration * self.acceleration[k + ahead];
             let u = sum.clamp(-limit, limit);
             free &= u == sum;
             command[k] = u;

@@ -339,7 +339,10 @@ fn feedforward(f: Option<&Feedforward>, angle: f64, t: f64) -> Complex<f64> {
     let velocity = Complex::new(0.0, angle.sin() / t);
     let half = (0.5 * angle).sin();
     let acceleration = -4.0 * half * half / (t * t);
-    f.map_or(Complex::new(0.0, 0.0), |f| f.factor * (f.velocity_s * velocity + f.acceleration_s2 * acceleration))
+    f.map_or(Complex::new(0.0, 0.0), |f| {
+        let ahead = Complex::from_polar(f.factor, angle * f64::from(f.ahead_samples));
+        ahead * (f.velocity_s * velocity + f.acceleration_s2 * acceleration)
+    })
 }
 
 /// Fourier coefficient of the there-and-back reference at line `w`, in closed form from its steps of acceleration.

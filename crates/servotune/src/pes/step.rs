@@ -1,39 +1,54 @@
-//! A step of the reference: what overshoot and settling are read off, with slopes by one pass backward.
+//! A step of the reference, or the move of a write: what overshoot and settling are read off, with slopes by one pass backward.
 //!
-//! In: a sampled plant and a horizon, once; then a chain of sections. Out: position and command at the controller's samples, the step
-//! at sample 0, from rest. Feed-forward sees the step as the firmware does: central differences, known one sample ahead.
+//! In: a sampled plant and a horizon or a spiral, once; then a chain of sections. Out: position and command at the controller's samples, without
+//! noise, from rest, sample 0 at time 0. Feed-forward sees the reference as the firmware does: central differences, known ahead.
 
 use super::kernel::{Buffers, Drive, Loop, Run, Seen, Slopes, Track};
+use super::{Reference, Spiral};
 use crate::controller::Feedforward;
 use crate::lti::{DiscretePlant, PlantLanes, Section};
 
-/// A unit step of the reference on one plant.
+/// One plant under a known reference.
 #[derive(Clone, Debug)]
 pub struct StepScene {
     run: Loop,
     drive: Drive<1>,
+    /// Samples before sample 0.
+    lead: usize,
 }
 
 /// Buffers of one thread.
 #[derive(Clone, Debug, Default)]
 pub struct StepWork {
-    /// Position at the controller's samples, from the step on; 1 is the step.
+    /// Position at the controller's samples, from sample 0 on; 1 is a step.
     pub position: Vec<f64>,
     track: Track,
+    lead: usize,
     buffers: Buffers<1>,
     command: Vec<f64>,
     placed: Vec<f64>,
 }
 
-/// Samples before the step: feed-forward looks one ahead.
-const AHEAD: usize = 1;
+/// Samples before sample 0, for what feed-forward sees ahead of a step.
+const AHEAD: usize = 1 + Feedforward::MOST_AHEAD as usize;
 
 impl StepScene {
-    /// A step with `samples` samples from it on.
+    /// A unit step at sample 0, with `samples` samples from it on.
     pub fn new(plant: &DiscretePlant, samples: usize) -> StepScene {
+        StepScene::under(plant, AHEAD, samples, |k| if k >= 0 { 1.0 } else { 0.0 })
+    }
+
+    /// The whole record of a spiral.
+    pub fn of_move(plant: &DiscretePlant, spiral: &Spiral) -> StepScene {
+        let (t, r) = (plant.sample_time_s(), Reference::of(spiral));
+        StepScene::under(plant, 0, (spiral.duration_s / t) as usize, |k| r.at(k as f64 * t))
+    }
+
+    fn under(plant: &DiscretePlant, lead: usize, samples: usize, reference: impl Fn(i64) -> f64) -> StepScene {
         let t = plant.sample_time_s();
-        let all = samples + AHEAD;
-        let reference = |k: i64| if k >= AHEAD as i64 { 1.0 } else { 0.0 };
+        let all = samples + lead;
+        let known = all + Feedforward::MOST_AHEAD as usize;
+        let reference = |k: i64| reference(k - lead as i64);
         let around = |k: usize| [-1, 0, 1].map(|i| reference(k as i64 + i));
         let difference = |[a, _, b]: [f64; 3]| (b - a) / (2.0 * t);
         let second = |[a, m, b]: [f64; 3]| (b - 2.0 * m + a) / (t * t);
@@ -42,23 +57,24 @@ impl StepScene {
                 plant: PlantLanes::of(plant),
                 readings: Vec::new(),
                 weights: Vec::new(),
-                velocity: (0..all).map(|k| difference(around(k))).collect(),
-                acceleration: (0..all).map(|k| second(around(k))).collect(),
+                velocity: (0..known).map(|k| difference(around(k))).collect(),
+                acceleration: (0..known).map(|k| second(around(k))).collect(),
             },
             drive: Drive {
                 target: (0..all).map(|k| [reference(k as i64)]).collect(),
                 windage: vec![[0.0]; all],
                 first: 0,
             },
+            lead,
         }
     }
 
-    /// Samples from the step on.
+    /// Samples from sample 0 on.
     pub fn samples(&self) -> usize {
-        self.drive.target.len() - AHEAD
+        self.drive.target.len() - self.lead
     }
 
-    /// Runs the first `samples` samples of the step, all of them at most.
+    /// Runs the first `samples` samples, all of them at most.
     pub fn run(
         &self,
         chain: &[Section],
@@ -67,17 +83,20 @@ impl StepScene {
         samples: usize,
         work: &mut StepWork,
     ) {
+        let (forward, ahead) = feedforward.map_or(([0.0; 2], 0), Feedforward::gains);
         let run = Run {
             chain,
-            forward: feedforward.map_or([0.0; 2], |f| [f.factor * f.velocity_s, f.factor * f.acceleration_s2]),
+            forward,
+            ahead,
             limit: output_limit.unwrap_or(f64::INFINITY),
-            end: samples.min(self.samples()) + AHEAD,
+            end: samples.min(self.samples()) + self.lead,
             kept: true,
         };
         self.run.forward(&self.drive, &run, &mut work.buffers, [&mut work.track]);
         let error = &work.track.signals[2..2 + run.end];
+        work.lead = self.lead;
         work.position.clear();
-        work.position.extend(self.drive.target.iter().zip(error).skip(AHEAD).map(|([r], e)| r - e));
+        work.position.extend(self.drive.target.iter().zip(error).skip(self.lead).map(|([r], e)| r - e));
     }
 
     /// Slopes of a figure of the last run, given its slopes in `position` and in the command of [`StepWork::command`]; either may be
@@ -93,19 +112,19 @@ impl StepScene {
         // The kernel counts samples from its own first one.
         work.placed.clear();
         if !position.is_empty() {
-            work.placed.resize(AHEAD, 0.0);
+            work.placed.resize(self.lead, 0.0);
             work.placed.extend_from_slice(position);
         }
         work.command.clear();
         work.command.extend_from_slice(command);
-        let seen = Seen { readings: &[], command: (AHEAD, &work.command), positions: &work.placed };
+        let seen = Seen { readings: &[], command: (self.lead, &work.command), positions: &work.placed };
         self.run.backward(chain, [(&work.track, seen)], &mut work.buffers, [out]);
     }
 }
 
 impl StepWork {
-    /// The command at the controller's samples, from the step on.
+    /// The command at the controller's samples, from sample 0 on.
     pub fn command(&self) -> &[f64] {
-        &self.track.command[AHEAD.min(self.track.end)..self.track.end]
+        &self.track.command[self.lead.min(self.track.end)..self.track.end]
     }
 }

@@ -73,7 +73,7 @@ impl<'a> Ending<'a> {
                     continue;
                 }
                 let records = problem.found(i, &work);
-                let found = Found { settling_s: None, ..records };
+                let found = Found { settling_s: None, move_settling_s: None, ..records };
                 let (mut a, mut b) = (0, 0);
                 for (number, (w, inside)) in problem.wanted.iter().zip(inside).enumerate() {
                     let asked = w.inside(rooms[number]);

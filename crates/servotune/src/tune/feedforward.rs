@@ -1,7 +1,8 @@
 //! Feed-forward set to the move: with the feedback as it stands the write is affine in the two feed-forward gains, so the best ones are the
 //! answer of a convex programme.
 //!
-//! In: a plant, a controller, a spec with its profile. Out: velocity and acceleration gains, factor 1. Minimised: the rms of the window's PES without noise,
+//! In: a plant, a controller, a spec with its profile. Out: velocity and acceleration gains, factor 1, and the samples that they are ahead: the
+//! programme is solved for each from none to a little more than the plant's delay, and the least is taken. Minimised: the rms of the window's PES without noise,
 //! or the weighted sum of its DFT norms where the objective is `dft`, subject to the command's peak where a limit holds it. Method: second-order
 //! cones (clarabel). Reference: r' and r'' by central differences, as the firmware forms them.
 
@@ -9,7 +10,7 @@ use super::record_figures::band_weights;
 use super::{Minimise, Spec, TuneError};
 use crate::controller::{Controller, Feedforward};
 use crate::lti::{DiscretePlant, Plant};
-use crate::pes::{Asked, QuickScene, QuickWork, Record};
+use crate::pes::{Asked, Profile, QuickScene, QuickWork, Record};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SolverStatus, SupportedConeT,
@@ -22,6 +23,9 @@ struct Response {
     command: Vec<f64>,
 }
 
+/// Samples beyond the plant's delay that are tried: modes and filters turn the phase as a further delay does.
+const BEYOND_DELAY: f64 = 3.0;
+
 /// The best feed-forward around `c` on `plant`; none where the programme has no answer.
 pub(super) fn best_feedforward(plant: &Plant, c: &Controller, spec: &Spec) -> Result<Option<Feedforward>, TuneError> {
     let profile = spec.write("feed-forward")?;
@@ -30,27 +34,43 @@ pub(super) fn best_feedforward(plant: &Plant, c: &Controller, spec: &Spec) -> Re
     let chain = c.sections()?.chain;
     let mut work = QuickWork::default();
     let asked = Asked { still: true, drawn: false, whole: true, slopes: false };
-    let mut respond = |velocity_s: f64, acceleration_s2: f64| {
-        let forward = Feedforward { factor: 1.0, velocity_s, acceleration_s2 };
+    let mut respond = |velocity_s: f64, acceleration_s2: f64, ahead_samples: u32| {
+        let forward = Feedforward { factor: 1.0, velocity_s, acceleration_s2, ahead_samples };
         // The output limit would bend what is affine; the limit on the peak is a row below.
         scene.run(&chain, Some(&forward), None, asked, &mut work);
         Response { window: work.window(Record::Still).to_vec(), command: work.command(Record::Still).to_vec() }
     };
-    let base = respond(0.0, 0.0);
+    let base = respond(0.0, 0.0, 0);
     let unit =
         |r: Response| Response { window: less(&r.window, &base.window), command: less(&r.command, &base.command) };
-    let (velocity, acceleration) = (unit(respond(1.0, 0.0)), unit(respond(0.0, 1.0)));
+    let most = (plant.delay_s / c.sample_time_s + BEYOND_DELAY).clamp(0.0, f64::from(Feedforward::MOST_AHEAD)) as u32;
+    let mut best: Option<(f64, Feedforward)> = None;
+    for ahead_samples in 0..=most {
+        let [velocity, acceleration] = [[1.0, 0.0], [0.0, 1.0]].map(|[v, a]| unit(respond(v, a, ahead_samples)));
+        let Some((value, [velocity_s, acceleration_s2])) = least(&base, [&velocity, &acceleration], spec, profile)
+        else {
+            continue;
+        };
+        if best.as_ref().is_none_or(|(least, _)| value < *least) {
+            best = Some((value, Feedforward { factor: 1.0, velocity_s, acceleration_s2, ahead_samples }));
+        }
+    }
+    Ok(best.map(|(_, forward)| forward))
+}
+
+/// The least that both gains reach, and the gains; none where the programme has no answer.
+fn least(base: &Response, columns: [&Response; 2], spec: &Spec, profile: &Profile) -> Option<(f64, [f64; 2])> {
     // Columns of one size keep the programme well scaled.
     let size = |r: &Response| r.window.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let scale = [size(&velocity), size(&acceleration)];
+    let [velocity, acceleration] = columns;
+    let scale = columns.map(size);
     if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
-        return Ok(None);
+        return None;
     }
-    let columns = [&velocity, &acceleration];
     let rate = profile.pes.sample_rate_hz;
     let blocks: Vec<(f64, Vec<[f64; 3]>)> = if spec.objective.minimise == Minimise::Dft {
         let weighed = spec.objective.bands_hz.iter().zip(band_weights(spec));
-        weighed.map(|(band, w)| (w, bins(&columns, &base, scale, *band, rate))).collect()
+        weighed.map(|(band, w)| (w, bins(&columns, base, scale, *band, rate))).collect()
     } else {
         let n = base.window.len() as f64;
         let row = |i: usize| {
@@ -66,8 +86,8 @@ pub(super) fn best_feedforward(plant: &Plant, c: &Controller, spec: &Spec) -> Re
             peak.push([row[0], row[1], limit + row[2]]);
         }
     }
-    let x = solve(&blocks, &peak);
-    Ok(x.map(|[v, a]| Feedforward { factor: 1.0, velocity_s: v / scale[0], acceleration_s2: a / scale[1] }))
+    let (value, [v, a]) = solve(&blocks, &peak)?;
+    Some((value, [v / scale[0], a / scale[1]]))
 }
 
 fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
@@ -91,8 +111,8 @@ fn bins(columns: &[&Response; 2], base: &Response, scale: [f64; 2], band: [f64; 
     rows
 }
 
-/// minimise the sum of weight |rows [x; 1]| subject to half-spaces row [x; 1] >= 0.
-fn solve(blocks: &[(f64, Vec<[f64; 3]>)], half_spaces: &[[f64; 3]]) -> Option<[f64; 2]> {
+/// minimise the sum of weight |rows [x; 1]| subject to half-spaces row [x; 1] >= 0: that sum, and x.
+fn solve(blocks: &[(f64, Vec<[f64; 3]>)], half_spaces: &[[f64; 3]]) -> Option<(f64, [f64; 2])> {
     let n = 2 + blocks.len();
     let (mut b, mut kinds, mut entries) = (Vec::new(), Vec::<SupportedConeT<f64>>::new(), vec![Vec::new(); n]);
     // s = b - A x: of a row r [x; 1] the matrix holds -r.
@@ -132,7 +152,7 @@ fn solve(blocks: &[(f64, Vec<[f64; 3]>)], half_spaces: &[[f64; 3]]) -> Option<[f
     solver.solve();
     let s = &solver.solution;
     let good = matches!(s.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
-    (good && s.x[..2].iter().all(|x| x.is_finite())).then(|| [s.x[0], s.x[1]])
+    (good && s.x[..2].iter().all(|x| x.is_finite())).then(|| (s.obj_val, [s.x[0], s.x[1]]))
 }
 
 #[cfg(test)]
@@ -144,10 +164,12 @@ mod tests {
     fn the_nearest_point_and_the_one_behind_a_half_space() {
         // |(x - 3, y + 1)|: the truth is (3, -1), and (1, -1) where x <= 1.
         let block = vec![(2.0, vec![[1.0, 0.0, -3.0], [0.0, 1.0, 1.0]])];
-        let [x, y] = solve(&block, &[]).unwrap();
+        let (_, [x, y]) = solve(&block, &[]).unwrap();
         // At the point itself the norm has a kink, which the solver rounds off.
         assert!((x - 3.0).abs() < 1e-4 && (y + 1.0).abs() < 1e-4, "{x} {y}");
-        let [x, y] = solve(&block, &[[-1.0, 0.0, 1.0]]).unwrap();
+        let (value, [x, y]) = solve(&block, &[[-1.0, 0.0, 1.0]]).unwrap();
         assert!((x - 1.0).abs() < 1e-5 && (y + 1.0).abs() < 1e-5, "{x} {y}");
+        // Twice the distance of 2.
+        assert!((value - 4.0).abs() < 1e-4, "{value}");
     }
 }

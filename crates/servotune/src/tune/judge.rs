@@ -3,7 +3,7 @@
 use super::exact_loop::exact_loop;
 use super::machine::{curve, measured_loop};
 use super::requirements::{Found, Judged, Requirement};
-use super::step_figures::{overshoot, settling_s};
+use super::step_figures::{MoveEnd, overshoot, settling_s};
 use super::{Machine, Spec, TuneError};
 use crate::controller::Controller;
 use crate::feedback::{Margins, ModelLoop, OpenLoop, confirmed_margins, margins};
@@ -121,19 +121,26 @@ pub(super) fn bins(spec: &Spec, profile: &Profile, harmonics: &[usize]) -> Vec<u
     (1..=n / 2).filter(|&k| inside(k)).collect()
 }
 
-/// Overshoot and settling of a step of the reference, where a limit asks for them.
+/// Overshoot and settling of a step of the reference and of the profile's move, where a limit asks for them.
 fn stepped(plant: &Plant, c: &Controller, spec: &Spec, found: &mut Found) -> Result<(), TuneError> {
-    let l = &spec.limits;
-    if l.overshoot_percent.is_none() && l.settling_s.is_none() {
-        return Ok(());
-    }
-    let t = c.sample_time_s;
-    let samples = super::record_figures::step_samples(spec, t);
-    let scene = StepScene::new(&DiscretePlant::of(plant, t)?, samples);
+    let (l, t) = (&spec.limits, c.sample_time_s);
     let mut work = StepWork::default();
-    scene.run(&c.sections()?.chain, c.feedforward.as_ref(), c.output_limit, samples, &mut work);
-    found.overshoot_percent = l.overshoot_percent.map(|_| overshoot(&work.position).1);
-    found.settling_s = l.settling_s.map(|_| settling_s(&work.position, t));
+    let mut run = |scene: &StepScene| -> Result<Vec<f64>, TuneError> {
+        scene.run(&c.sections()?.chain, c.feedforward.as_ref(), c.output_limit, scene.samples(), &mut work);
+        Ok(std::mem::take(&mut work.position))
+    };
+    if l.overshoot_percent.is_some() || l.settling_s.is_some() {
+        let samples = super::record_figures::step_samples(spec, t);
+        let position = run(&StepScene::new(&DiscretePlant::of(plant, t)?, samples))?;
+        found.overshoot_percent = l.overshoot_percent.map(|_| overshoot(&position).1);
+        found.settling_s = l.settling_s.map(|_| settling_s(&position, t));
+    }
+    if let Some(profile) = spec.profile.as_ref().filter(|_| l.at_end.any()) {
+        let position = run(&StepScene::of_move(&DiscretePlant::of(plant, t)?, &profile.spiral))?;
+        let end = MoveEnd::of(&profile.spiral, l.at_end.band(), t);
+        found.move_overshoot = l.at_end.overshoot.map(|_| end.overshoot(&position).1);
+        found.move_settling_s = l.at_end.settling_s.map(|_| end.settling_s(&position));
+    }
     Ok(())
 }
 

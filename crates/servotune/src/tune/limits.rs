@@ -3,7 +3,7 @@
 use super::SpecError;
 use super::spec::{interval, range};
 use crate::feedback::CurveLimit;
-use crate::pes::Profile;
+use crate::pes::{Profile, Reference};
 use serde::{Deserialize, Serialize};
 
 /// Frequency-domain requirements, each optional.
@@ -42,8 +42,53 @@ pub struct Limits {
     pub overshoot_percent: Option<f64>,
     /// Time after which a step of the reference stays within 2 %, at most (s).
     pub settling_s: Option<f64>,
+    /// The position at the end of the profile's move.
+    #[serde(rename = "move")]
+    pub at_end: MoveLimits,
     /// Curves over frequency.
     pub curve: Vec<CurveLimit>,
+}
+
+/// Requirements on the position without noise at the end of the profile's move, each optional.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MoveLimits {
+    /// How far the position goes beyond the end of the move, at most (position_unit).
+    pub overshoot: Option<f64>,
+    /// Time from the end of the reference's move after which |reference - position| stays within the band to the end of the record, at most (s).
+    pub settling_s: Option<f64>,
+    /// The band (position_unit).
+    pub band: Option<f64>,
+}
+
+impl MoveLimits {
+    /// Whether anything is limited.
+    pub fn any(&self) -> bool {
+        self.overshoot.is_some() || self.settling_s.is_some()
+    }
+
+    /// The band; without a limit that asks for it, none.
+    pub(super) fn band(&self) -> f64 {
+        self.band.unwrap_or(f64::INFINITY)
+    }
+
+    fn check(&self, profile: Option<&Profile>) -> Result<(), SpecError> {
+        above_zero("limits.move.overshoot", self.overshoot, f64::INFINITY, ABOVE)?;
+        above_zero("limits.move.settling_s", self.settling_s, f64::INFINITY, "a finite time above 0 s")?;
+        above_zero("limits.move.band", self.band, f64::INFINITY, ABOVE)?;
+        if self.settling_s.is_some() != self.band.is_some() {
+            return Err(SpecError::Band);
+        }
+        match profile {
+            None if self.any() => Err(SpecError::NeedsProfile { what: "a limit on the end of the move" }),
+            Some(p) if self.any() => {
+                let (end_s, duration_s) = (Reference::of(&p.spiral).end_s(), p.spiral.duration_s);
+                let needed_s = end_s + self.settling_s.unwrap_or(0.0);
+                if needed_s < duration_s { Ok(()) } else { Err(SpecError::Short { needed_s, duration_s }) }
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// Limit of one harmonic.
@@ -98,7 +143,8 @@ impl MarginLimits {
 impl Limits {
     /// Whether a limit is judged on a write.
     pub fn of_write(&self) -> bool {
-        self.dft_low.is_some() || self.dft_high.is_some() || self.command_peak.is_some() || !self.harmonics.is_empty()
+        let of_window = self.dft_low.is_some() || self.dft_high.is_some() || !self.harmonics.is_empty();
+        of_window || self.command_peak.is_some()
     }
 
     pub(super) fn check(&self, profile: Option<&Profile>, bands: &[[f64; 2]]) -> Result<(), SpecError> {
@@ -108,6 +154,7 @@ impl Limits {
         above_zero("limits.command_rms", self.command_rms, f64::INFINITY, ABOVE)?;
         above_zero("limits.overshoot_percent", self.overshoot_percent, f64::INFINITY, ABOVE)?;
         above_zero("limits.settling_s", self.settling_s, f64::INFINITY, "a finite time above 0 s")?;
+        self.at_end.check(profile)?;
         self.curve.iter().enumerate().try_for_each(|(i, c)| check_curve(i, c))?;
         let Some(profile) = profile else {
             return if self.of_write() {

@@ -4,7 +4,7 @@ use super::linear::SectionSlope;
 use super::objective::Minimise;
 use super::record_figures::{Asked, RecordFigure};
 use super::requirements::{Requirement, What};
-use super::step_figures::{envelope_from, overshoot, worst_outside};
+use super::step_figures::{MoveEnd, envelope_from, overshoot, worst_outside};
 use super::write_figures::{WriteBuffers, WriteSource};
 use super::{Spec, TuneError};
 use crate::controller::Controller;
@@ -108,6 +108,8 @@ pub(super) struct Prepared {
     plant: PlantAt,
     write: Option<WriteSource>,
     step: Option<StepScene>,
+    /// The profile's move and where it ends.
+    moving: Option<(StepScene, MoveEnd)>,
     /// Power of the position and of the command under the disturbance.
     disturbance: Option<[LoopPower; 2]>,
 }
@@ -128,6 +130,7 @@ pub(super) struct Buffers {
     pub slopes: Vec<Vec<f64>>,
     write: WriteBuffers,
     step: StepWork,
+    moving: StepWork,
     weights: Vec<f64>,
     sections: Slopes,
     power: PowerWork,
@@ -156,6 +159,15 @@ impl Prepared {
             (0, _) => None,
             (samples, Some(plant)) => Some(StepScene::new(plant, samples)),
             (_, None) => return Err(model("overshoot and settling of a step")),
+        };
+        let moving = match (asked.moves(), &stepped) {
+            (false, _) => None,
+            (true, Some(plant)) => {
+                let spiral = &spec.write("the end of the move")?.spiral;
+                let end = MoveEnd::of(spiral, spec.limits.at_end.band(), t);
+                Some((StepScene::of_move(plant, spiral), end))
+            }
+            (true, None) => return Err(model("the end of the move")),
         };
         let of_write = |f| {
             matches!(f, RecordFigure::Band(_) | RecordFigure::Harmonic(_) | RecordFigure::CommandPeak)
@@ -196,7 +208,7 @@ impl Prepared {
             (None, true) => return Err(super::SpecError::NeedsDisturbance.into()),
             _ => None,
         };
-        Ok(Prepared { sampled, plant, write, step, disturbance })
+        Ok(Prepared { sampled, plant, write, step, moving, disturbance })
     }
 
     /// The plant with its hold at `w` (rad/s).
@@ -221,6 +233,7 @@ impl Prepared {
             slopes: Vec::new(),
             write: WriteBuffers::default(),
             step: StepWork::default(),
+            moving: StepWork::default(),
             weights: Vec::new(),
             sections: Slopes::default(),
             power: PowerWork::default(),
@@ -243,8 +256,17 @@ impl Prepared {
                 b.figures[at] = overshoot(&b.step.position).1;
             }
             if let Some(at) = asked.place(RecordFigure::Envelope) {
-                let from = envelope_from(settling(aimed), c.sample_time_s);
+                let from = envelope_from(settling(aimed, What::Settling), c.sample_time_s);
                 b.figures[at] = worst_outside(&b.step.position, from).1;
+            }
+        }
+        if let Some((scene, end)) = &self.moving {
+            scene.run(chain, c.feedforward.as_ref(), c.output_limit, scene.samples(), &mut b.moving);
+            if let Some(at) = asked.place(RecordFigure::MoveOvershoot) {
+                b.figures[at] = end.overshoot(&b.moving.position).1;
+            }
+            if let Some(at) = asked.place(RecordFigure::MoveEnvelope) {
+                b.figures[at] = end.worst_outside(&b.moving.position, settling(aimed, What::MoveSettling)).1;
             }
         }
     }
@@ -276,22 +298,33 @@ impl Prepared {
             b.sections.sections.iter_mut().flatten().for_each(|d| *d *= half);
             in_parameters(&b.sections, slopes, &mut b.slopes[at]);
         }
+        let Buffers { step, moving, weights, sections, slopes: out, .. } = b;
+        let mut one_hot = |scene: &StepScene, work: &mut StepWork, at: usize, (sample, slope): (usize, f64)| {
+            weights.clear();
+            weights.resize(sample + 1, 0.0);
+            weights[sample] = slope;
+            scene.backward(chain, weights, &[], work, sections);
+            in_parameters(sections, slopes, &mut out[at]);
+        };
         if let Some(scene) = &self.step {
-            let one_hot = |at: usize, sample: usize, weight: f64, b: &mut Buffers| {
-                b.weights.clear();
-                b.weights.resize(sample + 1, 0.0);
-                b.weights[sample] = weight;
-                scene.backward(chain, &b.weights, &[], &mut b.step, &mut b.sections);
-                in_parameters(&b.sections, slopes, &mut b.slopes[at]);
-            };
             if let Some(at) = place(RecordFigure::Overshoot) {
-                let sample = overshoot(&b.step.position).0;
-                one_hot(at, sample, 100.0, b);
+                let sample = overshoot(&step.position).0;
+                one_hot(scene, step, at, (sample, 100.0));
             }
             if let Some(at) = place(RecordFigure::Envelope) {
-                let from = envelope_from(settling(aimed), c.sample_time_s);
-                let (sample, _, slope) = worst_outside(&b.step.position, from);
-                one_hot(at, sample, slope, b);
+                let from = envelope_from(settling(aimed, What::Settling), c.sample_time_s);
+                let (sample, _, slope) = worst_outside(&step.position, from);
+                one_hot(scene, step, at, (sample, slope));
+            }
+        }
+        if let Some((scene, end)) = &self.moving {
+            if let Some(at) = place(RecordFigure::MoveOvershoot) {
+                let (sample, _, slope) = end.overshoot(&moving.position);
+                one_hot(scene, moving, at, (sample, slope));
+            }
+            if let Some(at) = place(RecordFigure::MoveEnvelope) {
+                let (sample, _, slope) = end.worst_outside(&moving.position, settling(aimed, What::MoveSettling));
+                one_hot(scene, moving, at, (sample, slope));
             }
         }
     }
@@ -307,9 +340,9 @@ impl Prepared {
     }
 }
 
-/// The settling limit that is aimed at (s).
-fn settling(aimed: &[Requirement]) -> f64 {
-    aimed.iter().find(|w| w.what == What::Settling).map_or(f64::INFINITY, |w| w.limit)
+/// The settling limit of a step or of the move that is aimed at (s).
+fn settling(aimed: &[Requirement], what: What) -> f64 {
+    aimed.iter().find(|w| w.what == what).map_or(f64::INFINITY, |w| w.limit)
 }
 
 /// Slopes in parameters from slopes in coefficients.

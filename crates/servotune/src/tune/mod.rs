@@ -45,7 +45,7 @@ pub use confidence::margin_intervals;
 pub use from_table::{polish_table, roomiest_table};
 pub use gain_table::{CrossingRow, GainTable, GainTableError, InputDigest, Provenance, Summary};
 pub use judge::{Proof, judge};
-pub use limits::{HarmonicLimit, Limits, MarginLimits};
+pub use limits::{HarmonicLimit, Limits, MarginLimits, MoveLimits};
 pub use machine::{Hold, Machine, Route};
 pub use objective::{Disturbance, Minimise, Objective};
 pub use outcome::{AtBound, Infeasible, Outcome, Reached, RelaxedLimit, Tuned, Work};

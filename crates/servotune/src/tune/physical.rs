@@ -237,7 +237,16 @@ fn aim_inside(spec: &mut Spec, judged: &Judged) {
                 }
             }
             // Refused before the search.
-            (What::Bandwidth | What::CommandRms | What::Overshoot | What::Settling | What::Curve { .. }, _) => {}
+            (
+                What::Bandwidth
+                | What::CommandRms
+                | What::Overshoot
+                | What::Settling
+                | What::MoveOvershoot
+                | What::MoveSettling
+                | What::Curve { .. },
+                _,
+            ) => {}
         }
     }
 }

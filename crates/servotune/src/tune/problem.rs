@@ -289,6 +289,8 @@ impl TuningProblem {
             command_rms: figure(RecordFigure::CommandRms),
             overshoot_percent: figure(RecordFigure::Overshoot),
             settling_s: None,
+            move_overshoot: figure(RecordFigure::MoveOvershoot),
+            move_settling_s: None,
             curves: (0..self.curves.len()).map(ratio).collect(),
         }
     }
@@ -300,9 +302,9 @@ fn record_rows(machine: usize, aimed: &[Requirement], asked: &Asked, b: &Buffers
     for (wanted, w) in aimed.iter().enumerate() {
         let Some(figure) = RecordFigure::of(w.what, &mut harmonic).and_then(|f| asked.place(f)) else { continue };
         let found = b.figures[figure];
-        // The settling time is held as an envelope: how far the step leaves it after the limit, in shares of its width.
+        // A settling time is held as an envelope: how far the step leaves it after the limit, in shares of its width.
         let (value, share) = match (w.what, w.side) {
-            (What::Settling, _) => (found - 1.0, 1.0),
+            (What::Settling | What::MoveSettling, _) => (found - 1.0, 1.0),
             (_, Side::AtMost) => (w.violation(found), 1.0 / w.limit),
             (_, Side::AtLeast) => (w.violation(found), -1.0 / w.limit),
         };

@@ -21,9 +21,19 @@ pub(super) enum RecordFigure {
     Overshoot,
     /// How far a step leaves the band of 2 % after the settling limit, in shares of the band.
     Envelope,
+    /// How far the position goes beyond the end of the move (position_unit).
+    MoveOvershoot,
+    /// How far the error leaves its band after the move's settling limit, in shares of the band.
+    MoveEnvelope,
 }
 
 impl RecordFigure {
+    /// Whether it is of the position under a reference alone, a step or the move.
+    pub fn of_reference(self) -> bool {
+        use RecordFigure::{Envelope, MoveEnvelope, MoveOvershoot, Overshoot};
+        matches!(self, Overshoot | Envelope | MoveOvershoot | MoveEnvelope)
+    }
+
     /// The figure that a requirement limits; none for the loop's own. `harmonic` counts the harmonics met so far.
     pub fn of(what: What, harmonic: &mut usize) -> Option<RecordFigure> {
         match what {
@@ -37,6 +47,8 @@ impl RecordFigure {
             What::CommandRms => Some(RecordFigure::CommandRms),
             What::Overshoot => Some(RecordFigure::Overshoot),
             What::Settling => Some(RecordFigure::Envelope),
+            What::MoveOvershoot => Some(RecordFigure::MoveOvershoot),
+            What::MoveSettling => Some(RecordFigure::MoveEnvelope),
             _ => None,
         }
     }
@@ -91,6 +103,11 @@ impl Asked {
     /// Whether the objective is the first figure.
     pub fn objective_is_figure(&self) -> bool {
         self.figures.first() == Some(&RecordFigure::Objective)
+    }
+
+    /// Whether the end of the move is limited.
+    pub fn moves(&self) -> bool {
+        self.any(|f| matches!(f, RecordFigure::MoveOvershoot | RecordFigure::MoveEnvelope))
     }
 
     /// Whether any of the figures is of this kind.

@@ -26,6 +26,10 @@ pub enum What {
     CommandRms,
     Overshoot,
     Settling,
+    /// Beyond the end of the move.
+    MoveOvershoot,
+    /// From the end of the reference's move.
+    MoveSettling,
     /// The largest ratio of a magnitude to its curve (of the curve to the magnitude for "at least"), by index in `limits.curve`.
     Curve {
         index: usize,
@@ -87,6 +91,10 @@ pub struct Found {
     pub overshoot_percent: Option<f64>,
     /// Settling time of a step to 2 % (s); infinite beyond the simulated horizon, none where no limit asks for it.
     pub settling_s: Option<f64>,
+    /// How far the position goes beyond the end of the move (position_unit); none where no limit asks for it.
+    pub move_overshoot: Option<f64>,
+    /// Settling time after the move (s); infinite where the record ends outside the band, none where no limit asks for it.
+    pub move_settling_s: Option<f64>,
     /// Largest ratio to each curve, in the order of the spec, and where (Hz).
     pub curves: Vec<CurveFound>,
 }
@@ -147,10 +155,10 @@ impl What {
             What::GainMargin => "dB",
             What::MaxSensitivity | What::Curve { .. } => "ratio",
             What::GainCrossover | What::Bandwidth => "Hz",
-            What::DftLow | What::DftHigh | What::Harmonic { .. } => "position_unit",
+            What::DftLow | What::DftHigh | What::Harmonic { .. } | What::MoveOvershoot => "position_unit",
             What::CommandPeak | What::CommandRms => "command_unit",
             What::Overshoot => "%",
-            What::Settling => "s",
+            What::Settling | What::MoveSettling => "s",
         }
     }
 
@@ -183,6 +191,8 @@ impl fmt::Display for What {
             What::CommandRms => f.write_str("command_rms"),
             What::Overshoot => f.write_str("overshoot_percent"),
             What::Settling => f.write_str("settling_s"),
+            What::MoveOvershoot => f.write_str("move.overshoot"),
+            What::MoveSettling => f.write_str("move.settling_s"),
             What::Curve { index } => write!(f, "curve {}", index + 1),
         }
     }
@@ -208,6 +218,8 @@ impl Requirement {
         all.extend(l.command_rms.map(|x| at_most(What::CommandRms, x)));
         all.extend(l.overshoot_percent.map(|x| at_most(What::Overshoot, x)));
         all.extend(l.settling_s.map(|x| at_most(What::Settling, x)));
+        all.extend(l.at_end.overshoot.map(|x| at_most(What::MoveOvershoot, x)));
+        all.extend(l.at_end.settling_s.map(|x| at_most(What::MoveSettling, x)));
         all.extend((0..l.curve.len()).map(|index| at_most(What::Curve { index }, 1.0)));
         all
     }
@@ -259,6 +271,8 @@ impl Requirement {
             What::CommandRms => found.command_rms,
             What::Overshoot => found.overshoot_percent,
             What::Settling => found.settling_s,
+            What::MoveOvershoot => found.move_overshoot,
+            What::MoveSettling => found.move_settling_s,
             What::Curve { index } => found.curves.get(index).map(|c| c.ratio),
         }
     }

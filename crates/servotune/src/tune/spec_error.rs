@@ -40,6 +40,16 @@ pub enum SpecError {
         "limits.curve[{index}]: {found}; expected at least two frequencies above 0 Hz in ascending order and one level in dB for each"
     )]
     Curve { index: usize, found: String },
+    /// A settling time without its band, or the band without it.
+    #[error(
+        "limits.move: expected `settling_s` and `band` together: the time after the move, and the error (position_unit) within which it has settled"
+    )]
+    Band,
+    /// The record ends before the limit can be judged.
+    #[error(
+        "limits.move: the move and its settling take {needed_s} s, but the record ends at spiral.duration_s = {duration_s} s; expected a longer record"
+    )]
+    Short { needed_s: f64, duration_s: f64 },
     /// A disturbance that is none of the two kinds.
     #[error("[disturbance]: expected either `rms` and `corner_hz`, or `psd` with the file of a density")]
     Disturbance,

@@ -63,7 +63,7 @@ impl WriteSource {
         let (n, rate) = (last - first, profile.pes.sample_rate_hz);
         let dft = WindowDft::new(n, rate, bins(asked, n, rate));
         let noise = if asked.minimise.of_write() { NoisePower::of(profile, sampled, &dft) } else { None };
-        let limited = |f| !matches!(f, RecordFigure::Objective);
+        let limited = |f: RecordFigure| f != RecordFigure::Objective && !f.of_reference();
         let whole = |f| matches!(f, RecordFigure::CommandPeak | RecordFigure::CommandRms);
         let records = pes::Asked {
             still: asked.minimise.of_write(),
@@ -145,7 +145,8 @@ impl WriteSource {
                         RecordFigure::CommandPeak => {
                             peak_slopes(s, chain, sections, figures[at], b, &mut out[at]);
                         }
-                        RecordFigure::CommandRms | RecordFigure::Overshoot | RecordFigure::Envelope => continue,
+                        RecordFigure::CommandRms => continue,
+                        f if f.of_reference() => continue,
                         _ => {
                             shares(*figure, asked, s.dft(), &b.expected, figures[at], &mut b.shares);
                             let of = b.shares.iter().copied().enumerate().filter(|(_, q)| *q != 0.0);
@@ -228,7 +229,7 @@ impl ModelWrite {
                     let scale = 1.0 / (u.len() as f64 * figures[at].max(f64::MIN_POSITIVE));
                     command = u.iter().map(|u| u * scale).collect();
                 }
-                RecordFigure::Overshoot | RecordFigure::Envelope => continue,
+                f if f.of_reference() => continue,
                 _ if objective && asked.minimise == Minimise::PesRms => {
                     let window = b.work.window(record);
                     let scale = 1.0 / (window.len() as f64 * figures[at].max(f64::MIN_POSITIVE));

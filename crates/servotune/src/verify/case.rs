@@ -65,7 +65,7 @@ impl Job<'_> {
             };
             bound_write(&boxed, &self.bins(), &BoxSettings::default(), self.watch)
         });
-        let (step, command_rms) = if stable { self.records(plant) } else { Default::default() };
+        let (step, at_end, command_rms) = if stable { self.records(plant) } else { Default::default() };
         let known = Known {
             bounds: &bounds,
             magnitudes: &magnitudes,
@@ -73,6 +73,7 @@ impl Job<'_> {
             write: figures.as_ref(),
             write_box: write_box.as_ref(),
             step,
+            at_end,
             command_rms,
         };
         let limits = proven_limits(self.spec, self.wanted, &known);
@@ -99,6 +100,7 @@ impl Job<'_> {
             write: None,
             write_box: None,
             step: Default::default(),
+            at_end: Default::default(),
             command_rms: Bounded::default(),
         };
         let limits = proven_limits(self.spec, self.wanted, &known);
@@ -119,12 +121,20 @@ impl Job<'_> {
         self.wanted.iter().filter_map(bin).collect()
     }
 
-    /// Overshoot and settling, and the command's rms under the disturbance, where limits ask for them: of a box the plant as it stands only, which bounds from below.
-    fn records(&self, plant: &Plant) -> ([Bounded; 2], Bounded) {
+    /// Overshoot and settling of a step and of the move, and the command's rms under the disturbance, where limits ask for them: of a box the plant as it
+    /// stands only, which bounds from below.
+    fn records(&self, plant: &Plant) -> ([Bounded; 2], [Bounded; 2], Bounded) {
         let (c, limits) = (self.controller, &self.spec.limits);
         let own = |b: Bounded| if self.uncertainty.any() { Bounded { high: None, ..b } } else { b };
         let stepped = limits.overshoot_percent.is_some() || limits.settling_s.is_some();
         let of_step = if stepped { step::step(plant, self.held, c).map(own) } else { Default::default() };
+        let of_end = match &self.spec.profile {
+            Some(profile) if limits.at_end.any() => {
+                let band = limits.at_end.band.unwrap_or(f64::INFINITY);
+                step::move_end(plant, self.held, c, profile, band).map(own)
+            }
+            _ => Default::default(),
+        };
         let command = match &self.spec.disturbance {
             Some(Disturbance::Coloured { rms, corner_hz })
                 if limits.command_rms.is_some() && self.spec.profile.is_none() =>
@@ -134,6 +144,6 @@ impl Job<'_> {
             // The sum over a tabulated density is not bounded.
             _ => Bounded::default(),
         };
-        (of_step, command)
+        (of_step, of_end, command)
     }
 }

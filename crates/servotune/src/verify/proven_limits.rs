@@ -40,6 +40,8 @@ pub(super) struct Known<'a> {
     pub write_box: Option<&'a WriteBox>,
     /// Overshoot (%), settling time (s) and the command's rms under the disturbance; an end without a number where a box is asked for.
     pub step: [Bounded; 2],
+    /// Beyond the end of the move (position_unit), and the settling time after it (s).
+    pub at_end: [Bounded; 2],
     pub command_rms: Bounded,
 }
 
@@ -85,6 +87,8 @@ pub(super) fn proven_limits(spec: &Spec, wanted: &[Requirement], known: &Known<'
                 What::Curve { index } => known.magnitudes.curves.get(index).copied().unwrap_or_default(),
                 What::Overshoot => known.step[0],
                 What::Settling => known.step[1],
+                What::MoveOvershoot => known.at_end[0],
+                What::MoveSettling => known.at_end[1],
                 What::CommandRms if w.is_none() => known.command_rms,
                 what => w.map_or(Bounded::default(), |w| match what {
                     What::DftLow => boxed(around(w.dft_low, w.error), w.error, &|o| o.dft_low),

@@ -1,12 +1,14 @@
-//! A step of the reference and the command under a disturbance, on the cascade of `cascade.rs`.
+//! A step of the reference, the end of a move and the command under a disturbance, on the cascade of `cascade.rs`.
 //!
 //! In: plant as it stands, sections, law. Out: overshoot, settling time and the command's rms, each between two bounds. No partial fractions, no sum
-//! over frequency. The record goes on until the loop has come to rest. Spec: `specs/certificate.md`.
+//! over frequency. A step's record goes on until the loop has come to rest, a move's to the end of the write. Spec: `specs/certificate.md`.
 
 use super::bounds::Bounded;
 use super::cascade::Loop;
+use super::write::{ramps, reference};
 use crate::controller::Controller;
 use crate::lti::{Plant, Section};
+use crate::pes::Profile;
 use std::f64::consts::TAU;
 
 /// Band of the settling time, as a share of the step.
@@ -23,7 +25,7 @@ pub(super) fn step(plant: &Plant, sections: &[Section], c: &Controller) -> [Boun
     let l = Loop::of(plant, sections, c);
     let mut samples = SAMPLES[0];
     while samples <= SAMPLES[1] {
-        let y = positions(&l, c, samples);
+        let y = positions(&l, c, [-1 - ahead(c), samples as i64], |k| if k >= 0 { 1.0 } else { 0.0 });
         let (last, late) = (y[samples - 1], &y[samples / 2..]);
         if late.iter().all(|x| (x - last).abs() < REST) {
             return figures(&y, c.sample_time_s);
@@ -33,17 +35,45 @@ pub(super) fn step(plant: &Plant, sections: &[Section], c: &Controller) -> [Boun
     [Bounded::default(); 2]
 }
 
-/// The position at the controller's samples, the step at the first; feed-forward sees it one sample ahead.
-fn positions(l: &Loop<'_>, c: &Controller, samples: usize) -> Vec<f64> {
+/// How far a spiral's move goes beyond its end (position_unit), and the time from that end after which the error stays within `band` (s).
+pub(super) fn move_end(
+    plant: &Plant,
+    sections: &[Section],
+    c: &Controller,
+    profile: &Profile,
+    band: f64,
+) -> [Bounded; 2] {
+    let (l, t, s) = (Loop::of(plant, sections, c), c.sample_time_s, &profile.spiral);
+    let wanted = |k: i64| reference(profile, k as f64 * t);
+    let y = positions(&l, c, [0, (s.duration_s / t) as i64], wanted);
+    let rounding = ROUNDING * s.distance;
+    let over = y.iter().fold(0.0f64, |m, x| m.max(x * s.velocity.signum() - s.distance));
+    let end_s = s.start_s + ramps(profile)[1];
+    let settled = |band: f64| match (0..y.len()).rev().find(|k| (y[*k] - wanted(*k as i64)).abs() > band) {
+        None => Some(0.0),
+        Some(k) if k + 1 < y.len() => Some(((k + 1) as f64 * t - end_s).max(0.0)),
+        Some(_) => None,
+    };
+    let overshoot = Bounded { low: Some((over - rounding).max(0.0)), high: Some(over + rounding), hz: None };
+    [overshoot, Bounded { low: settled(band + rounding), high: settled(band - rounding), hz: None }]
+}
+
+/// Samples that the feed-forward is ahead.
+fn ahead(c: &Controller) -> i64 {
+    c.feedforward.map_or(0, |f| i64::from(f.ahead_samples))
+}
+
+/// The position at the controller's samples from time 0 on, without noise, run from sample `first` on; feed-forward sees the reference ahead.
+fn positions(l: &Loop<'_>, c: &Controller, [first, end]: [i64; 2], reference: impl Fn(i64) -> f64) -> Vec<f64> {
     let t = c.sample_time_s;
     let limit = c.output_limit.unwrap_or(f64::INFINITY);
-    let reference = |k: i64| if k >= 0 { 1.0 } else { 0.0 };
+    let ahead = ahead(c);
     let mut state = l.at_rest();
-    let mut all = Vec::with_capacity(samples);
-    for k in -1..samples as i64 {
+    let mut all = Vec::new();
+    for k in first..end {
         let y = l.cascade.output.dot(&state.x);
         let forward = c.feedforward.as_ref().map_or(0.0, |f| {
-            let [a, m, b] = [k - 1, k, k + 1].map(reference);
+            let [a, m, b] = [-1, 0, 1].map(|i| reference(k + ahead + i));
             f.factor * (f.velocity_s * (b - a) / (2.0 * t) + f.acceleration_s2 * (b - 2.0 * m + a) / (t * t))
         });
         let u = (l.law(&mut state, reference(k) - y) + forward).clamp(-limit, limit);

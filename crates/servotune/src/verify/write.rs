@@ -125,8 +125,8 @@ pub(super) fn draws(profile: &Profile, t: f64, ticks: usize) -> (Vec<f64>, Vec<f
 /// What the feed-forward adds at controller sample `k`.
 pub(super) fn forward(c: &Controller, profile: &Profile, k: usize) -> f64 {
     let t = c.sample_time_s;
-    let at = |i: f64| reference(profile, (k as f64 + i) * t);
     c.feedforward.as_ref().map_or(0.0, |f| {
+        let at = |i: f64| reference(profile, (k as f64 + f64::from(f.ahead_samples) + i) * t);
         let speed = f.factor * f.velocity_s * (at(1.0) - at(-1.0)) / (2.0 * t);
         speed + f.factor * f.acceleration_s2 * (at(1.0) - 2.0 * at(0.0) + at(-1.0)) / (t * t)
     })
@@ -229,17 +229,23 @@ pub(super) fn of_window(window: &[f64], rate: f64, bands_hz: &Bands, command_pea
     WriteFigures { dft_low, dft_high, harmonics, command_peak, error, command_error: None, command_rms: None }
 }
 
+/// Time at acceleration, and the length of the move (s). A move too short for the full speed turns back at the speed it reaches.
+pub(super) fn ramps(profile: &Profile) -> [f64; 2] {
+    let s = &profile.spiral;
+    let a = s.velocity.abs() / s.acceleration_time_s;
+    let ramp = s.acceleration_time_s.min((s.distance / a).sqrt());
+    [ramp, s.distance / (a * ramp) + ramp]
+}
+
 /// The reference: the double integral of a pulse of acceleration and one of deceleration.
 pub(super) fn reference(profile: &Profile, time: f64) -> f64 {
     let s = &profile.spiral;
     let speed = s.velocity.abs();
     let a = speed / s.acceleration_time_s;
-    // A move too short for the full speed turns back at the speed it reaches.
-    let ramp = s.acceleration_time_s.min((s.distance / a).sqrt());
-    let brake = s.distance / (a * ramp);
+    let [ramp, end] = ramps(profile);
+    let brake = end - ramp;
     let area = |t: f64| 0.5 * t.max(0.0).powi(2);
     let since = time - s.start_s;
-    let end = brake + ramp;
     if since >= end {
         return s.distance.copysign(s.velocity);
     }

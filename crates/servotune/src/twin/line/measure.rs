@@ -61,7 +61,7 @@ fn feed_forward() -> Result<Feedforward, TwinError> {
         }
         Body::Rational(_) => (0.0, 0.0),
     };
-    Ok(Feedforward { factor: 1.0, velocity_s, acceleration_s2 })
+    Ok(Feedforward { factor: 1.0, velocity_s, acceleration_s2, ahead_samples: 0 })
 }
 
 /// The factor that leaves least PES up to the end of the window. The loop is linear, so one write with and one without tell.
