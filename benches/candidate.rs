@@ -41,6 +41,26 @@ fn candidate_of(b: Bencher, spec: &Spec, machine: Machine<'_>) {
     b.bench_local(|| problem.score(black_box(&x), &mut work));
 }
 
+fn slopes_of(b: Bencher, spec: &Spec, machine: Machine<'_>) {
+    let start = controller();
+    let problem = TuningProblem::around(&[machine], spec, &start).unwrap();
+    let x = problem.parameters().vector(&start);
+    let mut work = problem.work();
+    b.bench_local(|| problem.slopes(black_box(&x), &mut work).unwrap());
+}
+
+#[divan::bench]
+fn slopes(b: Bencher) {
+    slopes_of(b, &without_peak(), Machine::Model(&paper_plant()));
+}
+
+#[divan::bench]
+fn slopes_on_a_response(b: Bencher) {
+    let frf = paper_response();
+    let machine = Machine::Response { frf: &frf, hold: servotune::tune::Hold::NotIncluded, continuation: None };
+    slopes_of(b, &without_peak(), machine);
+}
+
 #[divan::bench]
 fn candidate(b: Bencher) {
     candidate_of(b, &without_peak(), Machine::Model(&paper_plant()));

@@ -46,6 +46,7 @@ pub use from_table::{polish_table, roomiest_table};
 pub use gain_table::{CrossingRow, GainTable, GainTableError, InputDigest, Provenance, Summary};
 pub use judge::{Proof, judge};
 pub use limits::{HarmonicLimit, Limits, MarginLimits, MoveLimits};
+pub use linear::{CandidateSlopes, LimitSlope};
 pub use machine::{Hold, Machine, Route};
 pub use objective::{Disturbance, Minimise, Objective};
 pub use outcome::{AtBound, Infeasible, Outcome, Reached, RelaxedLimit, Tuned, Work};
