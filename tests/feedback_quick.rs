@@ -220,3 +220,39 @@ fn a_curve_limit_is_missed_by_the_most_of_a_fine_scan() {
     }
     assert!(missed > 10);
 }
+
+/// A low-pass that comes down turns the curve until it crosses the negative real axis there and back between two points of the grid.
+#[test]
+fn a_pair_of_phase_crossings_between_two_points_is_announced() {
+    let mut r = Random::new(21);
+    let (mut hidden, mut announced) = (0, 0);
+    for (_, plant, t, crossover_hz) in machines() {
+        let sampled = DiscretePlant::of(&plant, t).unwrap();
+        let grid = SampledPlant::of_model(&sampled);
+        let w = grid.w_rad_s().to_vec();
+        let mut on = LoopOnGrid::default();
+        for _ in 0..4 {
+            let chain = draw(&mut r, &sampled, crossover_hz);
+            for step in 0..400 {
+                let hz = 0.45 / t * (1.0 - f64::from(step) / 530.0);
+                let mut sections = Sections { chain: chain.clone(), sample_time_s: t };
+                sections.chain.push(Section::lowpass(hz, 0.7, t).unwrap());
+                let l = ModelLoop::new(&sampled, &sections).unwrap();
+                let exact = margins(&l);
+                let seen: Vec<f64> =
+                    exact.phase_crossings.iter().filter(|c| c.value < 30.0).map(|c| c.hz * TAU).collect();
+                for pair in seen.windows(2) {
+                    let interval = w.partition_point(|x| *x < pair[0]);
+                    if interval == 0 || interval != w.partition_point(|x| *x < pair[1]) || interval + 1 >= w.len() {
+                        continue;
+                    }
+                    hidden += 1;
+                    grid.judge(&sections.chain, &mut on);
+                    let near = |x: f64| x > w[interval.saturating_sub(2)] && x < w[(interval + 1).min(w.len() - 1)];
+                    announced += usize::from(on.quick.turns_back.iter().any(|e| near(e.w_rad_s)));
+                }
+            }
+        }
+    }
+    assert!(hidden >= 5 && announced == hidden, "{announced} of {hidden}");
+}

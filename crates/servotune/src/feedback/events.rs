@@ -24,7 +24,7 @@ pub struct Graze {
     pub minimum: bool,
 }
 
-/// Extrema of |L| within this of 1 (ln) are grazes: far more than the grid's error, far less than anybody can measure.
+/// Extrema of |L| within this of 1 (ln), and of its angle within this of -180 deg (rad), are grazes: far more than the grid's error, far less than anybody can measure.
 pub const GRAZE: f64 = 0.01;
 
 /// Margins read off the grid.
@@ -38,6 +38,8 @@ pub struct QuickMargins {
     pub phase_crossings: Vec<Event>,
     /// Extrema of |L| so near to 1 that a finer grid may see crossings there; value: phase margin (deg).
     pub grazes: Vec<Graze>,
+    /// Where L turns round so near to the negative real axis that a finer grid may see it cross there and back; value: gain margin (dB).
+    pub turns_back: Vec<Event>,
     /// Local minima of |1 + L| up to twice the lowest, value: |1 + L|.
     pub dips: Vec<Event>,
 }

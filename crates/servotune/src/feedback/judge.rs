@@ -14,6 +14,10 @@ use std::f64::consts::PI;
 const NEARLY: f64 = 1.5;
 /// Extrema of |L|² this near to 1 on the grid are looked at for a graze.
 pub(super) const NEAR_ONE: f64 = 0.07;
+/// The largest gain margin (20 dB is a hundredth of |L|²) at which a turn near the negative real axis is looked at.
+pub(super) const FAINT: f64 = 1e-4;
+/// |Im L| over |Re L| up to which such a turn is looked at.
+pub(super) const NEAR_AXIS: f64 = 0.05;
 /// Dips of |1 + L|² up to this factor above the lowest are read: twice the lowest distance.
 const DEEP: f64 = 4.0;
 
@@ -28,6 +32,7 @@ impl SampledPlant {
         quick.phase_crossings.clear();
         quick.dips.clear();
         quick.grazes.clear();
+        quick.turns_back.clear();
         let (mut passes, mut lows) = (std::mem::take(&mut on.passes), std::mem::take(&mut on.lows));
         passes.clear();
         lows.clear();
@@ -50,6 +55,12 @@ impl SampledPlant {
                     let event = self.gain_extremum(chain, on, i);
                     if event.l.norm().ln().abs() < GRAZE {
                         quick.grazes.push(Graze { event, minimum: sinking });
+                    }
+                }
+                if turns_back([on.im[i - 1], y[0], y[1]], on.re[i], g[0]) {
+                    let event = self.angle_extremum(chain, on, i);
+                    if (-event.l).arg().abs() < GRAZE {
+                        quick.turns_back.push(event);
                     }
                 }
             }
@@ -86,6 +97,14 @@ impl SampledPlant {
         quick.unstable_poles = self.outside + outside - turns.end(last, beyond);
         on.quick = quick;
     }
+}
+
+/// Whether L comes nearest to the negative real axis at the middle one of three points, and does not cross it there.
+#[inline(always)]
+pub(super) fn turns_back([before, here, after]: [f64; 3], re: f64, gain: f64) -> bool {
+    let nearest = (here.abs() < before.abs()) & (here.abs() <= after.abs());
+    let one_side = ((here < 0.0) == (before < 0.0)) & ((here < 0.0) == (after < 0.0));
+    nearest & one_side & (here.abs() < -NEAR_AXIS * re) & (gain > FAINT)
 }
 
 /// Integrators of a chain, and its poles outside the unit circle.

@@ -90,6 +90,13 @@ impl SampledPlant {
         Event { w_rad_s: x.exp(), value: (-l).arg().to_degrees(), l, slope }
     }
 
+    /// The extremum of L's angle around the point `i`; value: the gain margin that a crossing there would have (dB).
+    pub(super) fn angle_extremum(&self, chain: &[Section], on: &LoopOnGrid, i: usize) -> Event {
+        let angle: [f64; 3] = std::array::from_fn(|k| (-on.im[i + k - 1]).atan2(-on.re[i + k - 1]));
+        let (x, l, slope) = self.extremum(chain, i, angle, |_, s| 0.5 * s.im);
+        Event { w_rad_s: x.exp(), value: -10.0 * LOG10_E * l.norm_sqr().ln(), l, slope }
+    }
+
     /// Where `half_rate`, half the slope of what has the values `y` around the point `i`, is 0: from the vertex of a parabola by secants.
     fn extremum(
         &self,

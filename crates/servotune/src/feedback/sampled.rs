@@ -237,14 +237,15 @@ impl SampledPlant {
                 [at(0), at(1), at(2)]
             };
             let ([g0, g1, g2], [d0, d1, d2]) = (of(gain), of(distance));
-            let ([_, y1, y2], [_, f1, f2]) = (of(im), of(lifted));
+            let ([y0, y1, y2], [_, f1, f2], [_, x1, _]) = (of(im), of(lifted), of(&on.re[..n]));
             let mut hit = false;
             for j in 0..LANES {
                 let crosses = (g1[j] < 1.0) != (g2[j] < 1.0);
                 let passes = ((y1[j] < 0.0) != (y2[j] < 0.0)) | ((f1[j] < 0.0) != (f2[j] < 0.0));
                 let dips = (d1[j] < d0[j]) & (d2[j] >= d1[j]);
                 let turns = ((g2[j] < g1[j]) != (g1[j] < g0[j])) & ((g1[j] - 1.0).abs() < super::judge::NEAR_ONE);
-                hit |= crosses | passes | dips | turns;
+                let back = super::judge::turns_back([y0[j], y1[j], y2[j]], x1[j], g1[j]);
+                hit |= crosses | passes | dips | turns | back;
             }
             if hit {
                 on.hits.push(from as u32);

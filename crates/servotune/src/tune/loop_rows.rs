@@ -48,8 +48,9 @@ impl Row {
 pub(super) const FAR: f64 = 0.5;
 /// Violation of a crossover that does not exist.
 const NOTHING: f64 = 1.0;
-/// Weight of a crossing far from the range: where nothing meets every limit, the edge of the range may give, a crossing decades away may not.
-const FAR_CROSSING: f64 = 10.0;
+/// Weight of a crossing far from the range: where nothing meets every limit, the edge of the range may give, a crossing decades away may not. With
+/// the distance that is kept, |L| stays off 1 there up to a compromise that misses by half.
+const FAR_CROSSING: f64 = 50.0;
 
 /// A frequency at which a limit begins or ends, with the plant there.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -40,6 +40,12 @@ pub(super) fn margin_rows(machine: usize, wanted: usize, w: &Requirement, q: &Qu
         for g in q.grazes.iter().filter(|g| harmful(g, w, nearest)) {
             put(g.event.w_rad_s, zone(g), Moves::Loop(real(if g.minimum { -1.0 } else { 1.0 })));
         }
+    } else {
+        for e in q.turns_back.iter().filter(|e| breaks(e.value, w, nearest, TIE * w.limit)) {
+            // Re(j side d ln C) is the change of the angle towards -180 deg.
+            let angle = (-e.l).arg();
+            put(e.w_rad_s, GRAZE - angle.abs(), Moves::Loop(Complex::new(0.0, angle.signum())));
+        }
     }
 }
 
@@ -56,8 +62,12 @@ fn change(w: &Requirement, e: &Event) -> Complex<f64> {
 
 /// Whether an extremum of |L| near 1 would miss this limit if it were a crossing.
 fn harmful(g: &Graze, w: &Requirement, nearest: Option<&Event>) -> bool {
-    let value = g.event.value;
-    if value > 0.0 { w.violation(value) > 0.0 } else { nearest.is_none_or(|p| -value <= p.value + TIE_DEG) }
+    breaks(g.event.value, w, nearest, TIE_DEG)
+}
+
+/// Whether a margin of this value beside the nearest one would miss the limit, or may when the two change places within `tie`.
+fn breaks(value: f64, w: &Requirement, nearest: Option<&Event>, tie: f64) -> bool {
+    if value > 0.0 { w.violation(value) > 0.0 } else { nearest.is_none_or(|p| -value <= p.value + tie) }
 }
 
 /// How far |L| has come into the forbidden zone around 1 (ln).

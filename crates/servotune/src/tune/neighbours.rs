@@ -22,7 +22,7 @@ const TRIES_A_NOTCH: usize = 4;
 const PATIENCE: usize = 6;
 const LONG_PATIENCE: usize = 16;
 /// The same while no end meets the limits.
-const HOPELESS_PATIENCE: usize = 2;
+const HOPELESS_PATIENCE: usize = 6;
 /// Polishes that must have ended at the best before it counts as repeated.
 const REPEATS: usize = 4;
 /// Ends whose neighbours are tried.
@@ -163,6 +163,9 @@ fn mark(problem: &TuningProblem, x: &[f64]) -> Vec<f64> {
     plain.chain(centres).collect()
 }
 
+/// Kinds of neighbours, taken in turn.
+const KINDS: usize = 5;
+
 /// A neighbour of one of the parents; the better ones have more of them.
 fn neighbour(
     problem: &TuningProblem,
@@ -178,7 +181,7 @@ fn neighbour(
     let other = &parents[((random.uniform() * parents.len() as f64) as usize).min(parents.len() - 1)].x;
     let filters = notches(problem);
     let pick = |random: &mut Random| filters.get((random.uniform() * filters.len() as f64) as usize).copied();
-    match i % 4 {
+    match i % KINDS {
         // One notch where it pays.
         0 => {
             let laid = pick(random).and_then(|filter| placed(problem, &x, filter, random, work));
@@ -206,10 +209,19 @@ fn neighbour(
                 }
             }
         }
+        // One notch drawn anew, wherever that is.
+        3 => {
+            let chosen = pick(random);
+            for ((x, parameter), [from, to]) in x.iter_mut().zip(p.free()).zip(p.bounds()) {
+                if chosen.is_some() && notch(parameter) == chosen {
+                    *x = random.between(*from, *to);
+                }
+            }
+        }
         _ => {}
     }
     // Every number a little, or in a plain neighbour more.
-    let plain = i % 4 == 3 || filters.is_empty();
+    let plain = i % KINDS == KINDS - 1 || filters.is_empty();
     let shake = if plain { SHAKE * 4f64.powf(random.uniform()) } else { 0.1 * SHAKE };
     for (x, [from, to]) in x.iter_mut().zip(p.bounds()) {
         *x = (*x + shake * random.normal()).clamp(*from, *to);

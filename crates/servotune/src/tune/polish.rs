@@ -168,56 +168,58 @@ fn plan(
 ) -> Step {
     let n = x.len();
     let size = n + 2;
-    let mut p = Quadratic { h: vec![0.0; size * size], q: vec![0.0; size], a: Vec::new(), b: Vec::new() };
+    let bounds = problem.parameters().bounds();
+    let reach: Vec<[f64; 2]> = x
+        .iter()
+        .zip(bounds)
+        .map(|(x, [from, to])| [-radius.min(x - from).max(0.0), radius.min(to - x).max(0.0)])
+        .collect();
+    let mut p = Quadratic::new(size, reach.clone());
     for j in 0..n {
-        for k in 0..n {
-            // When only limits count, a little convexity picks the shortest of equal steps.
-            p.h[j * size + k] = if goal == Goal::Best {
-                hessian[j * n + k]
-            } else if j == k {
-                1e-3
-            } else {
-                0.0
-            };
+        // When only limits count, a little convexity picks the shortest of equal steps.
+        match goal {
+            Goal::Best => (0..n).for_each(|k| p.curve(j, k, hessian[j * n + k])),
+            _ => p.curve(j, j, 1e-3),
         }
     }
-    p.h[n * size + n] = 1e-9;
-    p.h[(n + 1) * size + n + 1] = 1e-9;
+    p.curve(n, n, 1e-9);
+    p.curve(n + 1, n + 1, 1e-9);
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     let mut row = vec![0.0; size];
     let objectives = if goal == Goal::Best { here.objectives.as_slice() } else { &[] };
-    p.q[n] = if goal == Goal::Best { 1.0 } else { 0.0 };
-    p.q[n + 1] = if goal == Goal::Best { price } else { 1.0 };
+    p.pull(n, if goal == Goal::Best { 1.0 } else { 0.0 });
+    p.pull(n + 1, if goal == Goal::Best { price } else { 1.0 });
     for (value, gradient) in objectives {
         row[..n].copy_from_slice(gradient);
         (row[n], row[n + 1]) = (-1.0, 0.0);
         p.row(&row, here.score.objective - value);
     }
-    for r in &here.rows {
-        row[..n].copy_from_slice(&r.gradient);
-        (row[n], row[n + 1]) = (0.0, -1.0);
+    let mut rows = Vec::with_capacity(here.rows.len());
+    for (number, r) in here.rows.iter().enumerate() {
         let bend = bent.and_then(|(there, d)| {
             let value = there.iter().find(|other| r.row.same(other))?.value;
             Some((value - r.row.value - dot(&r.gradient, d)).max(0.0))
         });
-        p.row(&row, -r.row.value - bend.unwrap_or(0.0));
+        let level = -r.row.value - bend.unwrap_or(0.0);
+        // A limit that no step within reach brings to 0 holds nothing back, unless room is what is asked for.
+        let most: f64 = r.gradient.iter().zip(&reach).map(|(g, [from, to])| (g * from).max(g * to)).sum();
+        if goal != Goal::Room && most < level {
+            continue;
+        }
+        row[..n].copy_from_slice(&r.gradient);
+        (row[n], row[n + 1]) = (0.0, -1.0);
+        p.row(&row, level);
+        rows.push(number);
     }
     row.fill(0.0);
     row[n + 1] = -1.0;
     p.row(&row, if goal == Goal::Room { MOST_ROOM } else { 0.0 });
-    row.fill(0.0);
-    for (j, (x, [from, to])) in x.iter().zip(problem.parameters().bounds()).enumerate() {
-        row[j] = 1.0;
-        p.row(&row, radius.min(to - x).max(0.0));
-        row[j] = -1.0;
-        p.row(&row, radius.min(x - from).max(0.0));
-        row[j] = 0.0;
-    }
     let (z, multiplier) = p.solve();
     let d = z[..n].to_vec();
     let least = if goal == Goal::Room { -MOST_ROOM } else { 0.0 };
     let left = here.rows.iter().map(|r| r.row.value + dot(&r.gradient, &d)).fold(least, f64::max);
-    let curved: f64 = 0.5 * (0..n).map(|j| d[j] * dot(&p.h[j * size..j * size + n], &d)).sum::<f64>();
+    let curved = |j: usize| (0..n).map(|k| p.curved(j, k) * d[k]).sum::<f64>();
+    let curved: f64 = 0.5 * (0..n).map(|j| d[j] * curved(j)).sum::<f64>();
     let promised = match goal {
         Goal::Best => {
             let objective = objectives.iter().map(|(v, g)| v + dot(g, &d)).fold(f64::NEG_INFINITY, f64::max);
@@ -227,13 +229,9 @@ fn plan(
         Goal::Room => here.score.violation - left,
     };
     let count = objectives.len();
-    Step {
-        d,
-        promised,
-        objective_share: multiplier[..count].to_vec(),
-        multiplier: multiplier[count..count + here.rows.len()].to_vec(),
-        violation_left: left,
-    }
+    let mut of_rows = vec![0.0; here.rows.len()];
+    rows.iter().zip(&multiplier[count..]).for_each(|(row, m)| of_rows[*row] = *m);
+    Step { d, promised, objective_share: multiplier[..count].to_vec(), multiplier: of_rows, violation_left: left }
 }
 
 /// Change of the Lagrangian's gradient between two candidates; limits without a counterpart are left out of both.

@@ -12,7 +12,9 @@ use nalgebra::Complex;
 use std::f64::consts::TAU;
 
 /// Numbers that a loop is shaped by, each from 0 to 1.
-const SHARES: usize = 11;
+const SHARES: usize = 15;
+/// Notches that have shares of their own; further ones take them again.
+const NOTCHES: usize = 4;
 
 /// What a shaped loop is made from.
 #[derive(Clone, Copy, Debug)]
@@ -24,12 +26,44 @@ struct Shape {
     integral: f64,
     /// Where a low-pass lies, 0 to 1 between its bounds (ln).
     lowpass: f64,
-    notch_depth: f64,
-    notch_damping: f64,
+    notch_depth: [f64; NOTCHES],
+    notch_damping: [f64; NOTCHES],
     /// Where other numbers lie between their bounds (ln).
     other: f64,
-    /// Where each notch lies between its bounds (ln); none lays it on the plant's modes.
-    notch: [Option<f64>; 4],
+    notch: [Place; NOTCHES],
+}
+
+/// Where a notch lies.
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    /// On the plant's mode of this rank, the worst first.
+    Mode(usize),
+    /// This share of the way between its bounds (ln).
+    At(f64),
+}
+
+/// How the notches of one start are laid.
+#[derive(Clone, Copy, Debug)]
+enum Laying {
+    /// On the worst modes, one each.
+    Modes,
+    /// Anywhere.
+    Anywhere,
+    /// Each on a mode or anywhere, two perhaps on one.
+    Mixed,
+}
+
+impl Laying {
+    const ALL: [Laying; 3] = [Laying::Modes, Laying::Anywhere, Laying::Mixed];
+
+    fn place(self, notch: usize, share: f64) -> Place {
+        match self {
+            Laying::Modes => Place::Mode(notch),
+            Laying::Mixed if share < 0.5 => Place::Mode((2.0 * share * NOTCHES as f64) as usize),
+            Laying::Mixed => Place::At(2.0 * share - 1.0),
+            Laying::Anywhere => Place::At(share),
+        }
+    }
 }
 
 /// `count` decision vectors or more: the given ones, two by rule, then strata under `seed`.
@@ -41,10 +75,10 @@ pub(super) fn starts(problem: &TuningProblem, given: &[Vec<f64>], seed: u64, cou
         lead: 1.3,
         integral: 8.0,
         lowpass: 0.8,
-        notch_depth: 0.2,
-        notch_damping: 0.3,
+        notch_depth: [0.2; NOTCHES],
+        notch_damping: [0.3; NOTCHES],
         other: 0.5,
-        notch: [None; 4],
+        notch: std::array::from_fn(Place::Mode),
     };
     for crossover_hz in [plain.crossover_hz, (low * low * high).cbrt()] {
         all.push(shaped(problem, 0, &Shape { crossover_hz, ..plain }));
@@ -62,8 +96,7 @@ pub(super) fn starts(problem: &TuningProblem, given: &[Vec<f64>], seed: u64, cou
     let columns: [Vec<f64>; SHARES] = std::array::from_fn(|_| column());
     let row = |i: usize| std::array::from_fn(|c| columns[c][i]);
     for i in 0..n {
-        // Every other start lays its notches on modes, the rest anywhere between their bounds.
-        let shape = Shape::of(problem, &row(i), i % 2 == 0);
+        let shape = Shape::of(problem, &row(i), Laying::ALL[i % 3]);
         all.push(shaped(problem, i % problem.machines.len(), &shape));
     }
     all
@@ -72,24 +105,29 @@ pub(super) fn starts(problem: &TuningProblem, given: &[Vec<f64>], seed: u64, cou
 /// One more shaped loop.
 pub(super) fn further(problem: &TuningProblem, random: &mut Random) -> Vec<f64> {
     let shares = std::array::from_fn(|_| random.uniform());
-    let on_modes = random.uniform() < 0.5;
-    shaped(problem, 0, &Shape::of(problem, &shares, on_modes))
+    let laying = Laying::ALL[((random.uniform() * 3.0) as usize).min(2)];
+    shaped(problem, 0, &Shape::of(problem, &shares, laying))
 }
 
 impl Shape {
-    fn of(problem: &TuningProblem, share: &[f64; SHARES], on_modes: bool) -> Shape {
+    fn of(problem: &TuningProblem, share: &[f64; SHARES], laying: Laying) -> Shape {
         let [low, high] = problem.parameters.ranges().crossover_hz;
         let between = |c: usize, from: f64, to: f64| from + (to - from) * share[c];
+        // Of one share and one of the notch's, so that each is uniform.
+        let spread = |c: usize, k: usize, from: f64, to: f64| {
+            from + (to - from) * (share[c] + share[11 + (k + c) % NOTCHES]).fract()
+        };
         Shape {
             crossover_hz: low * (high / low).powf(share[0]),
             // Some loops lead by notches alone, or rise by the integral alone.
             lead: 10f64.powf(if share[1] < 0.2 { -2.7 + 10.0 * share[1] } else { between(1, -1.2, 1.7) }),
             integral: 10f64.powf(between(2, -0.3, 2.4)),
             lowpass: share[3],
-            notch_depth: 10f64.powf(between(4, -1.5, -0.05)),
-            notch_damping: 10f64.powf(between(5, -1.3, -0.1)),
+            // Each notch has a depth and a width of its own: one may hide a narrow mode, another turn the phase over an octave.
+            notch_depth: std::array::from_fn(|k| 10f64.powf(spread(4, k, -1.5, -0.05))),
+            notch_damping: std::array::from_fn(|k| 10f64.powf(spread(5, k, -1.3, -0.1))),
             other: share[6],
-            notch: std::array::from_fn(|k| if on_modes { None } else { Some(share[7 + k]) }),
+            notch: std::array::from_fn(|k| laying.place(k, share[7 + k])),
         }
     }
 }
@@ -117,17 +155,16 @@ fn shaped(problem: &TuningProblem, machine: usize, s: &Shape) -> Vec<f64> {
             Parameter::LowpassFrequency { filter } => c.lowpass[filter].frequency_hz = share(s.lowpass),
             Parameter::DerivativeFilter => c.pid.derivative_filter_s = share(s.other),
             Parameter::NotchFrequency { filter } => {
-                let at = s.notch[filter % s.notch.len()];
-                let mode = || worst_mode(m, s.crossover_hz, filter).map(|hz| hz.clamp(from.exp(), to.exp()));
-                let hz = match at {
-                    Some(x) => share(x),
-                    None => mode().unwrap_or_else(|| share((filter as f64 + 1.0) / 4.0)),
+                let mode = |k: usize| worst_mode(m, s.crossover_hz, k).map(|hz| hz.clamp(from.exp(), to.exp()));
+                let hz = match s.notch[filter % NOTCHES] {
+                    Place::At(x) => share(x),
+                    Place::Mode(k) => mode(k).unwrap_or_else(|| share((filter as f64 + 1.0) / 4.0)),
                 };
                 c.notch[filter].frequency_hz = hz;
             }
             Parameter::NotchPoleDamping { filter } => {
                 // A range beyond a notch's own is a peak filter's.
-                let damping = if to.exp() > 0.5 { s.notch_damping } else { share(s.other) };
+                let damping = if to.exp() > 0.5 { s.notch_damping[filter % NOTCHES] } else { share(s.other) };
                 c.notch[filter].pole_damping_ratio = damping.clamp(from.exp(), to.exp());
             }
             _ => {}
@@ -135,7 +172,8 @@ fn shaped(problem: &TuningProblem, machine: usize, s: &Shape) -> Vec<f64> {
     }
     for (parameter, [from, to]) in p.free().iter().zip(p.bounds()) {
         if let Parameter::NotchDepth { filter } = *parameter {
-            let depth = if *to > 0.0 { (from + 0.3 * (to - from) * s.other).exp() } else { s.notch_depth };
+            let depth =
+                if *to > 0.0 { (from + 0.3 * (to - from) * s.other).exp() } else { s.notch_depth[filter % NOTCHES] };
             c.notch[filter].zero_damping_ratio = depth * c.notch[filter].pole_damping_ratio;
         }
     }
