@@ -164,9 +164,9 @@ fn lines(text: &str) -> Result<(usize, usize), String> {
 
 /// Closed-loop PES of a spiral write and its DFT
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Example:\n  servotune simulate --plant specs/machines/healthy.toml --controller specs/controllers/nominal.toml --profile specs/profiles/spiral.toml"
-)]
+#[command(after_help = "Examples:
+  servotune simulate --plant specs/machines/healthy.toml --controller specs/controllers/nominal.toml --profile specs/profiles/spiral.toml
+  servotune simulate --plant plant.toml --controller gains.toml --profile spiral.toml --spec spec.toml --report write.html")]
 pub(super) struct SimulateArguments {
     /// Plant model (plant.toml)
     #[arg(long, value_name = "PLANT")]
@@ -180,6 +180,15 @@ pub(super) struct SimulateArguments {
     /// Also write the record, one row a servo sample, as CSV
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
+    /// HTML page to write: PES with its window, DFT, cumulative spectrum, command, position
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// Limits that the page draws and judges (spec.toml): those on DFT, harmonics and command
+    #[arg(long, value_name = "SPEC", requires = "report")]
+    pub spec: Option<PathBuf>,
+    /// Replace what stands at the place of the page; it is kept under another name, which is said
+    #[arg(long, requires = "report")]
+    pub force: bool,
 }
 
 /// Search PID, low-pass and notch gains that meet the limits of a spec

@@ -1,14 +1,17 @@
 //! `servotune budget`: the sources of a PES, and predicted figures of gains never run.
 
+use super::outputs::Outputs;
 use super::performance_arguments::BudgetArguments;
 use super::{Ending, Failure, Screen, load};
 use serde::Serialize;
+use servotune::document::{read_text, sha256_hex, write_text};
 use servotune::feedback::{ModelLoop, confirmed_margins};
 use servotune::lti::DiscretePlant;
 use servotune::pes::{Budget, PredictSettings, Prediction, budget, predict};
 use servotune::tune::TuneError;
 use servotune_report::budget::{budget_table, prediction_table};
-use std::path::Path;
+use servotune_report::budget_page::{BudgetView, budget_page};
+use std::path::{Path, PathBuf};
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -27,6 +30,8 @@ struct Predicted<'a> {
 }
 
 pub(super) fn run(a: &BudgetArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let inputs: Vec<PathBuf> = [&a.plant, &a.controller, &a.profile].into_iter().chain(&a.predict).cloned().collect();
+    let outputs = Outputs::new(&a.report.iter().collect::<Vec<_>>(), &inputs, a.force)?;
     let plant = load::plant(&a.plant)?;
     if let Some(p) = plant.physics.first() {
         return Err(TuneError::Physics { effect: p.effect.clone() }.into());
@@ -57,6 +62,25 @@ pub(super) fn run(a: &BudgetArguments, screen: &mut Screen) -> Result<Ending, Fa
         predictions.push(Predicted { controller: file, prediction });
     }
     let whole = found.is_some() && predictions.iter().all(|p| p.prediction.is_some());
+    if let Some(file) = &a.report {
+        let mut provenance = vec![("program".to_owned(), format!("servotune {}", env!("CARGO_PKG_VERSION")))];
+        for input in &inputs {
+            provenance.push((input.display().to_string(), sha256_hex(read_text(input)?.as_bytes())));
+        }
+        let shown: Vec<_> = predictions.iter().map(|p| (p.controller.display().to_string(), p.prediction)).collect();
+        let view = BudgetView {
+            name: &a.plant.display().to_string(),
+            budget: found.as_ref(),
+            predictions: &shown,
+            rate_hz: profile.pes.sample_rate_hz,
+            unit: &plant.position_unit,
+            provenance,
+        };
+        let page = budget_page(&view)?.html();
+        outputs.keep_old(screen)?;
+        write_text(file, &page)?;
+        screen.say(&format!("wrote {}", file.display()));
+    }
     let document = Document {
         schema: "servotune.budget/1",
         position_unit: &plant.position_unit,

@@ -1,13 +1,16 @@
 //! `servotune classify`: class, probability and what to do, row by row.
 
 use super::gate_arguments::ClassifyArguments;
+use super::outputs::Outputs;
 use super::{Ending, Failure, Screen};
-use servotune::gate::{Gate, Table, Verdict};
+use servotune::document::{read_text, sha256_hex, write_text};
+use servotune::gate::{Gate, Table};
 use servotune_answer::classified;
-use servotune_report::number::NumberFormat;
-use servotune_report::table::{self, Column};
+use servotune_report::classified::{ClassifiedView, classified_page, machines_table};
 
 pub(super) fn run(a: &ClassifyArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let inputs = [a.table.clone(), a.gate.clone()];
+    let outputs = Outputs::new(&a.report.iter().collect::<Vec<_>>(), &inputs, a.force)?;
     let gate = Gate::read(&a.gate)?;
     let table = Table::read(&a.table, Some(&gate.label))?;
     let document = classified(Some(&a.gate), &gate, &table)?;
@@ -20,30 +23,23 @@ pub(super) fn run(a: &ClassifyArguments, screen: &mut Screen) -> Result<Ending, 
             moved.join(", ")
         ));
     }
-    screen.result(&document, &text(&document.rows)?)?;
-    Ok(if document.abstained == 0 { Ending::Accepted } else { Ending::Rejected })
-}
-
-fn text(rows: &[Verdict]) -> Result<String, Failure> {
-    let mut t = table::Table::new(
-        "Machines",
-        vec![
-            Column::words("machine"),
-            Column::words("class"),
-            Column::numbers("probability", "", NumberFormat::Decimals(4)),
-            Column::words("action"),
-            Column::words("why"),
-        ],
-    );
-    for v in rows {
-        let name = v.id.clone().unwrap_or_else(|| format!("line {}", v.line));
-        t.push(vec![
-            name.as_str().into(),
-            v.class_name.as_str().into(),
-            v.probability.into(),
-            v.action.word().into(),
-            v.why.as_str().into(),
-        ])?;
+    if let Some(file) = &a.report {
+        let mut provenance = vec![("program".to_owned(), format!("servotune {}", env!("CARGO_PKG_VERSION")))];
+        for input in &inputs {
+            provenance.push((input.display().to_string(), sha256_hex(read_text(input)?.as_bytes())));
+        }
+        let view = ClassifiedView {
+            name: &a.table.display().to_string(),
+            rows: &document.rows,
+            drift: &document.drift,
+            judged: document.judged.as_ref().map(|j| (j.rows, j.accuracy, &j.decisions)),
+            provenance,
+        };
+        let page = classified_page(&view)?.html();
+        outputs.keep_old(screen)?;
+        write_text(file, &page)?;
+        screen.say(&format!("wrote {}", file.display()));
     }
-    Ok(t.text())
+    screen.result(&document, &machines_table(&document.rows)?.text())?;
+    Ok(if document.abstained == 0 { Ending::Accepted } else { Ending::Rejected })
 }

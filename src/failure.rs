@@ -57,6 +57,10 @@ pub enum Failure {
     )]
     Unit { file: PathBuf, found: String, expected: String },
     #[error(
+        "--controller is given {found} times; expected once with --frf: of a sweep one loop is judged at a time, several on a model (--plant)"
+    )]
+    OneController { found: usize },
+    #[error(
         "--measured {measured} needs the controller that ran during the sweep; give it with --measured-with or --controller"
     )]
     NoController { measured: Measured },

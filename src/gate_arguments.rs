@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   servotune train features.csv --label label --out gate.json
-  servotune train features.csv --label label --search --out gate.json
+  servotune train features.csv --label label --search --out gate.json --report gate.html
   servotune train iris.csv --label species --features 4 --hidden 32,32 --out iris.json
   servotune train features.csv --label label --costs costs.toml --out gate.json
 
@@ -71,6 +71,12 @@ pub(super) struct TrainArguments {
     /// Action of every class (TOML: class = "none", "repair_sensor", "repair_pushpin", "tune" or "inspect")
     #[arg(long, value_name = "FILE")]
     pub actions: Option<PathBuf>,
+    /// HTML page to write: confusion, features, losses, calibration, decisions
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// Replace what stands at the place of the page; it is kept under another name, which is said
+    #[arg(long, requires = "report")]
+    pub force: bool,
 }
 
 impl TrainArguments {
@@ -99,8 +105,9 @@ impl TrainArguments {
 
 /// Class, probability and what to do for each machine of a table
 #[derive(Debug, Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
   servotune classify today.csv --gate gate.json --json
+  servotune classify today.csv --gate gate.json --report today.html
 
 Exit code 1: at least one machine was left to a person (action `inspect`).")]
 pub(super) struct ClassifyArguments {
@@ -110,4 +117,10 @@ pub(super) struct ClassifyArguments {
     /// Gate (gate.json)
     #[arg(long, value_name = "GATE")]
     pub gate: PathBuf,
+    /// HTML page to write: the machines with class, probability and action, and how the table differs from training
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// Replace what stands at the place of the page; it is kept under another name, which is said
+    #[arg(long, requires = "report")]
+    pub force: bool,
 }

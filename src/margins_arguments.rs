@@ -10,6 +10,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   servotune margins --plant specs/machines/healthy.toml --controller specs/controllers/nominal.toml
   servotune margins --plant plant_corrected.toml --controller specs/controllers/nominal.toml --amplitudes 0.02:15
+  servotune margins --plant plant.toml --controller today.toml --controller gains.toml --report margins.html
   servotune margins --frf slot07.bod --controller specs/controllers/nominal.toml
   servotune margins --frf sensitivity.csv --measured S --controller specs/controllers/nominal.toml
   servotune margins --frf bearing.bod --unstable-poles 1 --controller bearing_controller.toml")]
@@ -23,9 +24,10 @@ pub(super) struct MarginsArguments {
     /// The sweep was taken through the controller's own hold, which is then not applied again
     #[arg(long, requires = "frf")]
     pub hold_included: bool,
-    /// Controller (controller.toml) or gain table (gains.toml)
-    #[arg(long, value_name = "CONTROLLER")]
-    pub controller: PathBuf,
+    /// Controller (controller.toml) or gain table (gains.toml); of a model it may be given several times: each is judged, and the page shows
+    /// all of them in the same pictures
+    #[arg(long, value_name = "CONTROLLER", required = true)]
+    pub controller: Vec<PathBuf>,
     /// HTML page to write: the loop of a model, its sensitivity functions, its steps
     #[arg(long, value_name = "FILE", conflicts_with = "frf")]
     pub report: Option<PathBuf>,

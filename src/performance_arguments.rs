@@ -42,7 +42,8 @@ pub(super) struct ParetoArguments {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   servotune budget --plant specs/machines/healthy.toml --controller specs/controllers/nominal.toml --profile specs/profiles/spiral.toml
-  servotune budget --plant plant.toml --controller today.toml --profile spiral.toml --predict gains.toml --model-error 0.03")]
+  servotune budget --plant plant.toml --controller today.toml --profile spiral.toml --predict gains.toml --model-error 0.03
+  servotune budget --plant plant.toml --controller today.toml --profile spiral.toml --predict gains.toml --report budget.html")]
 pub(super) struct BudgetArguments {
     /// Plant model (plant.toml)
     #[arg(long, value_name = "PLANT")]
@@ -62,6 +63,12 @@ pub(super) struct BudgetArguments {
     /// Relative deviation of model and noise levels, beside the draws
     #[arg(long, value_name = "RATIO", default_value_t = 0.0, value_parser = not_negative)]
     pub model_error: f64,
+    /// HTML page to write: shares as bars, the cumulative spectrum by source, predictions
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// Replace what stands at the place of the page; it is kept under another name, which is said
+    #[arg(long, requires = "report")]
+    pub force: bool,
 }
 
 /// The few tones that would narrow the intervals of the margins most

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   servotune verify gains.toml --plant plant.toml --spec spec.toml
   servotune verify gains.toml --plant room.toml --plant cold.toml --plant hot.toml --spec spec.toml --uncertainty gain=5%,frequency=2%,damping=20%,delay=5%
+  servotune verify gains.toml --plant cold.toml --plant hot.toml --spec spec.toml --report proof.html
   servotune verify gains.toml --frf slot07.bod --min-damping 0.01 --spec spec.toml
   servotune verify gains.toml --plant plant.toml --spec spec.toml --word-length 24 --fraction-bits 20 --out gains.certificate.json
   servotune verify gains.toml --plant plant.toml --spec spec.toml --certificate gains.certificate.json
@@ -64,6 +65,12 @@ pub(super) struct VerifyArguments {
     /// Certificate to write
     #[arg(long, value_name = "CERTIFICATE")]
     pub out: Option<PathBuf>,
+    /// HTML page to write: every limit with its proven interval, machine by machine, what is left open, the box
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// Replace what stands at the place of the page; it is kept under another name, which is said
+    #[arg(long, requires = "report")]
+    pub force: bool,
 }
 
 impl VerifyArguments {

@@ -125,6 +125,7 @@ fn figures() -> Vec<(&'static str, Figure)> {
         before: Some(&dft_before),
         after: &dft_after,
         limits: &[(hz[0], 0.02), (hz[1], 0.02), (hz[2], 0.02), (hz[7], 0.01), (hz[8], 0.01), (hz[15], 0.006)],
+        bands_hz: &[[600.0, 1500.0], [1500.0, 3000.0]],
         unit: "track",
         until_hz: 4000.0,
     };

@@ -17,15 +17,18 @@ pub struct Classified<'a> {
     /// Features that are not distributed as in training.
     pub drift: Drift,
     /// Where the table has the gate's label column: what the decisions came to.
-    judged: Option<Judged>,
+    pub judged: Option<Judged>,
 }
 
 /// Decisions against the table's own labels.
 #[derive(Serialize)]
 pub struct Judged {
-    rows: usize,
-    accuracy: f64,
-    decisions: Decisions,
+    /// Rows with a label of the gate.
+    pub rows: usize,
+    /// Share of them whose class is right.
+    pub accuracy: f64,
+    /// What the decisions came to.
+    pub decisions: Decisions,
 }
 
 /// Classifies a table; `file` is the gate's, where it has one.

@@ -28,10 +28,10 @@ pub use floor::{FloorFiles, floor_files};
 pub use identified::IdentifiedDocument;
 pub use judged::{Described, ModelMargins, model_context, model_margins};
 pub use named::{Named, controller, plant, profile};
-pub use pages::{identified_page, margins_page};
+pub use pages::{compared_page, identified_page, margins_page};
 pub use physics::{for_a_loop, outside, restored};
 pub use proof::Proof;
-pub use simulated::{Simulated, simulated};
+pub use simulated::{Simulated, simulated, written_page};
 pub use sweep::{Ran, adjusted, opened};
 pub use tuned::{Asked, Given, Reached, TunedDocument, given_model, given_sweep, tuned};
 

@@ -10,6 +10,7 @@ use servotune::identify::Identified;
 use servotune::lti::Plant;
 use servotune::tune::{Minimise, Objective, Spec};
 use servotune_report::number::NumberFormat;
+use servotune_report::overlay::overlay_page;
 use servotune_report::page::{Card, Page, Section};
 use servotune_report::slot::{SlotView, loop_page};
 use servotune_report::table::Verdict;
@@ -95,4 +96,18 @@ pub fn margins_page(
         gains: Vec::new(),
         provenance,
     })?)
+}
+
+/// The page of `margins --plant` with several controllers: all of them in the same pictures, linear.
+pub fn compared_page(
+    plant: Named<'_, Plant>,
+    controllers: &[Named<'_, Controller>],
+    provenance: Vec<(String, String)>,
+) -> Result<Page, AnswerError> {
+    let loops = controllers
+        .iter()
+        .map(|c| linear_view(&c.file.display().to_string(), plant.value, c.value))
+        .collect::<Result<Vec<_>, _>>()?;
+    let beyond = (!plant.value.physics.is_empty()).then_some("Effects beyond linear are left out of this page.");
+    Ok(overlay_page(&plant.file.display().to_string(), &loops, units(plant.value), beyond, provenance)?)
 }

@@ -1,12 +1,12 @@
 //! One slot tuned: what `tune` and `demo` share, from the machine to the gain table and the page.
 
 use super::AnswerError;
-use super::steps::step_responses;
+use super::steps::{move_record, step_responses};
 use servotune::controller::Controller;
 use servotune::feedback::{ModelLoop, OpenLoop, confirmed_margins};
 use servotune::frf::Sweep;
 use servotune::identify::Identified;
-use servotune::lti::{DiscretePlant, Plant};
+use servotune::lti::{DiscretePlant, FrequencyResponse, Plant};
 use servotune::pes::{figures, simulate, simulate_physical};
 use servotune::physics::Restored;
 use servotune::tune::{GainTable, Hold, Judged, Machine, Outcome, PhysicalTuning, Spec, judge, margin_intervals};
@@ -79,10 +79,13 @@ pub(super) fn linear_view(name: &str, plant: &Plant, c: &Controller) -> Result<L
     Ok(LoopView {
         name: name.to_owned(),
         open_loop: w.iter().map(|&w| l.at(w)).collect(),
+        plant: w.iter().map(|&w| sampled.at(w)).collect(),
+        sample_time_s: c.sample_time_s,
         hz: w.into_iter().map(|w| w / TAU).collect(),
         margins,
         write: None,
         steps,
+        move_end: None,
         judged: None,
     })
 }
@@ -100,6 +103,10 @@ fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Res
             let figures = figures(&write.pes, profile);
             (write, figures)
         });
+        // With physics the steps and the end of the move would be another machine's.
+        if slot.spec.limits.at_end.any() && slot.physics.is_none() && view.margins.stable {
+            view.move_end = Some(move_record(slot.plant, c, profile)?);
+        }
     }
     view.judged = Some(judged);
     Ok(view)

@@ -4,7 +4,7 @@ use super::{Study, StudyError};
 use nalgebra::Complex;
 use servotune::feedback::{Margins, ModelLoop, OpenLoop, margins};
 use servotune::lti::{DiscretePlant, FrequencyResponse};
-use servotune::pes::{PesFigures, figures, simulate};
+use servotune::pes::{HIGH_BAND_HZ, LOW_BAND_HZ, PesFigures, figures, simulate};
 use servotune::twin::{MachineClass, nominal_controller, paper_machine, paper_profile};
 use servotune_report::bode::{BodeCurve, BodeMarks, bode};
 use servotune_report::figure::Ink;
@@ -87,6 +87,7 @@ pub fn classes() -> Result<Study, StudyError> {
             before: Some(&before),
             after: &after,
             limits: &[],
+            bands_hz: &[LOW_BAND_HZ, HIGH_BAND_HZ],
             unit: "track",
             until_hz: 3300.0,
         };

@@ -6,6 +6,16 @@ use super::table::{Column, Table};
 use servotune::feedback::{Interval, SweepPlan};
 use servotune::pes::{Budget, Prediction, Range, Source};
 
+/// A source in words.
+pub(super) fn source_name(s: Source) -> &'static str {
+    match s {
+        Source::Move => "the move itself",
+        Source::Runout => "run-out",
+        Source::Encoder => "encoder noise",
+        Source::Windage => "windage",
+    }
+}
+
 /// The sources of a PES, largest first.
 pub fn budget_table(b: &Budget, unit: &str) -> Result<Table, ReportError> {
     let digits = NumberFormat::Significant(4);
@@ -23,15 +33,9 @@ pub fn budget_table(b: &Budget, unit: &str) -> Result<Table, ReportError> {
         ],
     );
     for s in &b.sources {
-        let name = match s.source {
-            Source::Move => "the move itself",
-            Source::Runout => "run-out",
-            Source::Encoder => "encoder noise",
-            Source::Windage => "windage",
-        };
         let [low, high, all] = s.share.map(|x| 100.0 * x);
         table.push(vec![
-            name.into(),
+            source_name(s.source).into(),
             s.dft_low.into(),
             low.into(),
             s.dft_high.into(),

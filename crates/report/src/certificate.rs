@@ -3,18 +3,16 @@
 use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Column, Table};
-use servotune::verify::{Bounded, Certificate, Finding, Stability, Verdict, WriteBox, WriteOpen};
+use servotune::verify::{
+    Bounded, CaseProof, Certificate, Finding, ProvenLimit, Stability, Verdict, WriteBox, WriteOpen,
+};
 
 /// One table a machine, then the findings and the verdict.
 pub fn certificate_text(c: &Certificate) -> Result<String, ReportError> {
     let digits = NumberFormat::Significant(6);
     let mut text = String::new();
     for (i, case) in c.cases.iter().enumerate() {
-        let stability = match case.bounds.stability {
-            Stability::Stable => "stable",
-            Stability::Unstable => "UNSTABLE",
-            Stability::Undecided => "not proved stable",
-        };
+        let stability = stability_words(case.bounds.stability);
         let count = case.bounds.encirclements.map_or("not counted".to_owned(), |n| n.to_string());
         text += &format!(
             "Machine {} ({}): {stability}; encirclements of -1: {count}; {} cells.\n",
@@ -100,24 +98,8 @@ pub fn certificate_sentence(c: &Certificate) -> String {
             Stability::Undecided => parts.push(format!("{of}stability is not proved")),
         }
         for l in case.limits.iter().filter(|l| l.verdict != Verdict::Proved) {
-            let (side, end, way) = if l.side == "at_least" {
-                ("at least", l.proven.low, "at least")
-            } else {
-                ("at most", l.proven.high, "at most")
-            };
-            let proven = match end {
-                Some(x) => format!("{way} {x:.4} is proved"),
-                None if l.side == "at_most"
-                    && case.write_box.as_ref().is_some_and(|w| w.open.is_some() && l.proven.low.is_some()) =>
-                {
-                    case.write_box.as_ref().map_or(String::new(), |w| write_line(w).trim_end_matches('.').to_owned())
-                }
-                None if c.sweep.is_some() && case.write.is_none() && l.proven.high.is_none() => {
-                    "a sweep alone does not prove it".into()
-                }
-                None if c.uncertainty.any() && l.proven.low.is_some() => "no bound over a box".into(),
-                None => "no bound is proved".into(),
-            };
+            let side = if l.side == "at_least" { "at least" } else { "at most" };
+            let proven = open_reason(c, case, l);
             // A certificate keeps the field of the plant file in which the unit stands; a sentence says what it means.
             let unit = match l.unit.as_str() {
                 "position_unit" => "position units",
@@ -137,8 +119,35 @@ pub fn certificate_sentence(c: &Certificate) -> String {
     format!("Not proved: {}.", parts.join("; "))
 }
 
+/// What is proved of a limit that is not, or why nothing is.
+pub(super) fn open_reason(c: &Certificate, case: &CaseProof, l: &ProvenLimit) -> String {
+    let (end, way) = match l.side.as_str() {
+        "at_least" => (l.proven.low, "at least"),
+        _ => (l.proven.high, "at most"),
+    };
+    let over_box = case.write_box.as_ref().filter(|w| w.open.is_some() && l.proven.low.is_some());
+    match (end, over_box) {
+        (Some(x), _) => format!("{way} {x:.4} is proved"),
+        (None, Some(w)) if l.side == "at_most" => write_line(w).trim_end_matches('.').to_owned(),
+        _ if c.sweep.is_some() && case.write.is_none() && l.proven.high.is_none() => {
+            "a sweep alone does not prove it".into()
+        }
+        _ if c.uncertainty.any() && l.proven.low.is_some() => "no bound over a box".into(),
+        _ => "no bound is proved".into(),
+    }
+}
+
+/// Stability in words.
+pub(super) fn stability_words(s: Stability) -> &'static str {
+    match s {
+        Stability::Stable => "stable",
+        Stability::Unstable => "UNSTABLE",
+        Stability::Undecided => "not proved stable",
+    }
+}
+
 /// What was done for the write over a box, or why there is no bound.
-fn write_line(w: &WriteBox) -> String {
+pub(super) fn write_line(w: &WriteBox) -> String {
     match w.open {
         None => format!("The write is bounded over the whole box, in {} pieces.", w.boxes),
         Some(why) => {

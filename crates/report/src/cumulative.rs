@@ -5,13 +5,12 @@
 
 use super::error::ReportError;
 use super::figure::{Axis, Figure, Ink, Kind, Panel, Series};
-use servotune::pes::PesFigures;
+use servotune::pes::Harmonic;
 
 /// Rms up to each harmonic.
-fn cumulative(figures: &PesFigures, rate_hz: f64) -> Vec<f64> {
+fn cumulative(harmonics: &[Harmonic], rate_hz: f64) -> Vec<f64> {
     let mut sum = 0.0;
-    figures
-        .harmonics
+    harmonics
         .iter()
         .map(|h| {
             let share = if (2.0 * h.hz - rate_hz).abs() < 1e-9 * rate_hz { 1.0 } else { 2.0 };
@@ -21,13 +20,16 @@ fn cumulative(figures: &PesFigures, rate_hz: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The figure; `rate_hz` is the servo clock.
-pub fn cumulative_spectrum(curves: &[(&str, &PesFigures)], rate_hz: f64, unit: &str) -> Result<Figure, ReportError> {
+/// The figure: curves by name, colour and harmonics; `rate_hz` is the servo clock.
+pub fn cumulative_spectrum(
+    curves: &[(&str, Ink, &[Harmonic])],
+    rate_hz: f64,
+    unit: &str,
+) -> Result<Figure, ReportError> {
     let mut panel = Panel::new(Axis::frequency(), Axis::linear("Rms up to here", unit));
-    for (i, (name, figures)) in curves.iter().enumerate() {
-        let hz: Vec<f64> = figures.harmonics.iter().map(|h| h.hz).collect();
-        let ink = if i == 0 { Ink::Data(0) } else { Ink::Muted };
-        panel.marks.push(Series::new(name, ink, Kind::Stairs, &hz, &cumulative(figures, rate_hz))?.into());
+    for (name, ink, harmonics) in curves {
+        let hz: Vec<f64> = harmonics.iter().map(|h| h.hz).collect();
+        panel.marks.push(Series::new(name, *ink, Kind::Stairs, &hz, &cumulative(harmonics, rate_hz))?.into());
     }
     Ok(Figure {
         title: "Cumulative PES spectrum".into(),
@@ -43,7 +45,6 @@ pub fn cumulative_spectrum(curves: &[(&str, &PesFigures)], rate_hz: f64, unit: &
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use servotune::pes::Harmonic;
     use std::f64::consts::TAU;
 
     /// Parseval: the right end is the standard deviation, found in the time domain, of even and of odd windows.
@@ -60,11 +61,10 @@ mod tests {
                 let hz = k as f64 * 27_480.0 / n as f64;
                 Harmonic { k, hz, amplitude: part(f64::cos).hypot(part(f64::sin)) / n as f64 }
             };
-            let harmonics = (1..=n / 2).map(harmonic).collect();
-            let figures = PesFigures { harmonics, dft_low: None, dft_high: None, pes_range: 0.0, pes_std: 0.0 };
+            let harmonics: Vec<Harmonic> = (1..=n / 2).map(harmonic).collect();
             let mean = x.iter().sum::<f64>() / n as f64;
             let std = (x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
-            let end = *cumulative(&figures, 27_480.0).last().unwrap();
+            let end = *cumulative(&harmonics, 27_480.0).last().unwrap();
             assert!((end / std - 1.0).abs() < 1e-12, "{n}: {end} {std}");
         }
     }

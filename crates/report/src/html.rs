@@ -43,6 +43,7 @@ pub(super) fn script() -> String {
     let parts = [
         include_str!("assets/ticks.js"),
         include_str!("assets/plot.js"),
+        include_str!("assets/linked.js"),
         include_str!("assets/readout.js"),
         include_str!("assets/tables.js"),
     ];

@@ -99,8 +99,9 @@ impl Page {
                         @if count > 0 {
                             p.hint {
                                 "Figures: drag to zoom, double-click for the whole view, Shift-drag to move; the wheel zooms once "
-                                "a figure has been clicked. On a touch screen, pinch. Point at a curve to read it. Click a legend "
-                                "entry to hide its curve."
+                                "a figure has been clicked. On a touch screen, pinch. Point at a curve to read it; over "
+                                "frequency the other pictures of its section show the same place. Click a legend entry to "
+                                "hide its curve."
                             }
                         }
                         @for section in &sections { (section) }

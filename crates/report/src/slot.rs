@@ -4,21 +4,23 @@
 
 use super::ReportError;
 use super::bode::{BodeCurve, BodeMarks, bode};
+use super::disturbed::disturbed;
 use super::figure::{Figure, Ink, Kind, Region, Series};
+use super::limit_cards::limit_cards;
 use super::margins::margins_table;
+use super::move_end::{MoveRecord, move_end};
 use super::number::{MISSING, NumberFormat};
 use super::nyquist::{NyquistMarks, nyquist};
 use super::page::{Block, Card, Page, Section};
 use super::sensitivity::sensitivity;
-use super::spectrum_bars::{SpectrumBars, spectrum_bars};
 use super::steps::{StepLimits, StepResponses};
 use super::table::Verdict;
-use super::time::{CurveKind, TimeCurve, TimePanel, time};
-use super::tuned::{Units, figure_words, limits_table};
+use super::tuned::{Units, limits_table};
+use super::write::{NamedWrite, WriteView, write_blocks};
 use nalgebra::Complex;
 use servotune::feedback::{CurveSide, Magnitude, Margins};
-use servotune::pes::{ClosedLoop, PesFigures, Profile};
-use servotune::tune::{Judged, MET, Side, Spec};
+use servotune::pes::{ClosedLoop, PesFigures, Profile, coloured};
+use servotune::tune::{Judged, Spec};
 
 /// One controller on one machine, with all that is drawn of it.
 #[derive(Clone, Debug)]
@@ -29,12 +31,18 @@ pub struct LoopView {
     pub hz: Vec<f64>,
     /// L at them.
     pub open_loop: Vec<Complex<f64>>,
+    /// The sampled plant at them.
+    pub plant: Vec<Complex<f64>>,
+    /// The controller's sample time (s).
+    pub sample_time_s: f64,
     /// Its margins.
     pub margins: Margins,
     /// The write; none where the loop is unstable.
     pub write: Option<(ClosedLoop, PesFigures)>,
     /// Its steps; none where the loop is unstable.
     pub steps: Option<StepResponses>,
+    /// The end of the profile's move; none where nothing is asked of it.
+    pub move_end: Option<MoveRecord>,
     /// The limits, judged; none where there is no spec.
     pub judged: Option<Judged>,
 }
@@ -106,36 +114,10 @@ pub fn loop_page(view: &SlotView<'_>) -> Result<Page, ReportError> {
 /// Most cards.
 const CARDS: usize = 6;
 
-/// The limits as they were judged, so that cards and table are of one mind; margins that nothing is asked of fill the row.
+/// The limits as they were judged; margins that nothing is asked of fill the row.
 fn cards(view: &SlotView<'_>) -> Vec<Card> {
     let short = NumberFormat::Significant(3);
-    let page = |v: f64| short.page(v);
-    let limits = view.after.judged.as_ref().map_or(&[][..], |j| &j.limits);
-    let mut all: Vec<Card> = limits
-        .iter()
-        .map(|l| {
-            let (label, unit) = figure_words(l.wanted.what, view.units);
-            let side = if l.wanted.side == Side::AtLeast { "at least" } else { "at most" };
-            Card {
-                label: first_upper(&label),
-                value: l.found.map_or_else(|| MISSING.to_owned(), page),
-                unit: if unit == "ratio" { String::new() } else { unit.to_owned() },
-                note: format!("{side} {}", page(l.wanted.limit)),
-                verdict: Some(if l.violation > MET { Verdict::Fail } else { Verdict::Ok }),
-            }
-        })
-        .collect();
-    // A range stands in one card.
-    all.dedup_by(|b, a| {
-        let range = a.label == b.label && a.note.starts_with("at least") && b.note.starts_with("at most");
-        if range {
-            a.note = format!("{} to {}", &a.note["at least ".len()..], &b.note["at most ".len()..]);
-            a.verdict = if b.verdict == Some(Verdict::Fail) { b.verdict } else { a.verdict };
-        }
-        range
-    });
-    // What is missed is never behind the last card.
-    all.sort_by_key(|c| c.verdict == Some(Verdict::Ok));
+    let mut all = view.after.judged.as_ref().map_or_else(Vec::new, |j| limit_cards(j, view.units));
     all.truncate(CARDS);
     let m = &view.after.margins;
     let asked = |label: &str| all.iter().any(|c| c.label == label);
@@ -150,7 +132,7 @@ fn cards(view: &SlotView<'_>) -> Vec<Card> {
         .filter(|(label, ..)| !asked(label))
         .map(|(label, value, unit)| Card {
             label: label.into(),
-            value: value.map_or_else(|| MISSING.to_owned(), page),
+            value: value.map_or_else(|| MISSING.to_owned(), |v| short.page(v)),
             unit: unit.into(),
             note: "of the model".into(),
             verdict: None,
@@ -159,11 +141,6 @@ fn cards(view: &SlotView<'_>) -> Vec<Card> {
     let room = CARDS - all.len();
     all.extend(more.into_iter().take(room));
     all
-}
-
-fn first_upper(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |c| c.to_uppercase().collect::<String>() + letters.as_str())
 }
 
 /// The curves that the spec asks of this magnitude, as lines of the limit, and the band of the crossover.
@@ -179,6 +156,17 @@ fn requirements(figure: &mut Figure, view: &SlotView<'_>, of: &[Magnitude]) -> R
         panel.marks.insert(0, Region::of_x(low, high, &label, Ink::Muted));
     }
     Ok(())
+}
+
+/// Density (command_unit²/Hz) of what the spec says acts at the plant's input, else of the profile's windage; none without either.
+fn disturbance(spec: &Spec, sample_time_s: f64) -> Option<Box<dyn Fn(f64) -> f64 + '_>> {
+    if let Some(d) = &spec.disturbance {
+        return Some(Box::new(move |hz| d.density(hz, sample_time_s)));
+    }
+    let noise = &spec.profile.as_ref()?.noise;
+    (noise.windage_rms > 0.0).then(|| {
+        Box::new(coloured(noise.windage_rms, noise.windage_corner_hz, sample_time_s)) as Box<dyn Fn(f64) -> f64>
+    })
 }
 
 fn loop_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
@@ -221,6 +209,16 @@ fn loop_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
         let drawn = super::steps::steps(&steps, asked, [view.units.position, view.units.command])?;
         blocks.push(Block::Pair(curve, drawn));
     }
+    let at_end: Vec<(&str, &MoveRecord)> = std::iter::once(after)
+        .chain(view.before)
+        .filter_map(|v| v.move_end.as_ref().map(|r| (v.name.as_str(), r)))
+        .collect();
+    if !at_end.is_empty() {
+        blocks.push(Block::Figure(move_end(&at_end, &view.spec.limits.at_end, view.units.position)?));
+    }
+    if let Some(density) = disturbance(view.spec, after.sample_time_s) {
+        blocks.push(Block::Figure(disturbed(after, view.before, &density, view.units.position)?));
+    }
     blocks.push(Block::Table(margins_table(m)?));
     blocks.push(Block::Details("All crossings".into(), vec![Block::Table(super::margins::crossings_table(m)?)]));
     if let Some(before) = view.before {
@@ -230,77 +228,20 @@ fn loop_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
     Ok(Section { heading: "Loop".into(), blocks })
 }
 
-/// The window of the DFT in seconds, in words.
-pub(crate) fn window_words(p: &Profile) -> (f64, f64, String) {
-    let at = |n: usize| (p.first_servo_sample() + n) as f64 / p.pes.sample_rate_hz;
-    let [first, last] = p.pes.window;
-    (at(first), at(last), format!("DFT window, servo samples {first} to {last}"))
-}
-
 fn pes_section(view: &SlotView<'_>, profile: &Profile) -> Result<Section, ReportError> {
     let heading = "PES of a spiral write".to_owned();
-    let Some((write, figures)) = &view.after.write else {
+    let Some((run, figures)) = &view.after.write else {
         let notice = Block::Notice(Verdict::Fail, "The closed loop is unstable: there is no PES to show.".into());
         return Ok(Section { heading, blocks: vec![notice] });
     };
     let before = view.before.and_then(|b| b.write.as_ref());
-    let hz: Vec<f64> = figures.harmonics.iter().map(|h| h.hz).collect();
-    let amplitudes = |f: &PesFigures| f.harmonics.iter().map(|h| h.amplitude).collect::<Vec<f64>>();
-    let (after_bars, before_bars) = (amplitudes(figures), before.map(|(_, f)| amplitudes(f)));
-    let at = |k: usize| k as f64 * profile.pes.sample_rate_hz / (2 * hz.len()) as f64;
-    let limits: Vec<(f64, f64)> =
-        view.spec.limits.harmonics.iter().map(|h| (hz.get(h.k - 1).copied().unwrap_or(at(h.k)), h.amplitude)).collect();
-    let bars = SpectrumBars {
-        names: ["before", "after"],
-        frequency_hz: &hz,
-        before: before_bars.as_deref(),
-        after: &after_bars,
-        limits: &limits,
-        unit: view.units.position,
-        until_hz: 3300.0,
-    };
-    let spectrum = spectrum_bars("DFT of the window", "Amplitude |X_k|/N of each harmonic.", &bars)?;
-    let mut blocks =
-        vec![Block::Figure(record_figure(view, profile, write, before.map(|(w, _)| w))?), Block::Figure(spectrum)];
-    let mut spectra = vec![("after", figures)];
-    spectra.extend(before.map(|(_, f)| ("before", f)));
-    let rate = profile.pes.sample_rate_hz;
-    blocks.push(Block::Figure(super::cumulative::cumulative_spectrum(&spectra, rate, view.units.position)?));
-    blocks.push(Block::Table(super::pes::pes_table(figures, view.units.position)?));
-    let harmonics = super::pes::harmonics_table(figures, 24, view.units.position)?;
-    blocks.push(Block::Details("Harmonics".into(), vec![Block::Table(harmonics)]));
+    let blocks = write_blocks(&WriteView {
+        profile,
+        front: NamedWrite { name: "after", run, figures },
+        behind: before.map(|(run, figures)| NamedWrite { name: "before", run, figures }),
+        limits: &view.spec.limits,
+        bands_hz: &view.spec.objective.bands_hz,
+        units: view.units,
+    })?;
     Ok(Section { heading, blocks })
-}
-
-fn record_figure(
-    view: &SlotView<'_>,
-    profile: &Profile,
-    after: &ClosedLoop,
-    before: Option<&ClosedLoop>,
-) -> Result<Figure, ReportError> {
-    let rate = profile.pes.sample_rate_hz;
-    let servo: Vec<f64> = (0..after.pes.len()).map(|j| j as f64 / rate).collect();
-    let tick: Vec<f64> = (0..after.command.len()).map(|k| k as f64 * after.sample_time_s).collect();
-    let held = CurveKind::Held;
-    let mut pes = vec![];
-    let mut command = vec![];
-    if let Some(b) = before {
-        pes.push(TimeCurve { name: "before", time_s: &servo, value: &b.pes, ink: Ink::Muted, kind: CurveKind::Line });
-        command.push(TimeCurve { name: "before", time_s: &tick, value: &b.command, ink: Ink::Muted, kind: held });
-    }
-    pes.push(TimeCurve { name: "after", time_s: &servo, value: &after.pes, ink: Ink::Data(0), kind: CurveKind::Line });
-    command.push(TimeCurve { name: "after", time_s: &tick, value: &after.command, ink: Ink::Data(0), kind: held });
-    let limit = view.spec.limits.command_peak.map(|l| [(l, "limit"), (-l, "limit")]);
-    let none: [(f64, &str); 0] = [];
-    let panels = [
-        TimePanel { quantity: "PES", unit: view.units.position, curves: &pes, limits: &none },
-        TimePanel {
-            quantity: "Command",
-            unit: view.units.command,
-            curves: &command,
-            limits: limit.as_ref().map_or(&none[..], |l| &l[..]),
-        },
-    ];
-    let (from, to, words) = window_words(profile);
-    time("Record of the write", "Simulated.", &panels, Some((from, to, &words)))
 }

@@ -1,7 +1,7 @@
 //! The DFT of the PES as bars, before and after, against its limits.
 //!
-//! In: amplitudes on an even grid of frequencies in Hz. Out: a [`Figure`]. Convention: amplitude = |X_k|/N; the two
-//! bands are those of the paper's equations (42) and (43). Spec: `specs/report.md`.
+//! In: amplitudes on an even grid of frequencies in Hz. Out: a [`Figure`]. Convention: amplitude = |X_k|/N.
+//! Spec: `specs/report.md`.
 
 use super::error::{ReportError, same_length};
 use super::figure::{Axis, Figure, Ink, Kind, Panel, Region, Series};
@@ -19,16 +19,13 @@ pub struct SpectrumBars<'a> {
     pub after: &'a [f64],
     /// Limits as (frequency in Hz, amplitude).
     pub limits: &'a [(f64, f64)],
+    /// Bands that are shaded (Hz).
+    pub bands_hz: &'a [[f64; 2]],
     /// Unit of the amplitudes.
     pub unit: &'a str,
     /// Last frequency shown (Hz).
     pub until_hz: f64,
 }
-
-/// Low band of the paper (Hz), equation (42).
-pub const LOW_BAND_HZ: (f64, f64) = (600.0, 1500.0);
-/// High band of the paper (Hz), equation (43).
-pub const HIGH_BAND_HZ: (f64, f64) = (1500.0, 3000.0);
 
 /// Bars for each harmonic, ticks for the limits, shades for the two bands.
 pub fn spectrum_bars(title: &str, caption: &str, bars: &SpectrumBars) -> Result<Figure, ReportError> {
@@ -36,8 +33,15 @@ pub fn spectrum_bars(title: &str, caption: &str, bars: &SpectrumBars) -> Result<
     same_length("after", "amplitudes", hz.len(), bars.after.len())?;
     let mut panel = Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear("Amplitude", bars.unit));
     panel.height = 1.15;
-    panel.marks.push(Region::of_x(LOW_BAND_HZ.0, LOW_BAND_HZ.1, "low band 600 to 1500 Hz", Ink::Data(4)));
-    panel.marks.push(Region::of_x(HIGH_BAND_HZ.0, HIGH_BAND_HZ.1, "high band 1500 to 3000 Hz", Ink::Data(5)));
+    for (i, &[from, to]) in bars.bands_hz.iter().enumerate() {
+        let name = match (i, bars.bands_hz.len()) {
+            (0, 2) => "low band".to_owned(),
+            (1, 2) => "high band".to_owned(),
+            _ => format!("band {}", i + 1),
+        };
+        let ink = Ink::Data(if i % 2 == 0 { 4 } else { 5 });
+        panel.marks.push(Region::of_x(from, to, &format!("{name} {from} to {to} Hz"), ink));
+    }
     let spacing = hz.windows(2).map(|pair| pair[1] - pair[0]).find(|d| *d > 0.0).unwrap_or(1.0);
     let shown = hz.iter().filter(|f| **f <= bars.until_hz).count();
     let edge = 0.4 * spacing;
@@ -74,6 +78,7 @@ mod tests {
             before: Some(&before),
             after: &after,
             limits: &limits,
+            bands_hz: &[[600.0, 1500.0], [1500.0, 3000.0]],
             unit: "track",
             until_hz: 3000.0,
         };

@@ -37,36 +37,26 @@ pub(super) fn figure_words<'a>(what: What, units: Units<'a>) -> (String, &'a str
     }
 }
 
-/// Every limit with what was found before and after.
+/// Every limit with what was found: before and after, or alone.
 pub fn limits_table(before: Option<&Judged>, after: Option<&Judged>, units: Units<'_>) -> Result<Table, ReportError> {
     let digits = NumberFormat::Significant(4);
-    let mut table = Table::new(
-        "Limits",
-        vec![
-            Column::words("figure"),
-            Column::words("side"),
-            Column::numbers("limit", "", digits),
-            Column::numbers("before", "", digits),
-            Column::numbers("after", "", digits),
-            Column::words("unit"),
-        ],
-    );
+    let mut columns = vec![Column::words("figure"), Column::words("side"), Column::numbers("limit", "", digits)];
+    columns.extend(before.map(|_| Column::numbers("before", "", digits)));
+    columns.push(Column::numbers(if before.is_some() { "after" } else { "found" }, "", digits));
+    columns.push(Column::words("unit"));
+    let mut table = Table::new("Limits", columns);
     let Some(after) = after else { return Ok(table) };
     for (i, l) in after.limits.iter().enumerate() {
         let cell = |found: Option<f64>, violation: f64| {
             let cell = Cell::from(found);
             if violation > MET { cell.flagged(Verdict::Fail, "missed") } else { cell.flagged(Verdict::Ok, "met") }
         };
-        let was = before.and_then(|b| b.limits.get(i));
         let (name, unit) = figure_words(l.wanted.what, units);
-        table.push(vec![
-            name.as_str().into(),
-            if l.wanted.side == Side::AtLeast { "at least" } else { "at most" }.into(),
-            l.wanted.limit.into(),
-            was.map_or(Cell::from(None), |b| cell(b.found, b.violation)),
-            cell(l.found, l.violation),
-            unit.into(),
-        ])?;
+        let side = if l.wanted.side == Side::AtLeast { "at least" } else { "at most" };
+        let mut row = vec![name.as_str().into(), side.into(), l.wanted.limit.into()];
+        row.extend(before.map(|b| b.limits.get(i).map_or(Cell::from(None), |b| cell(b.found, b.violation))));
+        row.extend([cell(l.found, l.violation), unit.into()]);
+        table.push(row)?;
     }
     Ok(table)
 }

@@ -8,6 +8,7 @@ function withUnit(v, unit) { return number(v) + (unit ? "\u202f" + unit : ""); }
 Plot.prototype.leave = function () {
   this.readout.hidden = true;
   this.panels.forEach(function (p) { p.over.textContent = ""; });
+  this.tell(NaN);
 };
 // The index whose x is nearest, or of the x that is held; x ascends.
 function nearest(axis, xs, u, held) {
@@ -52,6 +53,7 @@ Plot.prototype.hoverPoint = function (p, x, y) {
   lines.push([d.xl, withUnit(this.xs[s.x][i], d.xu)], [d.yl, withUnit(s.y[i], d.yu)]);
   if (p.equal) lines.push(["distance from \u22121", number(Math.hypot(1 + this.xs[s.x][i], s.y[i]))]);
   this.say(lines, best.x, best.y);
+  if (s.along && s.along.unit === "Hz") this.tell(Math.abs(s.along.v[i]));
 };
 Plot.prototype.hoverColumn = function (p, x, y) {
   var self = this, u = this.atColumn(p, x), panels = this.share ? this.panels : [p], at = NaN, least = Infinity;
@@ -79,6 +81,7 @@ Plot.prototype.hoverColumn = function (p, x, y) {
     });
   });
   this.say(lines, this.column(p, at), y);
+  if (overFrequency(p)) this.tell(p.ax.log ? Math.pow(10, at) : at);
 };
 Plot.prototype.say = function (lines, x, y) {
   var box = this.readout, scale = this.svg.getBoundingClientRect().width / this.svg.viewBox.baseVal.width;
@@ -190,10 +193,11 @@ Plot.prototype.boxTo = function (drag, at) {
   make(p.over, "rect", { "class": "box", x: box.w ? box.x : p.x, y: box.h ? box.y : p.y, width: box.w || p.w, height: box.h || p.h });
   return box;
 };
+var every = [];
 Array.prototype.forEach.call(document.querySelectorAll("figure.fig"), function (fig) {
   var data = JSON.parse(fig.querySelector("script.plot-data").textContent), hidden = {};
   var plots = Array.prototype.map.call(fig.querySelectorAll("svg.plot"), function (svg) { return new Plot(fig, svg, data, hidden, data.share); });
-  plots.forEach(function (plot) { plot.others = plots; });
+  plots.forEach(function (plot) { plot.others = plots; every.push(plot); });
   var button = fig.querySelector("button.reset");
   if (button) button.addEventListener("click", function () { plots.forEach(function (plot) { plot.reset(); }); });
 });

@@ -4,7 +4,7 @@
 //! each source is simulated alone; noise by many draws. Convention: amplitudes as in `specs/pes.md`; spec: `specs/performance.md`.
 
 use super::figures::{HIGH_BAND_HZ, LOW_BAND_HZ};
-use super::{Noise, PesError, Profile, Scene, WindowDft};
+use super::{Harmonic, Noise, PesError, Profile, Scene, WindowDft};
 use crate::controller::Controller;
 use crate::lti::{DiscretePlant, Plant, Section};
 use serde::Serialize;
@@ -24,7 +24,7 @@ pub enum Source {
 }
 
 /// What one source brings, alone.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SourceShare {
     /// Which.
     pub source: Source,
@@ -36,6 +36,8 @@ pub struct SourceShare {
     pub pes_std: f64,
     /// Share of the sum of all sources' energies: low band, high band, window.
     pub share: [f64; 3],
+    /// Harmonics 1 to N/2 of the window, each the root of the mean square over the draws.
+    pub harmonics: Vec<Harmonic>,
 }
 
 /// The budget of one write, largest source first.
@@ -49,6 +51,8 @@ pub struct Budget {
     pub dft_high: f64,
     /// Likewise.
     pub pes_std: f64,
+    /// Likewise.
+    pub harmonics: Vec<Harmonic>,
 }
 
 /// How a prediction is drawn.
@@ -126,12 +130,23 @@ impl Runner {
 
     /// Both norms and the standard deviation.
     fn figures(&self, window: &[f64]) -> [f64; 3] {
+        self.spectrum(window).0
+    }
+
+    /// The same with the amplitude of every harmonic.
+    fn spectrum(&self, window: &[f64]) -> ([f64; 3], Vec<f64>) {
         let mut amplitude = Vec::new();
         self.dft.amplitudes(window, &mut amplitude);
         let n = window.len() as f64;
         let mean = window.iter().sum::<f64>() / n;
         let variance = window.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n;
-        [self.dft.band(&amplitude, LOW_BAND_HZ), self.dft.band(&amplitude, HIGH_BAND_HZ), variance.sqrt()]
+        let norms = [LOW_BAND_HZ, HIGH_BAND_HZ].map(|band| self.dft.band(&amplitude, band));
+        ([norms[0], norms[1], variance.sqrt()], amplitude)
+    }
+
+    fn harmonics(&self, amplitude: &[f64]) -> Vec<Harmonic> {
+        let of = |(&k, &amplitude): (&usize, &f64)| Harmonic { k, hz: self.dft.hz(k), amplitude };
+        self.dft.bins().iter().zip(amplitude).map(of).collect()
     }
 }
 
@@ -149,19 +164,21 @@ pub fn budget(plant: &Plant, controller: &Controller, profile: &Profile) -> Resu
     let apart = |p: &Profile| -> Result<Vec<f64>, PesError> {
         Ok(run.window(p)?.iter().zip(&still).map(|(a, b)| a - b).collect())
     };
-    let mut found = vec![(Source::Move, run.figures(&still))];
+    let mut found = vec![(Source::Move, run.spectrum(&still))];
     let noise = &profile.noise;
     if !noise.runout.is_empty() {
-        found.push((Source::Runout, run.figures(&apart(&with(&|n| n.runout.clone_from(&noise.runout)))?)));
+        found.push((Source::Runout, run.spectrum(&apart(&with(&|n| n.runout.clone_from(&noise.runout)))?)));
     }
-    let mean = |draw: &dyn Fn(u64) -> Result<Vec<f64>, PesError>| -> Result<[f64; 3], PesError> {
-        let mut sum = [0.0; 3];
+    let mean = |draw: &dyn Fn(u64) -> Result<Vec<f64>, PesError>| -> Result<([f64; 3], Vec<f64>), PesError> {
+        let (mut sum, mut power) = ([0.0; 3], vec![0.0; run.dft.bins().len()]);
         for i in 0..DRAWS {
-            for (sum, x) in sum.iter_mut().zip(run.figures(&draw(SEED + i)?)) {
-                *sum += x * x;
-            }
+            let (figures, amplitude) = run.spectrum(&draw(SEED + i)?);
+            let squared = |sum: &mut [f64], x: &[f64]| sum.iter_mut().zip(x).for_each(|(sum, x)| *sum += x * x);
+            squared(&mut sum, &figures);
+            squared(&mut power, &amplitude);
         }
-        Ok(sum.map(|s| (s / DRAWS as f64).sqrt()))
+        let root = |s: f64| (s / DRAWS as f64).sqrt();
+        Ok((sum.map(root), power.into_iter().map(root).collect()))
     };
     if noise.encoder_rms > 0.0 {
         let rms = noise.encoder_rms;
@@ -178,20 +195,21 @@ pub fn budget(plant: &Plant, controller: &Controller, profile: &Profile) -> Resu
         p.noise.seed = seed;
         run.window(&p)
     };
-    let [dft_low, dft_high, pes_std] = mean(&all)?;
-    let total: [f64; 3] = std::array::from_fn(|i| found.iter().map(|(_, f)| f[i] * f[i]).sum());
+    let ([dft_low, dft_high, pes_std], all) = mean(&all)?;
+    let total: [f64; 3] = std::array::from_fn(|i| found.iter().map(|(_, (f, _))| f[i] * f[i]).sum());
     let mut sources: Vec<SourceShare> = found
         .iter()
-        .map(|(source, f)| SourceShare {
+        .map(|(source, (f, amplitude))| SourceShare {
             source: *source,
             dft_low: f[0],
             dft_high: f[1],
             pes_std: f[2],
             share: std::array::from_fn(|i| if total[i] > 0.0 { f[i] * f[i] / total[i] } else { 0.0 }),
+            harmonics: run.harmonics(amplitude),
         })
         .collect();
     sources.sort_by(|a, b| b.share[2].total_cmp(&a.share[2]));
-    Ok(Budget { sources, dft_low, dft_high, pes_std })
+    Ok(Budget { sources, dft_low, dft_high, pes_std, harmonics: run.harmonics(&all) })
 }
 
 /// What the next record under these gains will show, by simulating many draws.

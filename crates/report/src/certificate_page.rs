@@ -1,0 +1,408 @@
+//! The page of a certificate: what is proved of every limit on every machine, what is left open and why, the box and what is taken for granted.
+//!
+//! In: a [`Certificate`] with a name for each machine. Out: a [`Page`]. Convention: room is the share of the limit by which a figure keeps it,
+//! below 0 where it misses it; nothing but "proved" is green. Spec: `specs/report.md`, `specs/certificate.md`.
+
+use super::ReportError;
+use super::certificate::{certificate_sentence, open_reason, sentence, stability_words, write_line};
+use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Series};
+use super::limit_cards::first_upper;
+use super::number::{MISSING, NumberFormat, typographic};
+use super::page::{Block, Card, Page, Section};
+use super::table::{Cell, Column, Table, Verdict};
+use super::tuned::Units;
+use servotune::verify::{Bounded, CaseProof, Certificate, ProvenLimit, Stability, Verdict as Proven, Word};
+
+/// A certificate with the names that it does not hold itself.
+#[derive(Clone, Debug)]
+pub struct CertificateView<'a> {
+    /// The gain table.
+    pub name: &'a str,
+    /// The certificate.
+    pub certificate: &'a Certificate,
+    /// A name for each of its cases, in order.
+    pub machines: &'a [String],
+    /// Units of position and command.
+    pub units: Units<'a>,
+    /// Inputs with digests, program.
+    pub provenance: Vec<(String, String)>,
+}
+
+/// Machines beyond which their tables are folded.
+const OPEN: usize = 3;
+/// Machines drawn in one figure.
+const DRAWN: usize = 6;
+const DIGITS: NumberFormat = NumberFormat::Significant(5);
+
+/// The page.
+pub fn certificate_page(v: &CertificateView<'_>) -> Result<Page, ReportError> {
+    let c = v.certificate;
+    let verdict = overall(c);
+    let mut blocks = vec![Block::Notice(verdict, certificate_sentence(c))];
+    blocks.extend(c.findings.iter().map(|f| Block::Notice(Verdict::Fail, sentence(f))));
+    blocks.push(Block::Table(side_by_side(v)?));
+    if let Some(figure) = room_figure(v)? {
+        blocks.push(Block::Figure(figure));
+    }
+    let mut machines = Vec::new();
+    for (i, case) in c.cases.iter().enumerate() {
+        let blocks = case_blocks(v, case)?;
+        let heading = format!("Machine {}: {}", i + 1, machine_name(v, i));
+        match c.cases.len() <= OPEN {
+            true => machines.push(Section { heading, blocks }),
+            false => {
+                machines.push(Section { heading: "Machines".into(), blocks: vec![Block::Details(heading, blocks)] })
+            }
+        }
+    }
+    if c.cases.len() > OPEN {
+        let blocks = machines.into_iter().flat_map(|s| s.blocks).collect();
+        machines = vec![Section { heading: "Machines".into(), blocks }];
+    }
+    let mut sections = vec![Section { heading: "Verdict".into(), blocks }];
+    sections.append(&mut machines);
+    sections.push(Section { heading: "The box, and what is taken for granted".into(), blocks: granted(c)? });
+    Ok(Page {
+        title: format!("Certificate: {}", v.name),
+        subtitle: "Every limit with bounds that hold at every frequency".into(),
+        cards: cards(v, verdict),
+        sections,
+        provenance: v.provenance.clone(),
+    })
+}
+
+/// Green only where everything is proved; red where something is known to be wrong.
+fn overall(c: &Certificate) -> Verdict {
+    let wrong = |case: &CaseProof| {
+        case.bounds.stability == Stability::Unstable || case.limits.iter().any(|l| l.verdict == Proven::Violated)
+    };
+    match c.proved {
+        true => Verdict::Ok,
+        false if !c.findings.is_empty() || c.cases.iter().any(wrong) => Verdict::Fail,
+        false => Verdict::Warn,
+    }
+}
+
+fn machine_name(v: &CertificateView<'_>, i: usize) -> String {
+    let digest = || v.certificate.cases.get(i).and_then(|c| c.sha256.get(..12)).unwrap_or_default().to_owned();
+    v.machines.get(i).cloned().unwrap_or_else(digest)
+}
+
+/// The verdict on one limit in a word, with its colour.
+fn word(p: Proven) -> (Verdict, &'static str) {
+    match p {
+        Proven::Proved => (Verdict::Ok, "proved"),
+        Proven::Violated => (Verdict::Fail, "violated"),
+        Proven::NotProved => (Verdict::Warn, "not proved"),
+    }
+}
+
+/// A certificate keeps the field of the plant file in which the unit stands.
+fn unit<'a>(v: &CertificateView<'a>, unit: &'a str) -> &'a str {
+    match unit {
+        "position_unit" => v.units.position,
+        "command_unit" => v.units.command,
+        other => other,
+    }
+}
+
+fn required(l: &ProvenLimit) -> String {
+    let side = if l.side == "at_least" { "at least" } else { "at most" };
+    format!("{side} {}", typographic(&l.required.to_string()))
+}
+
+/// Its name, with the side where both sides of one figure are limited.
+fn name(case: &CaseProof, l: &ProvenLimit) -> String {
+    let twice = case.limits.iter().filter(|other| other.name == l.name).count() > 1;
+    let side = if l.side == "at_least" { "lowest" } else { "highest" };
+    if twice { format!("{}, {side}", l.name) } else { l.name.clone() }
+}
+
+/// Worst and best end of the room to a limit as shares of it; none where that end is not bounded, or the limit is 0.
+fn room(l: &ProvenLimit) -> [Option<f64>; 2] {
+    let size = l.required.abs();
+    if size == 0.0 {
+        return [None, None];
+    }
+    match l.side.as_str() {
+        "at_least" => [l.proven.low, l.proven.high].map(|x| x.map(|x| (x - l.required) / size)),
+        _ => [l.proven.high, l.proven.low].map(|x| x.map(|x| (l.required - x) / size)),
+    }
+}
+
+fn cards(v: &CertificateView<'_>, verdict: Verdict) -> Vec<Card> {
+    let c = v.certificate;
+    let limits = || c.cases.iter().flat_map(|case| &case.limits);
+    let (proved, all) = (limits().filter(|l| l.verdict == Proven::Proved).count(), limits().count());
+    let stability = c.cases.iter().map(|case| case.bounds.stability);
+    let stability = stability.max_by_key(|s| match s {
+        Stability::Stable => 0,
+        Stability::Undecided => 1,
+        Stability::Unstable => 2,
+    });
+    let of_stability = |s| match s {
+        Stability::Stable => Verdict::Ok,
+        Stability::Undecided => Verdict::Warn,
+        Stability::Unstable => Verdict::Fail,
+    };
+    let worst = limits().filter_map(|l| room(l)[0].map(|x| (x, l))).min_by(|a, b| a.0.total_cmp(&b.0));
+    let card = |label: &str, value: String, unit: &str, note: String, verdict| Card {
+        label: label.into(),
+        value,
+        unit: unit.into(),
+        note,
+        verdict,
+    };
+    let machines = match c.cases.len() {
+        1 => "on one machine".to_owned(),
+        n => format!("on every one of {n} machines"),
+    };
+    let open = all - proved;
+    let not_all = if limits().any(|l| l.verdict == Proven::Violated) { Verdict::Fail } else { Verdict::Warn };
+    vec![
+        card("Certificate", if c.proved { "proved" } else { "not proved" }.into(), "", machines, Some(verdict)),
+        card(
+            "Limits proved",
+            format!("{proved} of {all}"),
+            "",
+            if open == 0 { "none is left open".into() } else { format!("{open} not proved") },
+            Some(if open == 0 { Verdict::Ok } else { not_all }),
+        ),
+        card(
+            "Closed loop",
+            stability.map_or(MISSING, stability_words).to_lowercase(),
+            "",
+            if c.uncertainty.any() { "every member of every box" } else { "as the plants stand" }.into(),
+            stability.map(of_stability),
+        ),
+        card(
+            "Least room proved",
+            worst.map_or_else(|| MISSING.to_owned(), |(x, _)| NumberFormat::Decimals(2).page(100.0 * x)),
+            "%",
+            worst.map_or_else(String::new, |(_, l)| format!("to {}, {}", l.name, required(l))),
+            worst.filter(|(_, l)| l.verdict != Proven::Proved).map(|(_, l)| word(l.verdict).0),
+        ),
+    ]
+}
+
+/// Limits down, machines across.
+fn side_by_side(v: &CertificateView<'_>) -> Result<Table, ReportError> {
+    let c = v.certificate;
+    let mut columns = vec![Column::words("limit"), Column::words("required"), Column::words("unit")];
+    columns.extend((0..c.cases.len()).map(|i| Column::words(&machine_name(v, i))));
+    let mut table = Table::new("Proven intervals, machine by machine", columns);
+    let Some(first) = c.cases.first() else { return Ok(table) };
+    for (row, l) in first.limits.iter().enumerate() {
+        let mut cells = vec![name(first, l).as_str().into(), required(l).as_str().into(), unit(v, &l.unit).into()];
+        cells.extend(c.cases.iter().map(|case| {
+            case.limits.get(row).map_or(Cell::from(""), |l| {
+                let (verdict, said) = word(l.verdict);
+                Cell::from(interval(l.proven).as_str()).flagged(verdict, said)
+            })
+        }));
+        table.push(cells)?;
+    }
+    Ok(table)
+}
+
+fn interval(b: Bounded) -> String {
+    match (b.low, b.high) {
+        (Some(low), Some(high)) if DIGITS.text(low) == DIGITS.text(high) => DIGITS.page(low),
+        (Some(low), Some(high)) => format!("{} to {}", DIGITS.page(low), DIGITS.page(high)),
+        (Some(low), None) => format!("{} and above", DIGITS.page(low)),
+        (None, Some(high)) => format!("{} and below", DIGITS.page(high)),
+        (None, None) => "no bound".into(),
+    }
+}
+
+/// Room to each limit over its proven interval, a panel for each machine; none where nothing is bounded.
+fn room_figure(v: &CertificateView<'_>) -> Result<Option<Figure>, ReportError> {
+    let cases = &v.certificate.cases;
+    let mut panels = Vec::new();
+    for (i, case) in cases.iter().take(DRAWN).enumerate() {
+        let shown: Vec<(&ProvenLimit, [Option<f64>; 2])> =
+            case.limits.iter().map(|l| (l, room(l))).filter(|(_, r)| r.iter().any(Option::is_some)).collect();
+        if shown.is_empty() {
+            continue;
+        }
+        let label = match cases.len() {
+            1 => "Room to the limit".to_owned(),
+            _ => format!("Room to the limit, {}", machine_name(v, i)),
+        };
+        let names: Vec<String> = shown.iter().rev().map(|(l, _)| name(case, l)).collect();
+        let mut panel = Panel::new(Axis::linear(&label, "%"), Axis::named("", names.iter().map(String::as_str)));
+        panel.height = (0.14 * shown.len() as f64).clamp(0.35, 3.0);
+        // The limit itself is always in sight.
+        let ends = || shown.iter().flat_map(|(_, r)| r).flatten().map(|x| 100.0 * x);
+        let (low, high) = ends().fold((0.0f64, 1.0f64), |(a, b), x| (a.min(x), b.max(x)));
+        let air = 0.04 * (high - low);
+        panel.x.range = Some((low - air, high + air));
+        panel.marks.push(RuleLine::vertical(0.0, if panels.is_empty() { "limit" } else { "" }, Ink::Limit));
+        for (row, (l, [worst, best])) in shown.iter().rev().enumerate() {
+            let at = row as f64;
+            let ink = match l.verdict {
+                Proven::Proved => Ink::Data(0),
+                Proven::Violated => Ink::Limit,
+                Proven::NotProved => Ink::Data(1),
+            };
+            let said = word(l.verdict).1;
+            let mut bar = |from: f64, to: f64, half: f64| -> Result<(), ReportError> {
+                let kind = Kind::Band { upper: vec![at + half; 2] };
+                let band = Series::new(said, ink, kind, &[100.0 * from, 100.0 * to], &[at - half; 2])?;
+                panel.marks.push(band.into());
+                Ok(())
+            };
+            // What is not bounded on its bad side has no bar from the limit: nothing is known there.
+            if let Some(worst) = worst {
+                bar(0.0, *worst, 0.3)?;
+            }
+            if let (Some(worst), Some(best)) = (worst, best) {
+                let thin = Series::new(said, ink, Kind::Solid, &[100.0 * worst, 100.0 * best], &[at; 2])?;
+                panel.marks.push(thin.into());
+            }
+            if let (None, Some(best)) = (worst, best) {
+                panel.marks.push(Series::new(said, ink, Kind::Points, &[100.0 * best], &[at])?.into());
+            }
+        }
+        panels.push(panel);
+    }
+    let mut caption = "Each bar reaches from the limit to the worst that the proof leaves possible, the line on from there to the best; right of \
+                       the red line the limit is kept. A dot without a bar has no bound on its bad side."
+        .to_owned();
+    if cases.len() > DRAWN {
+        caption += &format!(" The first {DRAWN} of {} machines.", cases.len());
+    }
+    let figure = Figure { title: "Room that is proved".into(), caption, share_x: false, panels };
+    Ok((!figure.panels.is_empty()).then_some(figure))
+}
+
+fn case_blocks(v: &CertificateView<'_>, case: &CaseProof) -> Result<Vec<Block>, ReportError> {
+    let b = &case.bounds;
+    let count = b.encirclements.map_or("not counted".to_owned(), |n| n.to_string());
+    let mut blocks = vec![Block::Prose(format!(
+        "The closed loop is {}; encirclements of -1: {count}; {} cells of frequency looked at.",
+        stability_words(b.stability),
+        b.cells
+    ))];
+    let mut columns = vec![
+        Column::words("figure"),
+        Column::words("required"),
+        Column::numbers("proven low", "", DIGITS),
+        Column::numbers("proven high", "", DIGITS),
+        Column::numbers("at", "Hz", DIGITS),
+        Column::words("unit"),
+        Column::words("verdict"),
+    ];
+    let some_open = case.limits.iter().any(|l| l.verdict == Proven::NotProved);
+    if some_open {
+        columns.push(Column::words("left open"));
+    }
+    let mut table = Table::new("Bounds that hold at every frequency", columns);
+    for l in &case.limits {
+        let (verdict, said) = word(l.verdict);
+        let mut open = String::new();
+        if l.verdict == Proven::NotProved {
+            open = open_reason(v.certificate, case, l);
+        }
+        let mut row = vec![
+            l.name.as_str().into(),
+            required(l).as_str().into(),
+            l.proven.low.into(),
+            l.proven.high.into(),
+            l.proven.hz.into(),
+            unit(v, &l.unit).into(),
+            Cell::from("").flagged(verdict, said),
+        ];
+        row.extend(some_open.then(|| open.as_str().into()));
+        table.push(row)?;
+    }
+    let us = |x: Bounded| Bounded { low: x.low.map(|s| s * 1e6), high: x.high.map(|s| s * 1e6), hz: x.hz };
+    for (name, x, unit) in [
+        ("modulus margin", b.modulus_margin, "ratio"),
+        ("delay margin", us(b.delay_margin_s), "us"),
+        ("disk margin", b.disk_margin, "ratio"),
+    ] {
+        let [low, high, hz] = [x.low, x.high, x.hz].map(Cell::from);
+        let mut row = vec![name.into(), "".into(), low, high, hz, unit.into(), "".into()];
+        row.extend(some_open.then(|| "".into()));
+        table.push(row)?;
+    }
+    blocks.push(Block::Table(table));
+    blocks.extend(case.write_box.as_ref().map(|w| Block::Prose(write_line(w))));
+    blocks.extend(case.sweep_again.iter().map(|s| {
+        let words = format!(
+            "Too coarse to promise: sweep {:.1} to {:.1} Hz again, points at most {:.3} Hz apart.",
+            s.low_hz, s.high_hz, s.spacing_hz
+        );
+        Block::Notice(Verdict::Warn, words)
+    }));
+    Ok(blocks)
+}
+
+/// The box, the word, and what the proof assumes.
+fn granted(c: &Certificate) -> Result<Vec<Block>, ReportError> {
+    let mut table = Table::new(
+        "What may differ from the files",
+        vec![Column::words("quantity"), Column::words("share"), Column::words("means")],
+    );
+    let u = c.uncertainty;
+    for (name, share, means) in [
+        ("gain", u.gain, "of the plant"),
+        ("frequency", u.frequency, "of the body and of every mode, zero and pole together"),
+        ("damping", u.damping, "every damping ratio on its own"),
+        ("delay", u.delay, "of the dead time"),
+    ] {
+        let said = match share > 0.0 {
+            true => format!("\u{b1} {} %", NumberFormat::Significant(3).page(100.0 * share)),
+            false => "as in the file".to_owned(),
+        };
+        table.push(vec![name.into(), said.as_str().into(), means.into()])?;
+    }
+    let held = match c.word {
+        Word::Double => "double precision".to_owned(),
+        Word::Single => "single precision, rounded to nearest".to_owned(),
+        Word::Fixed { bits, fraction } => format!("{bits} bits, {fraction} of them behind the point"),
+    };
+    table.push(vec!["coefficients".into(), "as held".into(), held.as_str().into()])?;
+    let mut blocks = vec![Block::Table(table), Block::Prose("Taken for granted:".into())];
+    blocks.extend(c.assumptions.iter().map(|a| Block::Prose(first_upper(a) + ".")));
+    Ok(blocks)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn limit(side: &str, low: Option<f64>, high: Option<f64>, verdict: Proven) -> ProvenLimit {
+        ProvenLimit {
+            name: "phase_margin_deg".into(),
+            side: side.into(),
+            required: 40.0,
+            unit: "deg".into(),
+            proven: Bounded { low, high, hz: None },
+            verdict,
+        }
+    }
+
+    /// At least 40 with 38 to 44: worst 5 % short, best 10 % to spare. At most 40 with the same: worst 10 % too much, best 5 % to spare.
+    #[test]
+    fn room_is_counted_from_the_limit_towards_its_good_side() {
+        let near = |found: [Option<f64>; 2], expected: [f64; 2]| {
+            found.iter().zip(expected).all(|(a, b)| a.is_some_and(|a| (a - b).abs() < 1e-12))
+        };
+        let both = |side| room(&limit(side, Some(38.0), Some(44.0), Proven::NotProved));
+        assert!(near(both("at_least"), [-0.05, 0.1]));
+        assert!(near(both("at_most"), [-0.1, 0.05]));
+        // Without a low end nothing is known of the worst.
+        assert_eq!(room(&limit("at_least", None, Some(44.0), Proven::NotProved))[0], None);
+    }
+
+    #[test]
+    fn nothing_but_proved_is_green() {
+        assert_eq!(
+            [Proven::Proved, Proven::Violated, Proven::NotProved].map(|p| word(p).0 == Verdict::Ok),
+            [true, false, false]
+        );
+    }
+}
