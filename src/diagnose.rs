@@ -1,8 +1,8 @@
 //! `servotune diagnose`: a case folder, or records straight from CSV files, to a diagnosis.
 
 use super::diagnose_arguments::DiagnoseArguments;
-use super::{Ending, Failure, Screen, load};
-use servotune::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
+use super::{Ending, Failure, Screen, diagnose_rules, load};
+use servotune::diagnose::{DiagnoseSettings, Diagnosis, Rule, decision_rules, diagnose};
 use servotune::document::{FileSet, check_target};
 use servotune::recording::{Case, NominalNoise, Record, RecordEntry, Role};
 use servotune_answer::{case_provenance, conclude, sure};
@@ -56,6 +56,11 @@ fn case(a: &DiagnoseArguments) -> Result<Case, Failure> {
 }
 
 pub(super) fn run(a: &DiagnoseArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    if a.rules {
+        let rules: Vec<&Rule> = decision_rules().collect();
+        screen.result(&rules, &diagnose_rules::text(&rules))?;
+        return Ok(Ending::Accepted);
+    }
     let (diagnosis, text) = make(a, screen)?;
     screen.result(&diagnosis, &text)?;
     Ok(if sure(&diagnosis) { Ending::Accepted } else { Ending::Rejected })

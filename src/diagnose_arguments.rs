@@ -12,6 +12,7 @@ use std::path::PathBuf;
   servotune diagnose P001 --bootstrap 199 --out P001_diagnosis
   servotune diagnose --plant axis.toml --record lap.csv.gz --columns time=t_s,reference=qg_m,position=qm_m,command=vir_V --rows 0:12480 --holdout-rows 12480:24841 --out axis
   servotune diagnose --plant box.toml --record box.csv.gz --columns position=V2_V,command=V1_V --sample-rate-hz 610.35 --rows 40650:105712 --holdout-rows 105712:127400 --out box
+  servotune diagnose --rules
 
 CASE_DIR holds case.toml. Written: diagnosis.json, plant_corrected.toml where the model changed, report.html.
 Ends with 1 where the verdict is data_fault, located_unexplained or undecidable.")]
@@ -53,8 +54,17 @@ pub(super) struct DiagnoseArguments {
     /// alarms; 99 or more let findings be withdrawn that noise gives as often as once in a hundred times
     #[arg(long, value_name = "DRAWS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     pub bootstrap: u32,
+    /// Print the decision rules of the diagnosis, and do nothing else
+    #[arg(long, group = "records", conflicts_with_all = ["case", "record"])]
+    pub rules: bool,
     /// Folder to write to
-    #[arg(long, value_name = "DIR")]
+    #[arg(
+        long,
+        value_name = "DIR",
+        required = false,
+        required_unless_present = "rules",
+        default_value_if("rules", "true", ".")
+    )]
     pub out: PathBuf,
 }
 
@@ -74,6 +84,7 @@ impl DiagnoseArguments {
             holdout_rows: None,
             spindle_hz: None,
             bootstrap: 0,
+            rules: false,
             out,
         }
     }

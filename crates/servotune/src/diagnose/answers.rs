@@ -4,6 +4,7 @@
 use super::hygiene::SampleFault;
 use super::linear::{Sampled, free_motions};
 use super::logs::shifted;
+use super::rules::{EARLY_LEFT, OTHER_UNIT_EXPLAINED, OTHER_UNIT_GAIN};
 use super::run::Run;
 use super::slip::slips_of_answer;
 use super::stack::Basis;
@@ -11,13 +12,8 @@ use crate::lti::{LtiError, Plant};
 use crate::numeric::least_squares::dot;
 use rayon::prelude::*;
 
-/// Factor of the gain beyond which no machine differs from its model, but its log does.
-const OTHER_UNIT: f64 = 8.0;
-/// Share of the position's energy that the scaled model must explain.
-const ALIKE: f64 = 0.8;
-/// Most samples by which a position is taken to be early, and the share of the error that moving it back must take.
+/// Most samples by which a position is taken to be early.
 const EARLIEST: usize = 20;
-const MOVED_BACK: f64 = 0.3;
 
 /// The given plant's answer to the command of every record.
 pub(super) struct Answers<'a> {
@@ -71,8 +67,8 @@ impl<'a> Answers<'a> {
     /// The factor by which the positions follow, where they do and no machine of this model can have it.
     pub(super) fn other_unit(&self) -> Option<f64> {
         let f = self.follow(0);
-        let possible = f.factor > OTHER_UNIT.recip() && f.factor < OTHER_UNIT;
-        (f.left < (1.0 - ALIKE) * f.whole && !possible).then_some(f.factor)
+        let possible = f.factor > OTHER_UNIT_GAIN.recip() && f.factor < OTHER_UNIT_GAIN;
+        (f.left < (1.0 - OTHER_UNIT_EXPLAINED) * f.whole && !possible).then_some(f.factor)
     }
 
     /// By how many samples the positions come before the commands that made them can have acted, the model's own delay being so many: no
@@ -89,7 +85,7 @@ impl<'a> Answers<'a> {
         }
         let by = best.1 as f64;
         // Up to the model's own delay it may be a machine that is faster than its model.
-        (best.0 < MOVED_BACK * unmoved && by > own_delay + 0.5).then_some(by)
+        (best.0 < EARLY_LEFT * unmoved && by > own_delay + 0.5).then_some(by)
     }
 
     /// Places where a position slipped against the answer to its command. A sound log may differ by its start, its gain, its delay and the

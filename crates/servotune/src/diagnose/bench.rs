@@ -5,6 +5,7 @@ use super::hygiene::{Grid, quantum};
 use super::linear::{Carrier, LinearForm, Sampled, body_numbers, free_motions, free_scales};
 use super::lines::{Line, take_lines};
 use super::refit::{Chosen, Fit, simulation_error};
+use super::rules::ROUNDING_ALIKE;
 use super::run::{Run, mean_run};
 use super::select::Model;
 use super::stack::{Basis, Stack};
@@ -47,9 +48,6 @@ pub struct Bench {
     /// The law that the plant was cleared of before the search, where it was.
     pub foretold: Option<Chosen>,
 }
-
-/// Rounding over the noise of repeats from which repeats round alike and their mean does not take it away.
-pub(super) const ALIKE: f64 = 0.5;
 
 /// The finest count of some runs, where all of them lie on one.
 fn count(runs: &[Run], which: &[usize]) -> Option<Grid> {
@@ -218,15 +216,16 @@ impl Bench {
         let repeats = if from_repeats { filtered } else { Vec::new() };
         weigh(&mut stack, &repeats);
         let grid = count(&runs, &fit_runs);
-        let (levels, whitener) = match grid.map(|g| g.step / 12f64.sqrt()).filter(|r| *r > ALIKE * levels.sensor_rms) {
-            Some(rounding) => {
-                // Repeats that round alike show less noise than there is, and their mean holds as much as each of them.
-                stack.segments.iter_mut().for_each(|s| s.weight = 1.0);
-                let levels = NoiseLevels { sensor_rms: levels.sensor_rms.hypot(rounding), ..levels };
-                (levels, Whitener::new(&levels, &given.body, sample_time_s))
-            }
-            None => (levels, whitener),
-        };
+        let (levels, whitener) =
+            match grid.map(|g| g.step / 12f64.sqrt()).filter(|r| *r > ROUNDING_ALIKE * levels.sensor_rms) {
+                Some(rounding) => {
+                    // Repeats that round alike show less noise than there is, and their mean holds as much as each of them.
+                    stack.segments.iter_mut().for_each(|s| s.weight = 1.0);
+                    let levels = NoiseLevels { sensor_rms: levels.sensor_rms.hypot(rounding), ..levels };
+                    (levels, Whitener::new(&levels, &given.body, sample_time_s))
+                }
+                None => (levels, whitener),
+            };
         let mut bench = Bench {
             form,
             runs,

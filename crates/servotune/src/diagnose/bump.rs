@@ -11,6 +11,7 @@ use super::fitted::refit;
 use super::judge::{Judged, error};
 use super::linear::{Sampled, free_motions};
 use super::name::text_of;
+use super::rules::{PUSH_BY_AMPLIFIER, PUSH_CHANCE, PUSH_STAYS, PUSH_SUSPECTED, PUSH_WHOLE, PUSHED_RECORDS};
 use super::run::Run;
 use super::scan::log_tail;
 use super::stack::Segment;
@@ -38,12 +39,6 @@ pub struct Bump {
     pub log_p: f64,
 }
 
-/// Chance of a false push.
-const FALSE: f64 = 1e-9;
-/// Chance under which a push is suspected: it is among the repeats that the noise was taken from, and hides behind itself.
-const SUSPECT: f64 = 1e-3;
-/// Share of what a record has beyond its noise that one push must explain: what comes and goes all the time is no bump.
-const WHOLE: f64 = 0.6;
 /// Widths of a push that are tried, and the shares of the record from which to which they go.
 const WIDTHS: usize = 8;
 const SHORTEST: f64 = 1.0 / 400.0;
@@ -126,7 +121,7 @@ fn strongest(bench: &Bench) -> Option<Bump> {
         let log_p = log_tail(gain, 1) + (points.max(1) as f64).ln();
         // Less three standard deviations of the noise's own share, its level being that of a median.
         let excess = excess_of / (sigma * sigma) - n - 3.0 * (6.0 * n).sqrt();
-        if log_p < SUSPECT.ln() && gain > WHOLE * excess && found.as_ref().is_none_or(|f| gain > f.0) {
+        if log_p < PUSH_SUSPECTED.ln() && gain > PUSH_WHOLE * excess && found.as_ref().is_none_or(|f| gain > f.0) {
             // A repeat less the mean holds this part of what is its own.
             let part = ((mates - 1) as f64 / mates as f64).sqrt();
             let t = bench.scene.sample_time_s;
@@ -174,7 +169,7 @@ fn of_two(bench: &Bench, answers: &[Answer], bump: Bump) -> Bump {
 /// The clearest push, if it is clear as it stands or once the noise is taken from the other records.
 fn clear(bench: &Bench, plant: &Plant, spindle_hz: Option<f64>) -> Option<Bump> {
     let bump = strongest(bench)?;
-    if bump.log_p < FALSE.ln() {
+    if bump.log_p < PUSH_CHANCE.ln() {
         return Some(bump);
     }
     let mut runs = bench.runs.clone();
@@ -194,11 +189,8 @@ fn clear(bench: &Bench, plant: &Plant, spindle_hz: Option<f64>) -> Option<Bump> 
     // The mean of the others has noise of its own.
     let gain = bump.gain(&without, &whitened)? / (1.0 + 1.0 / without.stack.segments[at].runs.len() as f64);
     let log_p = bump.log_p + log_tail(gain, 1) - log_tail(bump.gain, 1);
-    (log_p < FALSE.ln()).then_some(Bump { gain, log_p, ..bump })
+    (log_p < PUSH_CHANCE.ln()).then_some(Bump { gain, log_p, ..bump })
 }
-
-/// Share of the fit records into which pushes may fall; where there are more, they are no bumps but how the machine is.
-const BUMPED: f64 = 0.25;
 
 /// Finds records into which a push from outside falls, and makes the bench again without them.
 ///
@@ -214,7 +206,7 @@ pub(super) fn set_aside(
         return Ok(Vec::new());
     }
     let sample_time_s = bench.scene.sample_time_s;
-    let most = (BUMPED * bench.fit_runs.len() as f64).floor().max(1.0) as usize;
+    let most = (PUSHED_RECORDS * bench.fit_runs.len() as f64).floor().max(1.0) as usize;
     let plant = refit(&mut bench.clone(), iterations).refitted.plant;
     let mut cleaner = Bench::new(&plant, bench.runs.clone(), sample_time_s, spindle_hz)?;
     let mut found = Vec::new();
@@ -233,9 +225,6 @@ pub(super) fn set_aside(
     Ok(found)
 }
 
-/// Share of the gain of a push from which an amplifier that bends the commands explains it as well.
-const AS_WELL: f64 = 0.7;
-
 /// Whether the repeats may differ by what an amplifier does to their commands: at a limit a peak more or less looks like a push.
 fn bent(bench: &Bench, bump: &Bump) -> bool {
     let Ok(sampled) = Sampled::of(&bench.form.given, bench.scene.sample_time_s) else { return false };
@@ -243,11 +232,8 @@ fn bent(bench: &Bench, bump: &Bump) -> bool {
         let gain = |inner: &Vec<f64>| Difference::of(bench, &sampled, e, inner).gain();
         e.grid(&bench.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
     };
-    library().iter().filter(|e| e.bends()).any(|e| explains(*e) > AS_WELL * bump.gain)
+    library().iter().filter(|e| e.bends()).any(|e| explains(*e) > PUSH_BY_AMPLIFIER * bump.gain)
 }
-
-/// Share of what a push takes under the linear refit that it must still take under the final model.
-const STAYS: f64 = 0.3;
 
 /// The pushes that the final model does not do without: at a limit or at the end of a slip repeats differ too, and look like pushes.
 pub(super) fn beyond(bench: &Bench, bumps: Vec<Bump>, linear: &Judged, found: &Judged) -> Vec<Bump> {
@@ -258,7 +244,7 @@ pub(super) fn beyond(bench: &Bench, bumps: Vec<Bump>, linear: &Judged, found: &J
             bench.whitener.apply(&mut e);
             b.gain(bench, &e)
         };
-        left(linear).zip(left(found)).is_none_or(|(before, after)| after > STAYS * before)
+        left(linear).zip(left(found)).is_none_or(|(before, after)| after > PUSH_STAYS * before)
     };
     bumps.into_iter().filter(stays).collect()
 }

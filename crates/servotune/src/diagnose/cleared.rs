@@ -10,6 +10,7 @@ use super::columns::columns_along;
 use super::fitted::refit;
 use super::judge::size;
 use super::refit::Chosen;
+use super::rules::{CLEARED_BETTER, CLEARED_FAR, CLEARED_TELLS};
 use super::run::{Run, mean_run};
 use super::select::Model;
 use super::simulation_problem::{Problem, descended};
@@ -22,15 +23,9 @@ use rayon::prelude::*;
 const SMOOTHINGS: [f64; 3] = [3.0, 8.0, 20.0];
 /// The later of the two commands whose shares make any delay between them (samples).
 const LATER: usize = 4;
-/// Share of the linear plant's equation error that a law must leave less than to be tried by simulation.
-const TELLS: f64 = 0.7;
 /// Laws that are tried by simulation, as they stand and fitted.
 const TRIED: usize = 12;
 const FITTED: usize = 3;
-/// Error of the simulation with the law over that of the linear refit below which the plant is taken.
-const FAR_BETTER: f64 = 0.5;
-/// Error of the linear refit over the sensor's noise from which it is far off at all.
-const FAR: f64 = 3.0;
 /// Smoothings between rows of the balance.
 const ROWS: f64 = 0.5;
 
@@ -234,7 +229,7 @@ impl<'a> Balance<'a> {
             let all = grid.iter().filter_map(|inner| self.solved(Some((*e, inner))));
             let best = all.min_by(|a, b| a.left.total_cmp(&b.left))?;
             let share = best.left / linear.left;
-            (share < TELLS).then_some((share, best))
+            (share < CLEARED_TELLS).then_some((share, best))
         };
         effects.par_iter().filter_map(best).collect()
     }
@@ -268,7 +263,7 @@ pub(super) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str
     let least =
         [plain(&own, &linear), plain(&own, &given)].into_iter().filter(|v| v.is_finite()).fold(f64::MAX, f64::min);
     // Sums of squares count in the sensor's noise.
-    if least < FAR * FAR * samples {
+    if least < CLEARED_FAR * CLEARED_FAR * samples {
         return None;
     }
     say("a plant cleared of what bends it");
@@ -301,7 +296,7 @@ pub(super) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str
             best = Some((after, Cleared { plant: ground.form.plant(&fitted.refitted.p), law }));
         }
     }
-    best.filter(|(left, _)| *left < FAR_BETTER * FAR_BETTER * least).map(|(_, cleared)| cleared)
+    best.filter(|(left, _)| *left < CLEARED_BETTER * CLEARED_BETTER * least).map(|(_, cleared)| cleared)
 }
 
 /// The same ground around another plant, for simulations of plain errors: its noise and its motion stay.

@@ -6,6 +6,7 @@ use super::bench::Bench;
 use super::finding::{Estimate, Finding};
 use super::linear::{Knob, body_numbers, rate_of};
 use super::name::{everywhere, text_of};
+use super::rules::ONE_NUMBER;
 use super::run::Run;
 use super::scan::log_tail;
 use crate::numeric::golden::golden_section;
@@ -14,9 +15,6 @@ use std::collections::BTreeMap;
 /// Largest scale that is looked for, and how finely.
 const LARGEST: f64 = 0.1;
 const FINEST: f64 = 1e-6;
-
-/// Fall of the sum of squares from which one number in the place of all others is no chance.
-pub(super) const SURE: f64 = 250.0;
 
 /// A scale of all times.
 pub(super) struct Clock {
@@ -63,7 +61,7 @@ impl Clock {
 
     /// Whether it takes enough to be told from a chance likeness among small changes of many numbers.
     pub fn sure(&self) -> bool {
-        self.given - self.cost > SURE
+        self.given - self.cost > ONE_NUMBER
     }
 
     /// The finding.

@@ -11,6 +11,7 @@ use super::fitted::fitted;
 use super::held_out::HeldOut;
 use super::judge::Judged;
 use super::refit::Chosen;
+use super::rules::{LAW_FAR, LAW_SAYS, LAW_SHORT};
 use super::select::{Model, Selection};
 use crate::lti::LtiError;
 use serde::Serialize;
@@ -26,15 +27,12 @@ pub struct Confirmation {
     pub gains: f64,
 }
 
-/// What a law must say before the records can deny it; the share of it that they must fall short of, and the standard deviations.
-const LEAST: f64 = 40.0;
-const SHORT: f64 = 0.25;
-const FAR: f64 = 3.0;
-
 impl Confirmation {
     /// Whether the records that were not used deny the law.
     pub fn denied(&self) -> bool {
-        self.says > LEAST && self.gains < SHORT * self.says && self.gains < self.says - FAR * 2.0 * self.says.sqrt()
+        self.says > LAW_SAYS
+            && self.gains < LAW_SHORT * self.says
+            && self.gains < self.says - LAW_FAR * 2.0 * self.says.sqrt()
     }
 }
 

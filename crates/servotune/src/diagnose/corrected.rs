@@ -7,6 +7,7 @@ use super::bench::Bench;
 use super::judge::Judged;
 use super::linear::{LinearForm, body_numbers};
 use super::refit::Chosen;
+use super::rules::FREE_BODY;
 use super::select::Selection;
 use crate::lti::{Body, PhysicsEntry, Plant};
 use crate::physics::{Effect, Scene, Setting, effect};
@@ -35,9 +36,6 @@ impl Corrected {
     }
 }
 
-/// Share of the given stiffness below which the body counts as free.
-const FREE: f64 = 0.02;
-
 /// Makes the corrected model of a fit; `per_record` effects belong to records, not to the machine, and stay out.
 pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[Chosen], scene: &Scene) -> Corrected {
     let mut plant = form.plant(p);
@@ -55,7 +53,7 @@ pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[Chosen], scene: &Scene)
     let carrier = form.carrier(p);
     let (b, k0, c0) = body_numbers(&carrier.plant.body);
     let stiffness = k0 - carrier.spring * b * form.given.resonance_gain;
-    if k0 > 0.0 && stiffness < FREE * k0 {
+    if k0 > 0.0 && stiffness < FREE_BODY * k0 {
         let viscous = c0 - carrier.damper * b * form.given.resonance_gain;
         plant.body = Body::FreeInertia { acceleration_gain: b, viscous_rate_per_s: viscous.max(0.0) };
         if let Some(spring) = effect("cable_spring") {

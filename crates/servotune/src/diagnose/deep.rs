@@ -3,23 +3,18 @@
 use super::bench::Bench;
 use super::leftover::in_simulation;
 use super::refit::Chosen;
+use super::rules::{FAR_FROM_NOISE, PUSH_MOVES, PUSH_TOGETHER, REFIT_HIDES};
 use super::scan::{Candidate, Ground};
 use super::select::{Model, Step};
 use super::simulated::simulated;
 use crate::physics::{Effect, Port};
 
-/// Standard deviations of excess from which no law of a step is near, and below which a simulated model leaves nothing.
-pub(super) const DEEP: f64 = 30.0;
-pub(super) const SPENT: f64 = 5.0;
 /// Laws of a step that are fitted by simulation then: each takes as long as the last fit of all.
 const SIMULATED: usize = 1;
-/// Share of the strongest push that every other record must show, and the fewest moves that tell.
-const LIKE: f64 = 0.5;
-const MOVES: usize = 3;
 
 /// Whether no law of a step comes near the noise.
 pub(super) fn deep(step: &Step) -> bool {
-    !step.tried.is_empty() && step.tried.iter().all(|t| t.1.excess_sigma() > DEEP)
+    !step.tried.is_empty() && step.tried.iter().all(|t| t.1.excess_sigma() > FAR_FROM_NOISE)
 }
 
 /// Fits the best laws of a step by simulation, drags first, and keeps what is better: much is left, and along a noisy or a stuck motion a law that
@@ -94,7 +89,7 @@ pub(super) fn foretold(bench: &Bench, model: &Model, step: &mut Step) -> bool {
 pub(super) fn together(c: &Candidate) -> bool {
     let s = &c.setting.strengths;
     let most = s.iter().fold(0.0f64, |m, v| if v.abs() > m.abs() { *v } else { m });
-    s.len() >= MOVES && s.iter().all(|v| v * most.signum() > LIKE * most.abs())
+    s.len() >= PUSH_MOVES && s.iter().all(|v| v * most.signum() > PUSH_TOGETHER * most.abs())
 }
 
 /// The scan around linear parameters `p`; gains count from where the model stands.
@@ -114,9 +109,9 @@ pub(super) fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model
     let mut candidates = scan_at(bench, library, model, &model.refitted.p);
     // A law without a strength of its own (a lag, a limit), or a vibration that a known mode has moved to stand in for, is not straight
     // in the linear parameters: it is looked for around the given plant too.
-    if model.chosen.is_empty() && model.excess_sigma() > CROOKED {
+    if model.chosen.is_empty() && model.excess_sigma() > REFIT_HIDES {
         // Where the refit is far from the noise, any law may have bent it.
-        let far = model.excess_sigma() > DEEP;
+        let far = model.excess_sigma() > FAR_FROM_NOISE;
         let crooked = |e: &&'static dyn Effect| far || e.facts().fixed || e.facts().port == Port::Structure;
         let apart: Vec<&'static dyn Effect> = library.iter().copied().filter(crooked).collect();
         candidates.extend(scan_at(bench, &apart, model, &vec![0.0; model.refitted.p.len()]));
@@ -124,6 +119,3 @@ pub(super) fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model
     candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     Step { before: model.evidence, candidates, tried: Vec::new(), taken: None }
 }
-
-/// Standard deviations of excess above which a linear refit is taken to hide something.
-const CROOKED: f64 = 3.0;

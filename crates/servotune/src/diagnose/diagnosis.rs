@@ -12,6 +12,7 @@ use super::ground;
 use super::judge::rms;
 use super::logs::check;
 use super::pace::Pace;
+use super::rules::MEASURED_COMMAND;
 use super::run::{Run, runs};
 use super::select::{SelectSettings, Selection};
 use super::trial::Trial;
@@ -43,9 +44,6 @@ pub struct Diagnosed {
     /// Recorded less simulated position of every run: given, refit, corrected.
     pub errors: [Vec<Vec<f64>>; 3],
 }
-
-/// Share of the error of a held command below which a command counts as measured.
-const MEASURED: f64 = 0.9;
 
 /// Diagnoses a case.
 pub fn diagnose(
@@ -131,7 +129,7 @@ fn held_or_measured(
         rms(&b.without_starts(b.fit(vec![]).errors(&p)))
     };
     let (held, moving) = (left(&bench), left(&other));
-    if moving < MEASURED * held {
+    if moving < MEASURED_COMMAND * held {
         remarks.push(format!(
             "the command is taken as measured at the samples, not as held between them: the linear refit then leaves {:.3} of the error",
             moving / held

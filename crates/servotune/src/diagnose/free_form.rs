@@ -10,6 +10,7 @@ use super::free_form_left_out::LeftOut;
 use super::free_form_shape::Shape;
 use super::free_form_stretches::Stretches;
 use super::free_form_trial::Trial;
+use super::rules::{CURVE_LAG, FOLD_NAMED, SECOND_CURVE};
 use crate::numeric::spline::roughness_rows;
 use crate::physics::CurvePort;
 use nalgebra::DMatrix;
@@ -45,14 +46,8 @@ pub(super) struct Estimated<'a> {
     pub tried: Vec<(CurvePort, f64)>,
 }
 
-/// Error of a folded or limited reading over that of the free curve (squared, of the parts left out) up to which it is the curve.
-const NAMED: f64 = 1.15;
-/// The same up to which a curve at another port is looked for beside it.
-const WORTH: f64 = 2.0;
 /// Times that the smoothness is chosen anew.
 const CHOICES: usize = 2;
-/// Share to which a lag of the amplifier must take what is foretold wrongly to stay.
-const LAGGED: f64 = 0.85;
 /// Time constant from which a lag sets out (samples).
 const LAG: f64 = 3.0;
 /// Share of the readings below the place where a fold is taken to lie at first, and share of the range below that which makes an edge: the
@@ -110,7 +105,7 @@ fn from_each<'a>(
 fn with_lag<'a>(found: Foretelling<'a>) -> Foretelling<'a> {
     let t = found.trial.bench.scene.sample_time_s;
     let lagged = foretold(found.trial.clone().lagged(Some(LAG * t)));
-    lagged.filter(|l| l.left_out < LAGGED * found.left_out).unwrap_or(found)
+    lagged.filter(|l| l.left_out < CURVE_LAG * found.left_out).unwrap_or(found)
 }
 
 /// Linear parameters with other gains: what is read may be a part of the motion only.
@@ -231,12 +226,12 @@ pub(super) fn estimated<'a>(
         .into_iter()
         .min_by(|a, b| a.left_out.total_cmp(&b.left_out))
         .filter(|_| port == CurvePort::SensorOverPosition);
-    let mut reading = reading.filter(|r| r.left_out < WORTH * curve.left_out);
+    let mut reading = reading.filter(|r| r.left_out < SECOND_CURVE * curve.left_out);
     if let Some(r) = &reading {
         progress("a curve without a name beside the reading that was found");
         let (other, by_port) = beside(r, one_place)?;
         // A name, alone or with a curve at another port, before a sensor bent freely, where it foretells as well.
-        if r.left_out < NAMED * curve.left_out || other.left_out <= curve.left_out {
+        if r.left_out < FOLD_NAMED * curve.left_out || other.left_out <= curve.left_out {
             (curve, tried) = (other, by_port);
         } else {
             reading = None;

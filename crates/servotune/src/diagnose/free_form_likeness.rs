@@ -4,6 +4,7 @@
 //! textbook ones, fitted to the knots beside what a linear plant could hold.
 
 use super::free_form_gauge::Plain;
+use super::rules::{CURVE_LIKE, CURVE_LOPSIDED};
 use crate::numeric::least_squares::Qr;
 use crate::physics::CurvePort;
 
@@ -25,10 +26,6 @@ struct Form {
     value: Vec<f64>,
 }
 
-/// Least share of a curve by which a shape counts as like it.
-const LIKE: f64 = 0.5;
-/// Least difference of the two sides, as a share, that is worth a word.
-const LOPSIDED: f64 = 0.1;
 /// Places of a kink, as shares of the range.
 const KINKS: [f64; 7] = [0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.75];
 
@@ -142,7 +139,7 @@ pub(super) fn likeness(c: &Plain) -> Likeness {
     };
     let share = if whole > 0.0 { 1.0 - left / whole } else { 0.0 };
     let percent = 100.0 * share;
-    if share < LIKE {
+    if share < CURVE_LIKE {
         let says =
             format!("like none of the named laws: the nearest, {}, holds {percent:.0} % of the curve", form.words);
         return Likeness { effect: form.effect, share, says };
@@ -168,5 +165,5 @@ fn lopsided(c: &Plain, form: &Form) -> Option<String> {
     }
     let [above, below] = sides(c.port);
     let (share, place) = if ratio < 1.0 { (1.0 - ratio, above) } else { (1.0 - ratio.recip(), below) };
-    (share > LOPSIDED).then(|| format!("{:.0} % weaker {place}", 100.0 * share))
+    (share > CURVE_LOPSIDED).then(|| format!("{:.0} % weaker {place}", 100.0 * share))
 }

@@ -4,6 +4,7 @@
 
 use super::DiagnoseError;
 use super::bench::Bench;
+use super::rules::BEYOND_MOTION;
 
 /// Refuses a ground on which nothing can be computed.
 pub(super) fn check(bench: &Bench) -> Result<(), DiagnoseError> {
@@ -31,9 +32,6 @@ fn finite(bench: &Bench) -> Result<(), DiagnoseError> {
     }
 }
 
-/// Most times that a simulation may exceed the recorded motion: beyond it the numbers of a fit lose all their digits.
-const UNLIKE: f64 = 1e8;
-
 /// Refuses a plant that simulates something else than these records.
 fn alike(bench: &Bench) -> Result<(), DiagnoseError> {
     let none = vec![0.0; bench.form.knobs.len()];
@@ -42,7 +40,7 @@ fn alike(bench: &Bench) -> Result<(), DiagnoseError> {
         let moved: Vec<f64> = record.position.iter().map(|x| x - mean).collect();
         let size = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt();
         let ratio = size(&error) / size(&moved);
-        if size(&moved) > 0.0 && (!ratio.is_finite() || ratio > UNLIKE) {
+        if size(&moved) > 0.0 && (!ratio.is_finite() || ratio > BEYOND_MOTION) {
             return Err(DiagnoseError::Unlike { record: record.name.clone(), ratio });
         }
     }

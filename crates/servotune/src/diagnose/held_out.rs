@@ -6,6 +6,10 @@ use super::finding::Finding;
 use super::judge::Judged;
 use super::linear::free_motions;
 use super::place::{Part, place_of};
+use super::rules::{
+    ASTRAY_SHARE, ASTRAY_SIGMA, BEYOND_FAR, BEYOND_LEFT, HELD_OUT_CLEAR, HELD_OUT_FAR, HELD_OUT_LEFT,
+    HELD_OUT_TOGETHER, HELD_OUT_UNMOVED, RANGE_MARGIN,
+};
 use super::run::Run;
 use super::scan::log_tail;
 use super::select::{Model, Selection};
@@ -30,16 +34,13 @@ pub struct HeldOut {
     pub whitened: [f64; 2],
 }
 
-/// Share of the fit records' range by which a record inside it may stick out at either end.
-const MARGIN: f64 = 0.1;
-
 /// Smallest and largest value over several series.
 fn span<'a>(series: impl Iterator<Item = &'a [f64]>) -> [f64; 2] {
     series.flatten().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
 }
 
 fn within(inner: [f64; 2], outer: [f64; 2]) -> bool {
-    let margin = MARGIN * (outer[1] - outer[0]);
+    let margin = RANGE_MARGIN * (outer[1] - outer[0]);
     inner[0] >= outer[0] - margin && inner[1] <= outer[1] + margin
 }
 
@@ -74,19 +75,6 @@ pub(super) fn mean(all: &[HeldOut]) -> Option<[f64; 2]> {
     (n > 0).then(|| [sum(0), sum(1)])
 }
 
-/// Excess over noise, in its standard deviations and as a share of it, from which a record within the fit's range says more than
-/// noise; and the share of what the linear refit leaves there that a law of the machine may leave at most.
-const FAR: f64 = 5.0;
-const CLEAR: f64 = 0.05;
-const INSIDE: f64 = 0.5;
-/// The same beyond that range, where a law is continued and its numbers err more.
-const FAR_BEYOND: f64 = 10.0;
-const BEYOND: f64 = 0.5;
-
-/// The same for all records within the range together, each of which may say too little alone.
-const TOGETHER: f64 = 3.75;
-const UNMOVED: f64 = 0.6;
-
 /// Power of the noise of the noisiest segment over that of what the filter makes white: where some of the fit's records are noisier than
 /// the filter says, so may one that was not used be.
 fn loudest(bench: &Bench) -> f64 {
@@ -105,9 +93,9 @@ pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) 
     let loudest = loudest(bench);
     let [excess, left] = [0, 1].map(|i| move |h: &HeldOut| h.whitened[i] - loudest);
     let far = |h: &&HeldOut| {
-        let (far, share) = if h.inside { (FAR, INSIDE) } else { (FAR_BEYOND, BEYOND) };
+        let (far, share) = if h.inside { (HELD_OUT_FAR, HELD_OUT_LEFT) } else { (BEYOND_FAR, BEYOND_LEFT) };
         let noise = loudest * (2.0 / h.samples as f64).sqrt();
-        left(h) > f64::max(far * noise, CLEAR) && left(h) > share * excess(h)
+        left(h) > f64::max(far * noise, HELD_OUT_CLEAR) && left(h) > share * excess(h)
     };
     let most = |a: &&HeldOut, b: &&HeldOut| left(a).total_cmp(&left(b));
     if let Some(worst) = all.iter().filter(far).max_by(most) {
@@ -117,19 +105,15 @@ pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) 
     let samples: f64 = inside.iter().map(|h| h.samples as f64).sum();
     let mean = |of: &dyn Fn(&HeldOut) -> f64| inside.iter().map(|h| of(h) * h.samples as f64).sum::<f64>() / samples;
     let (refit, after) = (mean(&excess), mean(&left));
-    let unmoved = after > TOGETHER * loudest * (2.0 / samples).sqrt() && after > UNMOVED * refit;
+    let unmoved = after > HELD_OUT_TOGETHER * loudest * (2.0 / samples).sqrt() && after > HELD_OUT_UNMOVED * refit;
     inside.into_iter().filter(|_| unmoved).max_by(most)
 }
-
-/// Excess over noise, in its standard deviations and as a share of it, from which a record that was not used shows something that the
-/// fitted records do not: far more than errs a linear model that is only continued.
-const ASTRAY: [f64; 2] = [10.0, 0.3];
 
 /// The record that the linear refit misses most, by far more than noise.
 pub(super) fn astray<'a>(bench: &Bench, all: &'a [HeldOut]) -> Option<&'a HeldOut> {
     let loudest = loudest(bench);
     let left = |h: &HeldOut| h.whitened[0] - loudest;
-    let far = |h: &&HeldOut| left(h) > loudest * ASTRAY[1].max(ASTRAY[0] * (2.0 / h.samples as f64).sqrt());
+    let far = |h: &&HeldOut| left(h) > loudest * ASTRAY_SHARE.max(ASTRAY_SIGMA * (2.0 / h.samples as f64).sqrt());
     all.iter().filter(far).max_by(|a, b| left(a).total_cmp(&left(b)))
 }
 

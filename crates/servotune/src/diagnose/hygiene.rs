@@ -4,6 +4,7 @@
 //! that is shifted by d samples makes this replay fail, and shifting it back makes it right again; a machine with more delay
 //! does not.
 
+use super::rules::{REPLAY_ERROR, STUCK_STEPS};
 use super::run::Run;
 use super::stack::Basis;
 use crate::controller::Law;
@@ -75,8 +76,6 @@ fn misfit(law: &Law, run: &Run, reference: &[f64], position: &dyn Fn(usize) -> f
     free.fold((0.0, 0.0), |(off, all), (u, p)| (off + (u - p).powi(2), all + u * u))
 }
 
-/// Error of a replay above which the law is not the documented one; logs round their numbers.
-pub const REPLAY: f64 = 5e-3;
 /// Most samples by which a log is taken to be shifted.
 const SHIFT: i32 = 6;
 
@@ -90,7 +89,7 @@ pub fn replay_records(law: &Law, runs: &[&Run], smooth: &[Vec<f64>]) -> Option<R
     }
     let each: Vec<(f64, f64)> = with.par_iter().map(|(run, r, _)| misfit(law, run, r, &|k| run.position[k])).collect();
     let relative = |(off, all): (f64, f64)| (off / f64::max(all, 1e-300)).sqrt();
-    let failing: Vec<usize> = (0..with.len()).filter(|&i| relative(each[i]) > REPLAY).collect();
+    let failing: Vec<usize> = (0..with.len()).filter(|&i| relative(each[i]) > REPLAY_ERROR).collect();
     let plain = relative(each.iter().fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1)));
     let mut out = Replay {
         error: plain,
@@ -182,9 +181,6 @@ fn factors(law: &Law, with: &[(&Run, &[f64])]) -> (f64, f64, f64) {
     (a, b, ((uu - a * ru + b * pu).max(0.0) / f64::max(all, 1e-300)).sqrt())
 }
 
-/// Steps of an encoder's count that the model must move over while the position stands still.
-const MOVED: f64 = 3.0;
-
 /// Samples that the clock says are missing, and stretches where the position did not move although its noise says it must, or, where it lies on
 /// a coarse count, although the model (`expected`) moves over several steps of it.
 pub fn sample_faults(run: &Run, gaps: &[ClockGap], sample_time_s: f64, expected: &[f64]) -> Vec<SampleFault> {
@@ -215,7 +211,7 @@ pub fn sample_faults(run: &Run, gaps: &[ClockGap], sample_time_s: f64, expected:
     let moves = |from: usize, to: usize| {
         let part = &expected[from..to];
         let [low, high] = part.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
-        high - low > MOVED * grid
+        high - low > STUCK_STEPS * grid
     };
     let mut at = 0;
     for length in lengths {

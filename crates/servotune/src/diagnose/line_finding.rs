@@ -5,6 +5,7 @@ use super::finding::{Estimate, Finding, Where};
 use super::linear::{Sampled, free_motions};
 use super::lines::Line;
 use super::name::{everywhere, text_of};
+use super::rules::{HUM_COHERENCE, HUM_FADES, HUM_SPREAD, MAINS_MULTIPLES, MAINS_OFF_HZ};
 use super::run::Run;
 use super::select::Selection;
 use crate::lti::FrequencyResponse;
@@ -63,18 +64,11 @@ impl Phasors {
             .zip(second)
             .fold((0.0, 0.0), |(re, im), ([a, b], [c, d])| (re + a * c + b * d, im + a * d - b * c));
         let ratio = after / before;
-        spread < UNEVEN * mean
-            && re.hypot(im) > IN_STEP * (before * after).sqrt()
-            && (1.0 / FADES..FADES).contains(&ratio)
+        spread < HUM_SPREAD * mean
+            && re.hypot(im) > HUM_COHERENCE * (before * after).sqrt()
+            && (1.0 / HUM_FADES..HUM_FADES).contains(&ratio)
     }
 }
-
-/// Relative spread of a hum's strength over the runs, noise on it included.
-const UNEVEN: f64 = 0.42;
-/// Least coherence of the halves of all runs.
-const IN_STEP: f64 = 0.5;
-/// Ratio of the power in both halves within which a hum neither fades nor swells.
-const FADES: f64 = 3.0;
 
 /// Mean and its 95 % interval from the spread over runs.
 fn estimate(values: &[f64], scale: f64, unit: &str) -> Estimate {
@@ -98,15 +92,11 @@ fn frequency(bench: &Bench, line: &Line) -> Estimate {
     Estimate { value: line.hz, low: line.hz - off, high: line.hz + off, unit: "Hz".into() }
 }
 
-/// Most multiples of the mains that hum, and how near to one a frequency counts as one (Hz).
-const MULTIPLES: f64 = 12.0;
-const MAINS_OFF_HZ: f64 = 0.2;
-
 /// Whether the mains may hum at a frequency: a single higher order of the spindle there may be either.
 pub(super) fn mains(hz: f64) -> bool {
     [50.0, 60.0].iter().any(|base| {
         let k = (hz / base).round();
-        (1.0..=MULTIPLES).contains(&k) && (hz - k * base).abs() < MAINS_OFF_HZ
+        (1.0..=MAINS_MULTIPLES).contains(&k) && (hz - k * base).abs() < MAINS_OFF_HZ
     })
 }
 

@@ -1,11 +1,12 @@
 //! What happened to the linear parameters beside the findings: nothing, the delay alone, the log's clock, or a refit.
 
 use super::bench::Bench;
-use super::clock::{Clock, SURE};
+use super::clock::Clock;
 use super::finding::{Diagnosis, Estimate, Finding, Verdict};
 use super::linear::{Knob, LinearForm, body_numbers};
-use super::name::{FAMILY, everywhere, text_of};
+use super::name::{everywhere, text_of};
 use super::refit::{Chosen, Fit};
+use super::rules::{FAMILY, LAGS_ALIKE, ONE_NUMBER};
 use super::scan::log_tail;
 use super::select::{Model, Selection};
 use super::simulated::simulated_with;
@@ -71,9 +72,6 @@ fn lags_like(bench: &Bench, way: Way, delay_s: f64, cost: f64) -> Vec<String> {
 /// The lags of the library, and the iterations in which one of them alone is fitted.
 const LAGS: [&str; 2] = ["amplifier_lag", "sensor_lag"];
 const ITERATIONS: usize = 16;
-/// Share of what the best lag explains by which another may fall short: before or behind the arm a lag is the same to the records, but
-/// along a recorded motion that lags itself one of them is found less well.
-const ALIKE: f64 = 0.1;
 
 /// A lag whose time constant is looked for near a delay.
 fn lag(name: &str, near_s: f64) -> Option<Chosen> {
@@ -219,10 +217,10 @@ fn simple_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection) -> bool
     }
     if d.findings.is_empty() && selection.model.chosen.is_empty() && later_s > 0.0 {
         let lags = Lag::alone(bench, later_s);
-        let width = lags.first().map_or(0.0, |l| FAMILY.max(ALIKE * (fixed[0] - l.cost)));
+        let width = lags.first().map_or(0.0, |l| FAMILY.max(LAGS_ALIKE * (fixed[0] - l.cost)));
         let like: Vec<String> =
             lags.iter().filter(|l| l.cost < lags[0].cost + width).map(|l| l.name().to_owned()).collect();
-        let sure = |l: &&Lag| fixed[0] - l.cost > SURE && l.cost - selection.model.cost < allowed(1);
+        let sure = |l: &&Lag| fixed[0] - l.cost > ONE_NUMBER && l.cost - selection.model.cost < allowed(1);
         if let Some(lag) = lags.first().filter(sure) {
             d.verdict = if like.len() > 1 { Verdict::Family } else { Verdict::Named };
             d.findings.push(lag.finding(bench, like, fixed[0]));

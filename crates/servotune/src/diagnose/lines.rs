@@ -4,6 +4,7 @@
 //! would smear such a line and their spread would count it as noise, so lines are found in what repeats differ by and taken
 //! out of every run before anything else is estimated. The directions are closed to all later fits.
 
+use super::rules::{LINE_CHANCE, LINE_SNAP};
 use super::run::Run;
 use super::scan::log_tail;
 use super::stack::Basis;
@@ -26,12 +27,8 @@ pub struct Line {
 
 /// Most lines that are looked for.
 const MOST: usize = 8;
-/// Chance of a false line.
-const FALSE: f64 = 1e-6;
 /// Bins on each side over which the noise's level is taken, and those next to the line that are left out.
 const LEVEL: [usize; 2] = [40, 4];
-/// Part of a line's width (1/duration) within which it is an order of the spindle.
-const SNAP: f64 = 0.5;
 
 impl Line {
     /// Cosine and sine over a run.
@@ -114,7 +111,7 @@ pub fn peak(
     }
     let (gain, k) = best;
     let log_p = log_tail(gain, numbers) + (power.len() as f64).ln();
-    if log_p > FALSE.ln() {
+    if log_p > LINE_CHANCE.ln() {
         return None;
     }
     let width = 1.0 / (longest as f64 * sample_time_s);
@@ -134,7 +131,7 @@ pub fn peak(
     };
     let hz = golden_section(strength, at - 0.5 * width, at + 0.5 * width, 1e-3 * width).x;
     let order =
-        spindle_hz.map(|s| ((hz / s).round(), s)).filter(|(n, s)| *n >= 1.0 && (hz - n * s).abs() < SNAP * width);
+        spindle_hz.map(|s| ((hz / s).round(), s)).filter(|(n, s)| *n >= 1.0 && (hz - n * s).abs() < LINE_SNAP * width);
     Some(match order {
         Some((n, s)) => Line { hz: n * s, order: Some(n as usize), log_p },
         None => Line { hz, order: None, log_p },

@@ -6,15 +6,11 @@
 use super::bench::Bench;
 use super::columns::white_columns;
 use super::linear::Sampled;
+use super::rules::{DRIFT_FOLLOWS_MOTION, DRIFT_REPEATS};
 use super::select::Model;
 use super::stack::Basis;
 use crate::numeric::least_squares::dot;
 use nalgebra::{DMatrix, DVector};
-
-/// Variance between moves over that between repeats from which the strengths follow the motion.
-const LOCKED: f64 = 20.0;
-/// Fewest repeats beyond the first of their moves.
-const REPEATS: usize = 4;
 
 /// Whether the strengths of effect `at`, which are each record's own, follow the motion; false where too few repeats tell.
 pub(super) fn follows_motion(bench: &Bench, model: &Model, at: usize) -> bool {
@@ -63,7 +59,7 @@ pub(super) fn follows_motion(bench: &Bench, model: &Model, at: usize) -> bool {
         total += &information;
         moves.push((information, strengths));
     }
-    if repeats < REPEATS || moves.len() < 2 {
+    if repeats < DRIFT_REPEATS || moves.len() < 2 {
         return false;
     }
     if !total.iter().chain(pull.iter()).all(|x| x.is_finite()) {
@@ -79,5 +75,5 @@ pub(super) fn follows_motion(bench: &Bench, model: &Model, at: usize) -> bool {
         .sum();
     let between = between / ((moves.len() - 1) * m) as f64;
     let within = (within / (repeats * m) as f64).max(1.0);
-    between > LOCKED * within
+    between > DRIFT_FOLLOWS_MOTION * within
 }

@@ -5,6 +5,7 @@ use super::bench::scene;
 use super::finding::Finding;
 use super::hygiene::{Replay, SampleFault, replay_records, sample_faults};
 use super::judge::{Judged, error};
+use super::rules::UNIT_FACTOR;
 use super::run::Run;
 use super::slip::breaks_of_replay;
 use crate::controller::Law;
@@ -20,10 +21,6 @@ pub(super) struct Hygiene {
     /// Whether the controller's law holds, so that the loop can be closed in simulation.
     pub closed: bool,
 }
-
-/// Deviation of a factor from 1 above which a position counts as logged in other units; a factor of the command alone is the
-/// controller's.
-const UNIT: f64 = 0.02;
 
 /// What the logs say; positions that turn out to be shifted are moved back.
 pub(super) fn check(
@@ -62,7 +59,7 @@ pub(super) fn check(
                 hygiene.finding = Some(super::log_finding::misalignment(r, sample_time_s, &named));
                 let by = r.shift_samples;
                 failing.iter().for_each(|&i| shift(&mut runs[i], by));
-            } else if helps(r.error_scaled) && (r.position_factor - 1.0).abs() > UNIT {
+            } else if helps(r.error_scaled) && (r.position_factor - 1.0).abs() > UNIT_FACTOR {
                 hygiene.finding = Some(super::log_finding::scale(r, &named));
                 hygiene.closed = false;
             } else {

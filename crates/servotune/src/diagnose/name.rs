@@ -8,38 +8,25 @@ use super::linear::Sampled;
 use super::place::place;
 use super::refit::Chosen;
 use super::rival::Rival;
+use super::rules::{
+    DRY_LENGTH, FAMILY, FAMILY_SHARE, MAINS_ORDER, ORDER_BESIDE, SLIGHT, SLIGHT_CONFOUNDED, SLIGHT_NEAR_NOISE,
+    SLIGHT_SHARE,
+};
 use super::run::Run;
 use super::scan::log_tail;
 use super::select::Selection;
 use crate::physics::{Effect, Entry, Facts, Parameter, Setting, Share, effect, facts, library};
 use std::collections::BTreeMap;
 
-/// Difference of the fit (twice the log-likelihood) below which two names are one family.
-pub(super) const FAMILY: f64 = 20.0;
-/// The same as a share of what the effect explains: laws differ from any machine by more than noise.
-const FAMILY_SHARE: f64 = 1e-3;
-
 /// Difference of the fit below which two laws are one family, for an effect that explains so much.
 pub(super) fn family_width(gain: f64) -> f64 {
     FAMILY.max(FAMILY_SHARE * gain)
 }
 
-/// Fall of the sum of squares, also as a share of what the refit took, under which a law of a narrow band is no more than another linear
-/// model might take; the share of it that the refit can take from which that is so, and the standard deviations of excess that the refit
-/// leaves then.
-const SLIGHT: f64 = 120.0;
-const SLIGHT_SHARE: f64 = 0.01;
-const CURVED: f64 = 0.3;
-const NEXT_TO_NOTHING: f64 = 4.0;
-
 /// Difference of two linear answers below which they are one.
 const ALIKE: f64 = 1e-6;
-/// How many times the spindle's frequency a single order must have to be mistaken for the mains.
-const HIGHER: f64 = 1.5;
 /// By how much free numbers are moved to see what they enter.
 const NUDGE: f64 = 1.01;
-/// Sliding length over the sensor's noise below which friction counts as dry.
-const DRY: f64 = 12.0;
 
 /// Whether two names are both drags.
 pub(super) fn same_drag(a: &str, b: &str) -> bool {
@@ -78,7 +65,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
     let name = match own {
         "line_disturbance" if spindle(inner[0]) => "repeatable_runout",
         // A pre-sliding length that the sensor's noise covers is no pre-sliding: the drag is dry.
-        "pivot_friction" if inner[0] < DRY * bench.scene.noise => "coulomb_friction",
+        "pivot_friction" if inner[0] < DRY_LENGTH * bench.scene.noise => "coulomb_friction",
         _ => own,
     };
     let mut family = vec![name.to_owned()];
@@ -99,7 +86,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
         }
     }
     if own == "repeatable_runout"
-        && spindle_hz.is_some_and(|s| single_order(&chosen.setting).is_some_and(|hz| hz > HIGHER * s && mains(hz)))
+        && spindle_hz.is_some_and(|s| single_order(&chosen.setting).is_some_and(|hz| hz > MAINS_ORDER * s && mains(hz)))
     {
         family.push("line_disturbance".to_owned());
     }
@@ -109,9 +96,10 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
     }
     // Where the refit leaves next to nothing, a slight curve in the spectrum may be what its own straightness falls short of.
     let line = own == "line_disturbance";
-    let curve = line || chosen.effect.facts().port == crate::physics::Port::Structure && c.concealed > CURVED;
+    let curve =
+        line || chosen.effect.facts().port == crate::physics::Port::Structure && c.concealed > SLIGHT_CONFOUNDED;
     let slight = SLIGHT.max(SLIGHT_SHARE * (selection.given - selection.baseline.cost));
-    if curve && gain < slight && selection.baseline.excess_sigma() < NEXT_TO_NOTHING {
+    if curve && gain < slight && selection.baseline.excess_sigma() < SLIGHT_NEAR_NOISE {
         family.push("linear_parameters".to_owned());
     }
     let log_p = log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library().len() as f64).ln();
@@ -180,7 +168,7 @@ fn effect_signal(bench: &Bench, selection: &Selection, at: usize) -> Vec<f64> {
 fn single_order(setting: &Setting) -> Option<f64> {
     let sizes: Vec<f64> = setting.strengths.chunks_exact(2).map(|s| s[0].hypot(s[1])).collect();
     let (k, most) = sizes.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-    let alone = sizes.iter().enumerate().all(|(i, s)| i == k || *s < BESIDE_ORDER * most);
+    let alone = sizes.iter().enumerate().all(|(i, s)| i == k || *s < ORDER_BESIDE * most);
     alone.then_some((k + 1) as f64 * setting.inner[0])
 }
 
@@ -274,6 +262,3 @@ fn percent(explained: f64) -> String {
     let left = 100.0 * (1.0 - explained);
     if left > 1000.0 { "more than 1000".into() } else { hertz(left) }
 }
-
-/// Share of a single order's size below which the others do not count.
-const BESIDE_ORDER: f64 = 0.2;

@@ -6,19 +6,14 @@
 use super::bench::Bench;
 use super::finding::{Estimate, Finding, FitFigures};
 use super::name::{everywhere, text_of};
+use super::rules::{NOISE_DEPARTED, NOISE_LARGER, NOISE_SLOPE, NOISE_WITH_SPEED};
 use super::run::Run;
 use super::scan::log_tail;
 use super::unrest::Unrest;
 use crate::recording::NominalNoise;
 
-/// Growth of the noise's power from rest to the highest speed that is worth a word.
-const FASTER: f64 = 0.2;
-/// Share of its step to which a scale is graduated.
+/// Least error of a step, as a share of it: no scale is graduated better.
 const GRADUATION: f64 = 1e-4;
-/// Level over the stated one from which it has departed.
-const DEPARTED: f64 = 1.3;
-/// Power of the error over that of the sensor's white noise from which torque noise is by far the larger part of it.
-const LARGER: f64 = 4.0;
 /// Error of a level of torque noise that is no better known than its spectrum's shape.
 const SHAPE: f64 = 0.05;
 
@@ -30,9 +25,9 @@ pub(super) fn noise_findings(
     left: FitFigures,
 ) -> Vec<Finding> {
     let mut all: Vec<Finding> = counted(bench).into_iter().collect();
-    let larger = left.rms_after.powi(2) > LARGER * bench.levels.sensor_rms.powi(2);
+    let larger = left.rms_after.powi(2) > NOISE_LARGER * bench.levels.sensor_rms.powi(2);
     let blown = unrest.filter(|u| match nominal.windage_rms {
-        Some(level) => u.rms_command > DEPARTED * level,
+        Some(level) => u.rms_command > NOISE_DEPARTED * level,
         None => larger,
     });
     all.extend(blown.map(|u| wind(bench, u)));
@@ -73,7 +68,7 @@ fn wind(bench: &Bench, u: &Unrest) -> Finding {
 /// An encoder whose noise is above the stated one.
 fn loud(bench: &Bench, stated: f64) -> Option<Finding> {
     let level = bench.levels.sensor_rms;
-    if !bench.levels.from_repeats || level < DEPARTED * stated {
+    if !bench.levels.from_repeats || level < NOISE_DEPARTED * stated {
         return None;
     }
     let n: usize = bench.repeats.iter().map(|r| r.1.len()).sum();
@@ -115,7 +110,7 @@ fn faster(bench: &Bench) -> Option<Finding> {
     let sigma = (left / spread).sqrt();
     let floor = (sy - slope * sx) / n;
     // Seven standard errors, and at the highest speed clearly more than at rest.
-    if !(slope > 7.0 * sigma && slope > FASTER * floor) {
+    if !(slope > NOISE_SLOPE * sigma && slope > NOISE_WITH_SPEED * floor) {
         return None;
     }
     let seconds = (slope * bench.levels.sensor_rms.powi(2)).sqrt() / bench.scene.speed;

@@ -7,6 +7,7 @@
 use super::bench::Bench;
 use super::corrected::{Corrected, corrected};
 use super::judge::{Judged, errors, floor, rms, size};
+use super::rules::{REFIT_BETTER, REFIT_FAR, SIMULATION_ALIKE, SIMULATION_SAMPLING};
 use super::run::Run;
 use super::select::{Model, Selection};
 use super::simulation_problem::descended;
@@ -14,13 +15,6 @@ use crate::controller::Law;
 use crate::lti::Plant;
 use crate::recording::Role;
 
-/// Share by which two simulations may differ without one being worse, and the same over the root of the samples.
-const ALIKE: f64 = 0.01;
-const SAMPLING: f64 = 2.0;
-/// Error of a linear refit over the noise from which a fit by simulation is tried beside it.
-const FAR: f64 = 3.0;
-/// Share of the refit's error that a fit by simulation must take to stand in its place.
-const BETTER: f64 = 0.95;
 /// Stretches that records are cut into where there are fewer of them.
 const STRETCHES: usize = 4;
 /// Shortest stretch (samples).
@@ -66,7 +60,7 @@ pub(super) struct Reporting<'a> {
 
 /// Whether one root mean square over so many samples is above another by more than sampling.
 fn worse(one: f64, than: f64, samples: usize) -> bool {
-    !one.is_finite() || one > than * (1.0 + ALIKE.max(SAMPLING / (samples as f64).sqrt()))
+    !one.is_finite() || one > than * (1.0 + SIMULATION_ALIKE.max(SIMULATION_SAMPLING / (samples as f64).sqrt()))
 }
 
 /// A figure as a person says it.
@@ -201,7 +195,7 @@ impl Reporting<'_> {
         let noise = floor(&own_errors, &fit).unwrap_or(self.bench.levels.sensor_rms);
         let sound = !worse(left, of_given.fit, samples);
         let mut offer = (own, true);
-        if !sound || left > FAR * noise {
+        if !sound || left > REFIT_FAR * noise {
             let mut start = baseline.clone();
             start.chosen.clear();
             if !sound {
@@ -211,7 +205,7 @@ impl Reporting<'_> {
             let other = self.descended(&start, &self.material(&start));
             let other = other.map(|m| (self.linear(&m.refitted.p), m));
             let better = other.filter(|(o, m)| {
-                self.rms(o, &fit) < BETTER * least
+                self.rms(o, &fit) < REFIT_BETTER * least
                     && self.left_out(m, given).is_some_and(|[own, given]| !worse(own, given, samples))
             });
             match better {
@@ -250,7 +244,7 @@ impl Reporting<'_> {
         let made =
             |m: &Model| Offer { made: corrected(&bench.form, &m.refitted.p, &m.chosen, &bench.scene), full: true };
         let samples = self.samples(Role::Fit);
-        let least = of_given.fit.min(self.measured(linear).fit * (1.0 + ALIKE));
+        let least = of_given.fit.min(self.measured(linear).fit * (1.0 + SIMULATION_ALIKE));
         let mut offer = made(last);
         let mut of_offer = self.measured(&offer);
         let unit = &bench.form.given.position_unit;

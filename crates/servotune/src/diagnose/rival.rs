@@ -6,7 +6,8 @@
 use super::bench::Bench;
 use super::name::family_width;
 use super::refit::Chosen;
-use super::select::{Model, OWN, Step, begun, gain_of};
+use super::rules::{OWN_OF_RECORD, RIVAL_BETTER, RIVAL_DOUBT, SIMULATION_NO_JUDGE, USUAL_LAW};
+use super::select::{Model, Step, begun, gain_of};
 use super::simulated::simulated;
 
 /// Another law in the place of one effect of the model, everything else refitted.
@@ -20,17 +21,6 @@ pub struct Rival {
     pub model: Model,
 }
 
-/// Fall of the sum of squares for which an effect is exchanged.
-pub(super) const BETTER: f64 = 2.0;
-/// Share of what an effect explains by which the recorded motion may err between two laws: so near, simulation decides.
-const DOUBT: f64 = 0.05;
-/// Simulation error over that along the recorded motion above which a simulation is no judge (a body that drifts).
-const NO_JUDGE: f64 = 1.2;
-
-/// Twice the logarithm of the odds, ten to one, of a law that all machines of this kind follow against one that few do: what decides where
-/// the records do not.
-const USUAL: f64 = 4.6;
-
 /// Free numbers of a law.
 pub(super) fn numbers(c: &Chosen) -> usize {
     let strengths = if c.effect.facts().fixed { 0 } else { c.setting.strengths.iter().filter(|s| **s != 0.0).count() };
@@ -43,7 +33,7 @@ pub(super) fn more(bench: &Bench, law: &Chosen, than: &Chosen) -> f64 {
     let price = (bench.stack.total as f64).ln();
     let of = |c: &Chosen| {
         let numbers = numbers(c) + begun(bench, &c.setting.inner, c.effect);
-        price * numbers as f64 - if c.effect.usual() { USUAL } else { 0.0 }
+        price * numbers as f64 - if c.effect.usual() { USUAL_LAW } else { 0.0 }
     };
     of(law) - of(than)
 }
@@ -57,11 +47,11 @@ pub(super) fn by_simulation(
     steps: &[Step],
 ) {
     for at in 0..rivals.len().min(model.chosen.len()) {
-        if by_simulation.cost > NO_JUDGE * model.cost {
+        if by_simulation.cost > SIMULATION_NO_JUDGE * model.cost {
             return;
         }
         let won = gain_of(steps, &model.chosen[at]);
-        let width = family_width(won).max(DOUBT * won);
+        let width = family_width(won).max(RIVAL_DOUBT * won);
         let mut best: Option<(f64, usize, Model)> = None;
         for (i, r) in rivals[at].iter_mut().enumerate() {
             if r.cost - model.cost >= width {
@@ -70,9 +60,9 @@ pub(super) fn by_simulation(
             let Some(s) = simulated(bench, &r.model) else { continue };
             r.cost = model.cost + (s.cost - by_simulation.cost);
             let facts = r.model.chosen[at].effect.facts();
-            let dearer = if facts.per_record { OWN * won } else { 0.0 };
+            let dearer = if facts.per_record { OWN_OF_RECORD * won } else { 0.0 };
             let ahead = by_simulation.cost - s.cost - dearer - more(bench, &s.chosen[at], &by_simulation.chosen[at]);
-            if ahead > BETTER && r.model.possible() && best.as_ref().is_none_or(|b| ahead > b.0) {
+            if ahead > RIVAL_BETTER && r.model.possible() && best.as_ref().is_none_or(|b| ahead > b.0) {
                 best = Some((ahead, i, s));
             }
         }

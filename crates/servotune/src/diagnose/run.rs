@@ -1,5 +1,6 @@
 //! A record made ready: what acted on the plant, what it answered, and whose repeat it is.
 
+use super::rules::LAP_DIGITS;
 use crate::recording::{Case, Role};
 
 /// One record of a case.
@@ -94,7 +95,7 @@ impl Run {
         let moving: Vec<(&[f64], f64)> = drives
             .into_iter()
             .filter(|x| x.iter().any(|v| *v != x[0]))
-            .map(|x| (x, PRINTED * x.iter().fold(0.0f64, |m, v| m.max(v.abs()))))
+            .map(|x| (x, LAP_DIGITS * x.iter().fold(0.0f64, |m, v| m.max(v.abs()))))
             .collect();
         let repeats =
             |n: usize| moving.iter().all(|(x, close)| x.iter().zip(&x[n..]).all(|(a, b)| (a - b).abs() <= *close));
@@ -111,8 +112,6 @@ impl Run {
 const AHEAD: [f64; 4] = [533.0 / 840.0, -139.0 / 840.0, 29.0 / 840.0, -1.0 / 280.0];
 /// Shortest lap (samples): below it there is no spectrum of noise to speak of.
 const SHORTEST_LAP: usize = 256;
-/// Relative difference that printed digits leave between two laps of one drive.
-const PRINTED: f64 = 1e-7;
 
 /// Samples at the start over which a command at rest is averaged.
 const AT_REST: usize = 16;

@@ -2,13 +2,18 @@
 
 use super::bench::Bench;
 use super::bootstrap::{Bootstrap, bootstrap};
-use super::deep::{DEEP, FELT, SPENT, by_simulation_first, deep, felt_scan, felt_trial, foretold, scan, together};
+use super::deep::{FELT, by_simulation_first, deep, felt_scan, felt_trial, foretold, scan, together};
 use super::fitted::{fitted, fitted_from_both, refit, settled, taken_by_last};
 use super::leftover::{Leftover, leftover};
 use super::locked::follows_motion;
 use super::name::same_drag;
 use super::refit::{Chosen, Refitted};
 use super::rival::{Rival, by_simulation, numbers as free_numbers};
+use super::rules::{
+    BESIDE_DRAG, CONFOUNDED, CONFOUNDED_NEAR_NOISE, DOWN_TO_NOISE, EXPLAINS, FALSE_ALARM, FAR_FROM_NOISE,
+    FORM_OF_SIMULATED, FOURTH_ADDS, GAIN_WITHOUT_REPEATS, LINEAR_FURTHER, LINEAR_OF_GAIN, MIXTURE_LAWS, MIXTURE_LEADS,
+    NEAR_NOISE, OWN_OF_RECORD, REST_BESIDE_DRAG, SECOND_ADDS, THIRD_ADDS,
+};
 use super::scan::{Candidate, log_tail};
 use super::settle::{exchange, prune, spare};
 use super::simulated::simulated;
@@ -38,8 +43,8 @@ impl Default for SelectSettings {
         SelectSettings {
             most: 4,
             refits: 5,
-            false_alarm: 1e-4,
-            share: 0.35,
+            false_alarm: FALSE_ALARM,
+            share: EXPLAINS,
             iterations: 8,
             bootstrap: 0,
             by_simulation: true,
@@ -138,7 +143,8 @@ impl Selection {
     /// something only where repeats tell what noise is: otherwise what laws explain is told in logarithms, not in shares.
     pub fn mixture(&self) -> bool {
         let gains: Vec<f64> = (0..self.model.chosen.len()).map(|at| self.gain(at)).collect();
-        gains.len() >= MANY && gains.iter().copied().fold(0.0, f64::max) < LEADS * gains.iter().sum::<f64>()
+        gains.len() >= MIXTURE_LAWS
+            && gains.iter().copied().fold(0.0, f64::max) < MIXTURE_LEADS * gains.iter().sum::<f64>()
     }
 
     /// The model that numbers are taken from.
@@ -147,36 +153,14 @@ impl Selection {
     }
 }
 
-/// Share of what is explained already that a second, third and fourth effect must add: no law is nearer to a machine than
-/// the first, and machines with many defects are rare.
-pub(super) const MINOR: [f64; 4] = [0.0, 5e-3, 2e-2, 4e-2];
-
-/// What a drag does while the arm stands still, no motion tells: beside it an effect that adds less than this share must explain this
-/// much of what is left.
-const BESIDE_DRAG: f64 = 0.08;
-const REST: f64 = 0.75;
-/// Gain of a scan from which a law is tried where no repeat tells what noise is: noise made from the error itself hides most of what
-/// is left.
-const LOOK: f64 = 8.0;
+/// Share of what is explained already that a first, second, third and fourth effect must add.
+pub(super) const MINOR: [f64; 4] = [0.0, SECOND_ADDS, THIRD_ADDS, FOURTH_ADDS];
 
 /// What an effect explained when it was taken.
 pub(super) fn gain_of(steps: &[Step], chosen: &Chosen) -> f64 {
     let step = &steps[chosen.step];
     step.taken.map_or(0.0, |t| step.before - step.tried[t].1.evidence)
 }
-
-/// Laws that together are many, and the share of what they explain by which one of them leads.
-const MANY: usize = 3;
-const LEADS: f64 = 0.8;
-
-/// Share of a law that the linear parameters can imitate above which these records say nothing of it.
-const CONCEALED: f64 = 0.9995;
-/// The same where the linear parameters have come to their end within so many standard deviations of the noise: what is still seen is not
-/// theirs.
-const NEARLY_ALL: f64 = 0.999_999;
-const SETTLED: f64 = 5.0;
-/// Share of its gain by which an effect of each record's own must beat one of the machine.
-pub(super) const OWN: f64 = 0.05;
 
 /// Searches the library for what the linear model lacks.
 pub fn select(
@@ -201,7 +185,7 @@ pub fn select(
     while model.chosen.len() < settings.most {
         progress(&format!("scan of {} effects for finding {}", library.len(), model.chosen.len() + 1));
         let mut step = if felt { felt_scan(bench, library, &model) } else { scan(bench, library, &model) };
-        let concealed = if model.excess_sigma() < SETTLED { NEARLY_ALL } else { CONCEALED };
+        let concealed = if model.excess_sigma() < NEAR_NOISE { CONFOUNDED_NEAR_NOISE } else { CONFOUNDED };
         let price = (bench.stack.total as f64).ln();
         // Two forms of the leading effect, one of each other: the one that is worth its numbers most. Each number of a law is paid for (Schwarz
         // 1978): of two that fit alike, the one with fewer.
@@ -224,7 +208,7 @@ pub fn select(
             if new
                 && c.effect.possible(&c.setting, &[])
                 && (c.log_p_value(library.len()) < limit && hums(bench, c, c.gain, library.len()) < limit
-                    || (!bench.levels.from_repeats && c.gain > LOOK))
+                    || (!bench.levels.from_repeats && c.gain > GAIN_WITHOUT_REPEATS))
                 && c.concealed < concealed
                 && match (leads, seen) {
                     (true, 0) => true,
@@ -232,7 +216,8 @@ pub fn select(
                     (false, 0) => best_form(c),
                     _ => false,
                 }
-                && (worth.len() < settings.refits || c.effect.drag() && seen == 0 && model.excess_sigma() > DEEP)
+                && (worth.len() < settings.refits
+                    || c.effect.drag() && seen == 0 && model.excess_sigma() > FAR_FROM_NOISE)
             {
                 worth.push(i);
             }
@@ -267,7 +252,7 @@ pub fn select(
             let c = &step.candidates[t.0];
             let begun = begun(bench, &c.setting.inner, c.effect);
             let own = c.effect.facts().per_record || begun > 0;
-            let dearer = if own { OWN * (model.evidence - t.1.evidence).max(0.0) } else { 0.0 };
+            let dearer = if own { OWN_OF_RECORD * (model.evidence - t.1.evidence).max(0.0) } else { 0.0 };
             t.1.evidence + price * (numbers(c) + begun as f64) + dearer
         };
         step.taken = (0..step.tried.len()).min_by(|&a, &b| paid(&step.tried[a]).total_cmp(&paid(&step.tried[b])));
@@ -283,7 +268,7 @@ pub fn select(
             let log_p = log_p.max(hums(bench, c, gain, library.len()));
             let explained = (baseline.evidence - model.evidence).max(0.0);
             let dragged = model.chosen.iter().any(|c| c.effect.drag());
-            let share = if dragged && gain < BESIDE_DRAG * explained { REST } else { settings.share };
+            let share = if dragged && gain < BESIDE_DRAG * explained { REST_BESIDE_DRAG } else { settings.share };
             let asked = share * (model.excess() - 2.0 * model.sigma).max(0.0);
             let minor = MINOR.get(model.chosen.len()).copied().unwrap_or(0.0) * explained;
             (log_p < limit && gain > asked && gain > minor).then(|| next.clone())
@@ -298,7 +283,7 @@ pub fn select(
                 without = settled(bench, without, settings.iterations);
             }
             let linear = model.evidence - without.evidence;
-            if linear > FURTHER.max(OF_THE_GAIN * (model.evidence - next.evidence)) {
+            if linear > LINEAR_FURTHER.max(LINEAR_OF_GAIN * (model.evidence - next.evidence)) {
                 if model.chosen.is_empty() {
                     baseline = without.clone();
                 }
@@ -317,7 +302,7 @@ pub fn select(
                 // What its column along a noisy motion falls short by is nobody's: from here on simulation tells.
                 if (felt || to_the_end) && model.cost > next.cost {
                     (model, felt) = (next, true);
-                    if model.excess_sigma() < SPENT || model.excess() < FORM * baseline.excess() {
+                    if model.excess_sigma() < DOWN_TO_NOISE || model.excess() < FORM_OF_SIMULATED * baseline.excess() {
                         break;
                     }
                 }
@@ -361,14 +346,8 @@ pub(super) fn begun(bench: &Bench, inner: &[f64], effect: &dyn Effect) -> usize 
     effect.free(inner, &bench.scene, 1).len() * bench.stack.segments.len()
 }
 
-/// Share of the linear refit's excess that may be the simulated laws' own form: what is left below it is given to no further law.
-const FORM: f64 = 0.045;
-
-/// Most times that a step is made again because the model before it was not at its best, and the fall of the sum of squares that shows it,
-/// as a number and as a share of the step's gain.
+/// Most times that a step is made again because the model before it was not at its best.
 const AGAIN: usize = 3;
-const FURTHER: f64 = 5.0;
-const OF_THE_GAIN: f64 = 0.05;
 
 /// Free numbers of a candidate.
 fn numbers(c: &Candidate) -> f64 {
@@ -394,6 +373,6 @@ fn again(c: &Candidate, first: &Setting) -> bool {
 /// Logarithm of the closed-form bound of the strongest candidate beside a model.
 pub(super) fn strongest(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> f64 {
     let step = scan(bench, library, model);
-    let possible = step.candidates.iter().filter(|c| c.effect.possible(&c.setting, &[]) && c.concealed < CONCEALED);
+    let possible = step.candidates.iter().filter(|c| c.effect.possible(&c.setting, &[]) && c.concealed < CONFOUNDED);
     possible.map(|c| c.log_p_value(library.len())).fold(0.0, f64::min)
 }

@@ -4,8 +4,9 @@ use super::bench::Bench;
 use super::deep::scan_at;
 use super::fitted::{fitted, fitted_from_both};
 use super::refit::Chosen;
-use super::rival::{BETTER, Rival, more, numbers};
-use super::select::{MINOR, Model, OWN, Step, begun, gain_of};
+use super::rival::{Rival, more, numbers};
+use super::rules::{OWN_OF_RECORD, RIVAL_BETTER, RIVAL_TRIED, RIVAL_TRIED_WITHOUT_REPEATS, SMALL_BESIDE_DRAG};
+use super::select::{MINOR, Model, Step, begun, gain_of};
 use super::simulated::simulated;
 use crate::physics::{Effect, library};
 
@@ -29,9 +30,6 @@ pub(super) fn prune(bench: &Bench, model: &mut Model, before: f64, iterations: u
     }
 }
 
-/// Share of the largest gain below which an effect beside a drag is in doubt.
-const SMALL: f64 = 0.3;
-
 /// Takes out what stands beside a drag only because the drag's column, made along a noisy motion, falls short of the drag: simulated,
 /// the model does without.
 pub(super) fn spare(
@@ -45,7 +43,7 @@ pub(super) fn spare(
 ) {
     let drag = |c: &Chosen| c.effect.drag();
     let most = model.chosen.iter().map(|c| gain_of(steps, c)).fold(0.0, f64::max);
-    let small = |c: &Chosen| gain_of(steps, c) < SMALL * most;
+    let small = |c: &Chosen| gain_of(steps, c) < SMALL_BESIDE_DRAG * most;
     let price = (bench.stack.total as f64).ln();
     while model.chosen.len() > 1 && model.chosen.iter().any(drag) {
         let mut without = Vec::new();
@@ -68,10 +66,6 @@ pub(super) fn spare(
     }
 }
 
-/// Share of the gain of an effect from which a rival of its step is tried in its place: of a gain under a known noise, and of one under the
-/// noise that each model left for itself, by which a poor start makes its own excuse.
-const NEAR: f64 = 0.8;
-const NEAR_UNKNOWN: f64 = 0.4;
 /// Most forms of one law that are tried in the place of another.
 const FORMS: usize = 2;
 
@@ -84,7 +78,7 @@ fn form(c: &Chosen) -> (&'static str, usize, u64) {
 /// Laws that may stand in the place of effect `at`, simpler forms of its own first: those that came near it in its own step, and where
 /// other laws stand beside it than did then, those it is confused with that explain as much beside these.
 fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, iterations: usize) -> Vec<Chosen> {
-    let near = if bench.levels.from_repeats { NEAR } else { NEAR_UNKNOWN };
+    let near = if bench.levels.from_repeats { RIVAL_TRIED } else { RIVAL_TRIED_WITHOUT_REPEATS };
     let own = &model.chosen[at];
     let facts = own.effect.facts();
     let in_place = |c: &Chosen| Chosen { step: own.step, ..c.clone() };
@@ -138,9 +132,9 @@ pub(super) fn exchange(bench: &Bench, model: &mut Model, steps: &[Step], iterati
             let mut chosen = model.chosen.clone();
             chosen[at] = law;
             let other = fitted_from_both(bench, &chosen, &model.refitted.p, iterations);
-            let dearer = if each { OWN * gain } else { 0.0 };
+            let dearer = if each { OWN_OF_RECORD * gain } else { 0.0 };
             let dearer = dearer + more(bench, &other.chosen[at], &model.chosen[at]);
-            let better = other.cost + BETTER + dearer < model.cost && other.possible();
+            let better = other.cost + RIVAL_BETTER + dearer < model.cost && other.possible();
             // Another form of the same law is no rival.
             match (better, facts.name == own) {
                 (true, true) => *model = other,

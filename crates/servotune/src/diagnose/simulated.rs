@@ -11,6 +11,7 @@ use super::bench::Bench;
 use super::judge::size;
 use super::linear::Knob;
 use super::refit::Refitted;
+use super::rules::{RUNS_AWAY, SIMULATION_SILENT};
 use super::select::Model;
 use super::simulation_problem::{Problem, places};
 use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
@@ -25,10 +26,6 @@ const AGAIN: usize = 3;
 const FURTHER: f64 = 3e-4;
 /// Standard deviations of what is left beyond the noise from which a fit is made from elsewhere too.
 const UNSETTLED: f64 = 5.0;
-/// Whitened simulation error over that along the recorded motion above which the simulation runs away and fits nothing.
-const AWAY: f64 = 100.0;
-/// The same above which a fit that wins nothing says nothing.
-const FAR_OFF: f64 = 1.2;
 
 /// The whitened simulation error of a model, stacked, each segment's own directions taken out.
 pub(super) fn simulation_error(bench: &Bench, model: &Model) -> Vec<f64> {
@@ -76,7 +73,7 @@ fn descended(bench: &Bench, model: &Model) -> Option<Model> {
     let mut problem = Problem::whitened_error(bench, model);
     let mut x = problem.start();
     let before = size(&problem.settle(&x));
-    if !(before.is_finite() && before < AWAY * model.cost) {
+    if !(before.is_finite() && before < RUNS_AWAY * model.cost) {
         return None;
     }
     let mut work = Workspace::default();
@@ -94,7 +91,7 @@ fn descended(bench: &Bench, model: &Model) -> Option<Model> {
             break;
         }
     }
-    if cost == before && before > FAR_OFF * model.cost {
+    if cost == before && before > SIMULATION_SILENT * model.cost {
         return None;
     }
     let x = best;

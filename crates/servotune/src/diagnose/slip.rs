@@ -5,6 +5,9 @@
 //! command does the same.
 
 use super::hygiene::{SampleFault, between};
+use super::rules::{
+    REPLAY_FAILS, REPLAY_FAILS_OF_COMMAND, ROWS_MOVE, ROWS_WHOLE, SHIFT_LEFT, SLIP_TAKEN, SLIPS_LEFT, STILL_SAMPLES,
+};
 use super::run::Run;
 use super::stack::Basis;
 use crate::controller::Law;
@@ -46,14 +49,6 @@ pub fn breaks_of_replay(law: &Law, run: &Run, sample_time_s: f64) -> Vec<SampleF
     all
 }
 
-/// Error of a replay, over the quiet ones before it and over the command, from which it fails.
-const FAILS: f64 = 20.0;
-const FAILS_OF_COMMAND: f64 = 1e-3;
-/// Fewest equal positions in a row that count as stuck where the replay fails with them.
-const STILL: usize = 4;
-/// Share of its squares that the right shift may leave of a failing replay.
-const LEFT: f64 = 0.05;
-
 /// The first break behind sample `from`, the position being late by `shift` samples already.
 fn first_break(law: &Law, run: &Run, from: usize, shift: f64) -> Option<Break> {
     let reference = &run.reference.as_deref()?[from..];
@@ -75,7 +70,7 @@ fn first_break(law: &Law, run: &Run, from: usize, shift: f64) -> Option<Break> {
     start.sort_by(f64::total_cmp);
     let size = (dot(&run.command, &run.command) / run.len() as f64).sqrt();
     let quiet = start[head * 9 / 10].max(1e-6 * size);
-    let first = plain.iter().position(|e| *e > FAILS * quiet && *e > FAILS_OF_COMMAND * size)?;
+    let first = plain.iter().position(|e| *e > REPLAY_FAILS * quiet && *e > REPLAY_FAILS_OF_COMMAND * size)?;
     // The start itself fails: not a break inside the record.
     if first < head {
         return None;
@@ -89,9 +84,9 @@ fn first_break(law: &Law, run: &Run, from: usize, shift: f64) -> Option<Break> {
     };
     let at = from + first;
     let still = still_around(&run.position, at);
-    if still.len() >= STILL && from + n > still.end + tail_least {
+    if still.len() >= STILL_SAMPLES && from + n > still.end + tail_least {
         let left = squares(still.end - from, 0.0) / tail_least as f64;
-        if left.sqrt() < FAILS * quiet {
+        if left.sqrt() < REPLAY_FAILS * quiet {
             return Some(Break { at: still.start + 1, later: 0.0, still: still.len() - 1, gone: 0.0 });
         }
     }
@@ -102,21 +97,18 @@ fn first_break(law: &Law, run: &Run, from: usize, shift: f64) -> Option<Break> {
     }
     let before = squares(tail, 0.0);
     // Right again without a shift, from another memory: rows are gone, unless a motion that runs on without a jump says no.
-    if (before / tail_least as f64).sqrt() < FAILS * quiet {
+    if (before / tail_least as f64).sqrt() < REPLAY_FAILS * quiet {
         let told = run.reference.as_deref().and_then(|r| rows_gone(r, at)).or_else(|| rows_gone(&run.position, at));
         let gone = told.unwrap_or(1.0);
         return (gone > 0.0).then_some(Break { at, later: 0.0, still: 0, gone });
     }
     let all = (1 - SLIP..SLIP).filter(|d| *d != 0).map(|d| (f64::from(d), squares(tail, f64::from(d))));
     let (later, left) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (left < LEFT * before).then_some(Break { at, later, still: 0, gone: 0.0 })
+    (left < SHIFT_LEFT * before).then_some(Break { at, later, still: 0, gone: 0.0 })
 }
 
-/// Samples on either side of a place over which a motion is taken as straight; what it must move over one of them, over its scatter; and the
-/// share of a row by which a count may be off.
+/// Samples on either side of a place over which a motion is taken as straight.
 const STRAIGHT: usize = 16;
-const MOVES: f64 = 2.0;
-const WHOLE: f64 = 0.3;
 
 /// Rows that lack before sample `at` of a series that goes on straight on both sides of it, 0 where it runs through; none where it hardly
 /// moves or jumps by no number of its own steps.
@@ -135,7 +127,7 @@ fn rows_gone(y: &[f64], at: usize) -> Option<f64> {
     let slope = 0.5 * (s + r);
     // The middles lie a stretch apart; what they differ by beyond it was run through in rows that are not there.
     let rows = (b - a) / slope - STRAIGHT as f64;
-    let told = slope.abs() > MOVES * scatter && rows > -WHOLE && (rows - rows.round()).abs() < WHOLE;
+    let told = slope.abs() > ROWS_MOVE * scatter && rows > -ROWS_WHOLE && (rows - rows.round()).abs() < ROWS_WHOLE;
     told.then(|| rows.round().max(0.0))
 }
 
@@ -154,9 +146,6 @@ fn still_around(y: &[f64], at: usize) -> std::ops::Range<usize> {
 const BLOCKS: usize = 64;
 /// Counts of lost samples whose place is looked for sample by sample.
 const CLOSE: usize = 5;
-/// Share of its squares that one slip may leave of the error, and all slips together of what was there at first.
-const TAKEN: f64 = 0.7;
-const ALL_LEFT: f64 = 0.1;
 
 /// Most rounds in which each slip is looked for again under the others.
 const ROUNDS: usize = 4;
@@ -184,7 +173,7 @@ pub fn slips_of_answer(run: &Run, nuisances: &[Vec<f64>], clock: &[f64], sample_
     while slips.len() < MOST {
         let mut more = slips.clone();
         more.push(log.slip(&slips));
-        if log.squares(&more) >= TAKEN * left {
+        if log.squares(&more) >= SLIP_TAKEN * left {
             break;
         }
         // What the first one took for itself is the others' too.
@@ -201,12 +190,12 @@ pub fn slips_of_answer(run: &Run, nuisances: &[Vec<f64>], clock: &[f64], sample_
             }
         }
         let now = log.squares(&more);
-        if now >= TAKEN * left {
+        if now >= SLIP_TAKEN * left {
             break;
         }
         (slips, left) = (more, now);
     }
-    if left >= ALL_LEFT * first {
+    if left >= SLIPS_LEFT * first {
         return Vec::new();
     }
     slips.sort_unstable();

@@ -14,6 +14,7 @@ use super::free_form_shape::{Shape, lag};
 use super::free_form_stretches::Stretches;
 use super::judge::{Judged, errors, rms};
 use super::name::{everywhere, text_of};
+use super::rules::{CURVE_CLEARLY, CURVE_NEAR, CURVE_NO_WORSE};
 use super::run::Run;
 use super::select::Selection;
 use crate::controller::Law;
@@ -62,12 +63,6 @@ pub(super) struct StandIn {
     pub finding: Option<Finding>,
 }
 
-/// Share of the best linear plant's error (squared, of the parts left out) that a curve may leave at most.
-const CLEARLY: f64 = 0.6;
-/// Error of records that were not used over that of the better linear model, and over that of a mixture of laws, up to which it is no worse.
-const NO_WORSE: f64 = 1.0;
-const NEAR: f64 = 1.1;
-
 /// What both figures of a simulation are judged by.
 pub(super) struct Standing<'a> {
     /// The controller, where records are shown in closed loop.
@@ -94,7 +89,7 @@ pub(super) fn stand_in(
     let of = |e: &[Vec<f64>]| rms(&which.iter().map(|&i| e[i].clone()).collect::<Vec<_>>());
     let [given, refit, laws] = [0, 1, 2].map(|m| of(&standing.errors[m]));
     let (linear, after) = (given.min(refit), of(&errors[0]));
-    if !(after.is_finite() && after <= NO_WORSE * linear && (after <= NEAR * laws || laws >= linear)) {
+    if !(after.is_finite() && after <= CURVE_NO_WORSE * linear && (after <= CURVE_NEAR * laws || laws >= linear)) {
         return None;
     }
     let floor = standing.floor.min(after);
@@ -109,10 +104,12 @@ pub(super) fn stand_in(
 /// What is taken of an estimate: the curve where it foretells clearly better than what stands without it, a named reading or the linear
 /// plant; else the reading alone, if that does; else nothing.
 fn taken<'e, 'a>(found: &'e Estimated<'a>) -> Option<&'e Foretelling<'a>> {
-    let linear = CLEARLY * found.linear.left_out;
+    let linear = CURVE_CLEARLY * found.linear.left_out;
     match &found.reading {
         None => Some(&found.curve).filter(|c| c.left_out <= linear),
-        Some(r) if found.curve.left_out <= CLEARLY * r.left_out && found.curve.left_out <= linear => Some(&found.curve),
+        Some(r) if found.curve.left_out <= CURVE_CLEARLY * r.left_out && found.curve.left_out <= linear => {
+            Some(&found.curve)
+        }
         Some(r) => Some(r).filter(|r| r.left_out <= linear),
     }
 }

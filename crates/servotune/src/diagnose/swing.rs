@@ -9,6 +9,7 @@ use super::line_finding::left;
 use super::linear::{Sampled, free_motions};
 use super::lines::peak;
 use super::name::{everywhere, text_of};
+use super::rules::{SWING_ALIKE, SWING_CHANCE, SWING_PERIODS};
 use super::run::Run;
 use super::scan::log_tail;
 use super::select::Selection;
@@ -18,13 +19,6 @@ use crate::numeric::golden::golden_section;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-
-/// Chance of a false swing.
-const FALSE: f64 = 1e-8;
-/// Periods of a swing in a record: what is slower is a drift.
-const FEWEST: f64 = 3.0;
-/// Depth over its spread from run to run from which all of them swing alike.
-const ALIKE: f64 = 1.5;
 
 /// One run, ready to be fitted.
 struct Ready {
@@ -97,7 +91,7 @@ pub(super) fn swing(bench: &Bench, selection: &Selection) -> Option<Finding> {
     let line = peak(&products, &vec![1.0; runs.len()], numbers, t, None)?;
     let longest = products.iter().map(Vec::len).max()?;
     let width = 1.0 / (longest as f64 * t);
-    if line.hz < FEWEST * width {
+    if line.hz < SWING_PERIODS * width {
         return None;
     }
     let at = |hz: f64| -> Vec<Swung> { runs.par_iter().map(|r| r.swung(bench, &sampled, hz)).collect() };
@@ -108,7 +102,7 @@ pub(super) fn swing(bench: &Bench, selection: &Selection) -> Option<Finding> {
     let weight: f64 = all.iter().map(|s| s.variance.recip()).sum();
     let depth = all.iter().map(|s| s.depth / s.variance).sum::<f64>() / weight;
     let spread = (all.iter().map(|s| (s.depth - depth).powi(2) / s.variance).sum::<f64>() / weight).sqrt();
-    if log_p > FALSE.ln() || depth < ALIKE * spread {
+    if log_p > SWING_CHANCE.ln() || depth < SWING_ALIKE * spread {
         return None;
     }
     let (says, port) = text_of("parametric_gain");

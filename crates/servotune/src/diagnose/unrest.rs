@@ -6,13 +6,10 @@
 
 use super::bench::Bench;
 use super::linear::body_numbers;
+use super::rules::{CORNERS_TOLD, TORQUE_NOISE_AHEAD, TORQUE_NOISE_LOUD};
 use super::whiten::Periodogram;
 use std::f64::consts::TAU;
 
-/// Twice the log-likelihood by which torque noise must be ahead of any noise of the sensor.
-const AHEAD: f64 = 40.0;
-/// Power over that of the sensor's own noise, where it is strongest, from which the noise of a torque is worth a word.
-const LOUD: f64 = 2.0;
 /// Corners that are tried, and colours of the sensor's noise from sample to sample.
 const CORNERS: usize = 18;
 const COLOURS: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.75, 0.9];
@@ -130,7 +127,7 @@ pub(super) fn unrest(bench: &Bench) -> Option<Unrest> {
     let torque = mixture(&p, t, &through, &coarse)?;
     let sensor = mixture(&p, t, &|_| 1.0, &coarse)?;
     let ahead = sensor.cost - torque.cost;
-    if !(ahead > AHEAD && torque.ratio > LOUD) {
+    if !(ahead > TORQUE_NOISE_AHEAD && torque.ratio > TORQUE_NOISE_LOUD) {
         return None;
     }
     // Between two corners of the grid, and as far as the spectrum cannot tell.
@@ -138,7 +135,7 @@ pub(super) fn unrest(bench: &Bench) -> Option<Unrest> {
         .filter_map(|i| mixture(&p, t, &through, &[torque.corner_hz * (STEP * f64::from(i)).exp()]))
         .collect();
     let best = fine.iter().copied().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-    let alike = fine.iter().filter(|m| m.cost < best.cost + TOLD).map(|m| m.corner_hz);
+    let alike = fine.iter().filter(|m| m.cost < best.cost + CORNERS_TOLD).map(|m| m.corner_hz);
     let [low, high] = alike.fold([f64::INFINITY, 0.0f64], |[low, high], hz| [low.min(hz), high.max(hz)]);
     // Neighbours that were not tried may be as good.
     let corners_hz = [low * (-STEP).exp(), high * STEP.exp()];
@@ -152,7 +149,6 @@ pub(super) fn unrest(bench: &Bench) -> Option<Unrest> {
     })
 }
 
-/// Corners on either side of the best of the grid, and how far apart in the logarithm; fall of twice the log-likelihood that tells two.
+/// Corners on either side of the best of the grid, and how far apart in the logarithm.
 const FINE: i32 = 10;
 const STEP: f64 = 0.05;
-const TOLD: f64 = 4.0;

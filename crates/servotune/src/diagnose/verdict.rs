@@ -8,35 +8,15 @@ use super::line_finding::{line_findings, same_line};
 use super::linear_story::linear_story;
 use super::name::{finding, same_drag, unexplained};
 use super::reported::Reported;
+use super::rules::{
+    BOOTSTRAP_CHANCE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, COLOURED, DECISIVE_RIVAL, DECISIVE_SHARE, GIVEN_FAR,
+    HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER, LOOP_EXPLAINS, LOOP_LEFT, NAMED_SHARE,
+    NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE,
+};
 use super::select::{Model, Selection};
 use super::swing::swing;
 use crate::lti::Plant;
 use crate::physics::{Port, library};
-
-/// Whitened error per sample of records that were not used, up to which a model holds whatever the refit leaves.
-const HELD_OUT: f64 = 1.2;
-/// Share of the error in excess of noise that findings must explain to be named.
-pub(super) const NAMED_SHARE: f64 = 0.955;
-/// The same for several laws beside which another still sees something.
-const SEVERAL: f64 = 0.98;
-/// Standard deviations of excess below which a model counts as clean, whatever the share.
-const CLEAN: f64 = 3.0;
-/// Standard deviations of excess, and whitened error per sample, from which something is there though no law was found.
-const RESTLESS: [f64; 2] = [6.0, 1.06];
-/// Share of an error clearly beyond noise that a model which counts as clean must have explained.
-const MOSTLY: f64 = 0.6;
-/// Part of that, where no other law sees anything in what is left and records held out lose as large a part of their own excess.
-const HALF: f64 = 0.5;
-/// Share of what the findings took that another law may still see beside them: no law is a machine's own to the last part.
-const BESIDE: f64 = 0.05;
-
-/// Error of the hold-out records over the noise from which, in closed loop, no name stands that explains less than this share of it.
-const SEVERAL_TIMES: f64 = 3.0;
-const NEARLY: f64 = 0.99;
-
-/// Error over the noise floor that is down to it, and by how much the refit must leave more for a single law to be answered by it.
-const DOWN: f64 = 1.05;
-const ABOVE: f64 = 1.1;
 
 /// Findings that the search has no part in.
 pub(super) struct ByOthers {
@@ -65,20 +45,23 @@ impl<'a> Evidence<'a> {
         let (base, model) = (&selection.baseline, selection.best());
         let explained = if base.excess() > 0.0 { 1.0 - model.excess().max(0.0) / base.excess() } else { 1.0 };
         // Down to the noise, and not only because there was little above it; or as near as its level may err, no law seeing anything more.
-        let spent = selection.leftover.is_none() && model.cost / model.freedom < RESTLESS[1];
+        let spent = selection.leftover.is_none() && model.cost / model.freedom < RESTLESS_RATIO;
         // The level of the noise errs in the records that it is taken from; those that were held out tell on their own how much is explained.
-        let held = d.holdout_whitened.is_some_and(|[refit, after]| after - 1.0 < HALF * (refit - 1.0));
+        let held = d.holdout_whitened.is_some_and(|[refit, after]| after - 1.0 < CLEAN_HELD_OUT * (refit - 1.0));
         let clean = (model.excess_sigma() < CLEAN && base.excess_sigma() < CLEAN)
-            || (explained >= MOSTLY && (model.excess_sigma() < CLEAN || spent))
-            || (explained >= HALF * MOSTLY && spent && held);
+            || (explained >= CLEAN_EXPLAINS && (model.excess_sigma() < CLEAN || spent))
+            || (explained >= CLEAN_HELD_OUT * CLEAN_EXPLAINS && spent && held);
         // Where no law was found, much more is asked of the excess: noise may differ a little from what its repeats say.
-        let restless = model.excess_sigma() > RESTLESS[0] && model.cost / model.freedom > RESTLESS[1];
+        let restless = model.excess_sigma() > RESTLESS_SIGMA && model.cost / model.freedom > RESTLESS_RATIO;
         // Along the recorded motion, and simulated: in closed loop limits and noise play into each other, in open loop a free body
         // drifts away; a model must hold in one of them.
-        let simulated =
-            |h: FitFigures| h.rms_after <= 1.05 * h.rms_refit_linear || h.rms_after <= HELD_OUT * h.noise_floor;
+        let simulated = |h: FitFigures| {
+            h.rms_after <= HELD_OUT_NO_WORSE * h.rms_refit_linear || h.rms_after <= HELD_OUT_HOLDS * h.noise_floor
+        };
         let simulations: Vec<FitFigures> = d.fit.holdout.into_iter().chain(d.fit.open_loop).collect();
-        let holds = d.holdout_whitened.is_none_or(|[refit, after]| after <= 1.05 * refit || after <= HELD_OUT)
+        let holds = d
+            .holdout_whitened
+            .is_none_or(|[refit, after]| after <= HELD_OUT_NO_WORSE * refit || after <= HELD_OUT_HOLDS)
             && (simulations.is_empty() || simulations.into_iter().any(simulated))
             && reported.withdrawn.is_none();
         let against = contradicts(bench, &d.held_out, &selection.model).cloned();
@@ -88,7 +71,7 @@ impl<'a> Evidence<'a> {
     /// Whether the laws of the model may be named; what speaks against it is said.
     fn names(&self, d: &mut Diagnosis) -> bool {
         let Evidence { selection, model, explained, .. } = *self;
-        let decisive = explained >= MOST && rival_share(selection) < RIVAL;
+        let decisive = explained >= DECISIVE_SHARE && rival_share(selection) < DECISIVE_RIVAL;
         if let Some(h) = &self.against {
             d.remarks.push(format!(
                 "the nearest law holds on the records that it was fitted to, but not on {}, which {}: whitened error {:.3} after {:.3} under the linear refit, 1 being noise",
@@ -100,7 +83,9 @@ impl<'a> Evidence<'a> {
         }
         // A law that is asked where it hardly acts errs by its form; where the hold-out records are simulated down to their noise by it, and only
         // by it, they have answered.
-        let down = |h: FitFigures| h.rms_after < DOWN * h.noise_floor && h.rms_refit_linear > ABOVE * h.rms_after;
+        let down = |h: FitFigures| {
+            h.rms_after < HELD_OUT_DOWN * h.noise_floor && h.rms_refit_linear > HELD_OUT_ABOVE * h.rms_after
+        };
         let answered = model.chosen.len() < 2 && d.fit.holdout.is_some_and(down);
         let denied = d.confirmed.iter().find(|c| c.denied() && !answered).cloned();
         if let Some(c) = &denied {
@@ -117,7 +102,7 @@ impl<'a> Evidence<'a> {
                 laws.join(", ")
             ));
         }
-        let beside = selection.leftover.as_ref().filter(|l| l.share > BESIDE);
+        let beside = selection.leftover.as_ref().filter(|l| l.share > LEFTOVER);
         if let Some(l) = beside {
             d.remarks.push(format!(
                 "beside the nearest laws {} can still be seen, with {:.1} % of what they explain: they are near to what acts here, and not it",
@@ -127,10 +112,11 @@ impl<'a> Evidence<'a> {
         }
         // Of several laws together more is asked while yet another sees something: each further one is nearer to anything.
         let laws = model.chosen.len();
-        let several = selection.leftover.is_some() && (laws > 2 || laws > 1 && !self.clean && explained < SEVERAL);
+        let several =
+            selection.leftover.is_some() && (laws > 2 || laws > 1 && !self.clean && explained < NAMED_SHARE_OF_SEVERAL);
         let told = (explained >= NAMED_SHARE || self.clean || decisive) && !several && beside.is_none() && !mixture;
         // In closed loop nothing drifts: what several times the noise is left of, is not explained.
-        let left = |h: FitFigures| h.rms_after > SEVERAL_TIMES * h.noise_floor && h.explained_share < NEARLY;
+        let left = |h: FitFigures| h.rms_after > LOOP_LEFT * h.noise_floor && h.explained_share < LOOP_EXPLAINS;
         let left = d.fit.simulation == Simulation::ClosedLoop && d.fit.holdout.is_some_and(left);
         told && !left && self.holds && self.against.is_none() && denied.is_none()
     }
@@ -222,7 +208,7 @@ pub(super) fn judge(
     linear_story(d, bench, selection, given);
     if d.verdict == Verdict::Refit && !reported.refits {
         // The given plant stands; whether it agrees, its own error says.
-        let far = d.fit.fit.rms_before > FAR * d.fit.fit.noise_floor;
+        let far = d.fit.fit.rms_before > GIVEN_FAR * d.fit.fit.noise_floor;
         d.verdict = if far { Verdict::LocatedUnexplained } else { Verdict::NoMismatch };
         d.findings.extend(far.then(|| unexplained(bench, selection, 0.0)));
     }
@@ -276,7 +262,7 @@ fn believed(d: &mut Diagnosis, selection: &Selection) -> bool {
             b.draws, b.p_value, b.alarms
         ));
     }
-    selection.bootstrap.as_ref().is_none_or(|b| b.p_value <= BELIEVED.max(1.0 / (b.draws + 1) as f64))
+    selection.bootstrap.as_ref().is_none_or(|b| b.p_value <= BOOTSTRAP_CHANCE.max(1.0 / (b.draws + 1) as f64))
 }
 
 /// Findings of the noise beside those of the search. What is left without a name is theirs where the linear refit comes down to their noise.
@@ -291,9 +277,6 @@ fn take_noise(d: &mut Diagnosis, noise: Vec<Finding>) {
     }
 }
 
-/// Error of the given plant over the noise from which it does not agree with the records though no refit is better.
-const FAR: f64 = 1.5;
-
 /// What the best rival of the first finding explains, as a share of what that finding does.
 fn rival_share(selection: &Selection) -> f64 {
     let Some((step, taken)) = selection.steps.first().and_then(|s| s.taken.map(|t| (s, &s.tried[t]))) else {
@@ -305,21 +288,8 @@ fn rival_share(selection: &Selection) -> f64 {
     others.map(|t| (step.before - t.1.evidence) / gain).fold(0.0, f64::max)
 }
 
-/// Share of the error in excess of noise from which a name may be given though more is left than noise, and the share of its
-/// gain that the best rival may reach then: what the library lacks is usually near to several of its laws.
-const MOST: f64 = 0.75;
-const RIVAL: f64 = 0.8;
-
-/// Chance over the whole search, by the bootstrap, up to which findings stand.
-const BELIEVED: f64 = 0.01;
-
 /// Whether a scan saw far more than noise shows, though no law explains enough of it.
 fn unaccounted(selection: &Selection) -> bool {
     let best = selection.steps.first().and_then(|s| s.candidates.first());
-    best.is_some_and(|c| c.log_p_value(library().len()) < SEEN.ln())
+    best.is_some_and(|c| c.log_p_value(library().len()) < SEEN_CHANCE.ln())
 }
-
-/// Chance of a scan's best gain under noise below which something is there.
-const SEEN: f64 = 1e-9;
-/// Open-loop error over the sensor's white noise above which it counts as coloured.
-const COLOURED: f64 = 1.25;

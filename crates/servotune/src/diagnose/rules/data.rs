@@ -1,0 +1,58 @@
+//! Rules of the data checks: what makes a log, and not the machine, the thing that is wrong.
+//!
+//! In: nothing. Out: a constant and a row of the table for each rule. Convention: thresholds in the unit of their row. Spec:
+//! `specs/rules.md`.
+
+use super::{Floor, Rule, rules};
+
+rules! {
+    Floor::Data;
+    OTHER_UNIT_GAIN: f64 = 8.0, "ratio",
+        "factor of the gain between record and given plant, or its inverse, above which the log is in another unit",
+        "no machine is eight times its own model; units differ by 10, 1000 or 57.3";
+    OTHER_UNIT_EXPLAINED: f64 = 0.8, "share",
+        "energy of the position that the scaled model must explain for it",
+        "judgement: a right plant with a wrong factor leaves little";
+    EARLY_LEFT: f64 = 0.3, "share",
+        "error that moving an early position back may leave",
+        "judgement: a shift that is the fault takes most of the error";
+    BEYOND_MOTION: f64 = 1e8, "ratio",
+        "simulated motion over recorded motion above which a case is refused",
+        "beyond it the numbers of a fit lose their digits (16 digits, half of them squared)";
+    REPLAY_ERROR: f64 = 5e-3, "share",
+        "error of the replayed command over the command above which the controller is not the documented one",
+        "logs round their numbers to three or four digits";
+    STUCK_STEPS: f64 = 3.0, "counts",
+        "steps of the encoder that the model moves while the position stands still, from which the value is stuck",
+        "judgement: two counts may be rounding";
+    UNIT_FACTOR: f64 = 0.02, "share",
+        "deviation of a factor from 1 above which a position counts as logged in other units",
+        "a factor is found to parts in a thousand; 2 % leave room for rounding";
+    REPLAY_FAILS: f64 = 20.0, "ratio",
+        "error of a replay over that of the quiet blocks before it, from which it fails",
+        "judgement: rounding varies less from block to block";
+    REPLAY_FAILS_OF_COMMAND: f64 = 1e-3, "share",
+        "the same over the command",
+        "below it rounding of the log alone can do it";
+    STILL_SAMPLES: usize = 4, "samples",
+        "equal positions in a row that count as stuck where the replay fails with them",
+        "judgement: fewer equal readings happen in slow motion";
+    SHIFT_LEFT: f64 = 0.05, "share",
+        "squares of a failing replay that the right shift may leave",
+        "the right shift is exact up to rounding, a wrong one is not";
+    ROWS_MOVE: f64 = 2.0, "ratio",
+        "motion over one row by its scatter, from which lost rows can be counted",
+        "below it a count errs by half a row";
+    ROWS_WHOLE: f64 = 0.3, "rows",
+        "distance of a count of lost rows from a whole number",
+        "rows are lost whole";
+    SLIP_TAKEN: f64 = 0.7, "share",
+        "squares of the error that one slip may leave",
+        "judgement: each slip must earn its place";
+    SLIPS_LEFT: f64 = 0.1, "share",
+        "squares of the first error that all slips together may leave",
+        "a machine with another gain, delay and clock leaves more";
+    LAP_DIGITS: f64 = 1e-7, "share",
+        "difference between two laps of one drive up to which they are repeats",
+        "digits that are printed";
+}

@@ -1,0 +1,73 @@
+//! Rules of the fits: which plant and which simulation is offered.
+//!
+//! In: nothing. Out: a constant and a row of the table for each rule. Convention: thresholds in the unit of their row. Spec:
+//! `specs/rules.md`.
+
+use super::{Floor, Rule, rules};
+
+rules! {
+    Floor::Fit;
+    MEASURED_COMMAND: f64 = 0.9, "share",
+        "error of a held command that a moving one must stay below to count as measured",
+        "judgement: another way to hold it moves the error by less";
+    FREE_BODY: f64 = 0.02, "share",
+        "stiffness over the given one below which a body counts as free",
+        "judgement";
+    CLEARED_TELLS: f64 = 0.7, "share",
+        "equation error of the linear balance that a law must stay below to be simulated",
+        "it only saves simulations: they decide";
+    CLEARED_BETTER: f64 = 0.5, "ratio",
+        "simulation error with the law over that of the best linear plant below which its plant is taken",
+        "a bent plant leaves several times the noise; half cannot be one more number's luck";
+    CLEARED_FAR: f64 = 3.0, "noise",
+        "simulation error of the best linear plant over the sensor's noise from which a plant is cleared at all",
+        "nearer to the noise the search starts well enough";
+    ONE_NUMBER: f64 = 250.0, "sum of squares",
+        "fall by one number in the place of all others that is no chance",
+        "16 standard deviations of one number: laws differ from machines by more than noise does";
+    LAGS_ALIKE: f64 = 0.1, "share",
+        "share of the best lag's gain by which another may fall short",
+        "before or behind the arm a lag is the same to the records";
+    RUNS_AWAY: f64 = 100.0, "ratio",
+        "whitened simulation error over that along the motion above which a simulation runs away",
+        "a body that drifts; it then fits nothing";
+    SIMULATION_SILENT: f64 = 1.2, "ratio",
+        "the same above which a fit that wins nothing says nothing",
+        "judgement";
+    SIMULATION_ALIKE: f64 = 0.01, "share",
+        "difference of two simulation errors without one being worse",
+        "judgement";
+    SIMULATION_SAMPLING: f64 = 2.0, "standard deviations",
+        "the same over the root of the samples",
+        "two standard deviations of a mean square of so many samples, at the least";
+    REFIT_FAR: f64 = 3.0, "noise",
+        "error of a linear refit over noise from which a fit by simulation is tried beside it",
+        "it only saves a fit: errors decide";
+    REFIT_BETTER: f64 = 0.95, "ratio",
+        "share of the refit's error that the fit by simulation must stay below",
+        "another kind of fit needs a reason";
+    FOLD_NAMED: f64 = 1.15, "ratio",
+        "squared error of a folded or limited reading over that of the free curve up to which it is the curve",
+        "a form with three numbers against one with seventeen may leave a little more";
+    SECOND_CURVE: f64 = 2.0, "ratio",
+        "the same up to which a curve at another port is looked for beside it",
+        "judgement";
+    CURVE_LAG: f64 = 0.85, "share",
+        "error on parts left out that a lag must stay below to stay",
+        "judgement: a lag must pay for itself on parts that it was not fitted to";
+    CURVE_LIKE: f64 = 0.5, "share",
+        "share of a curve that a shape must explain to be called like it",
+        "half of it is the least that the word allows";
+    CURVE_LOPSIDED: f64 = 0.1, "share",
+        "difference of the two sides that is reported",
+        "judgement";
+    CURVE_CLEARLY: f64 = 0.6, "share",
+        "squared error on parts left out over that of the best linear plant that a curve must stay below",
+        "judgement: a curve has seventeen numbers and no name";
+    CURVE_NO_WORSE: f64 = 1.0, "ratio",
+        "error on held-out records over that of the better linear model",
+        "never worse than what was there";
+    CURVE_NEAR: f64 = 1.1, "ratio",
+        "the same over that of a mixture of laws",
+        "one curve instead of several laws may cost a tenth";
+}

@@ -1,0 +1,76 @@
+//! Rules of the noise: pushes, lines and noise of its own kind.
+//!
+//! In: nothing. Out: a constant and a row of the table for each rule. Convention: thresholds in the unit of their row. Spec:
+//! `specs/rules.md`.
+
+use super::{Floor, Rule, rules};
+
+rules! {
+    Floor::Noise;
+    ROUNDING_ALIKE: f64 = 0.5, "ratio",
+        "rounding over the noise of repeats from which repeats round alike",
+        "a mean then does not take the rounding away (Widrow and Kollar 2008)";
+    PUSH_CHANCE: f64 = 1e-9, "probability",
+        "chance of a false push below which it is one",
+        "many places, widths and records are looked at; false pushes are to be rarer than one in a thousand cases";
+    PUSH_SUSPECTED: f64 = 1e-3, "probability",
+        "chance below which a push is looked at again under the noise of the other records",
+        "the push stands in its own noise and hides behind it";
+    PUSH_WHOLE: f64 = 0.6, "share",
+        "excess of its record that one push must explain",
+        "what comes and goes all the time is no push";
+    PUSHED_RECORDS: f64 = 0.25, "share",
+        "fit records that may carry a push",
+        "more often it is how the machine is";
+    PUSH_BY_AMPLIFIER: f64 = 0.7, "share",
+        "gain of a push from which an amplifier that bends the commands explains it as well",
+        "repeats differ at a limit too";
+    PUSH_STAYS: f64 = 0.3, "share",
+        "gain under the refit that a push must keep under the final model",
+        "what the final model explains was no push";
+    LINE_CHANCE: f64 = 1e-6, "probability",
+        "chance of a false line over all frequencies",
+        "judgement: a line is taken out of every record, so chance must not make one";
+    LINE_SNAP: f64 = 0.5, "line widths",
+        "distance within which a line is an order of the spindle",
+        "half the resolution of the record";
+    HUM_SPREAD: f64 = 0.42, "share",
+        "relative spread of the amplitude over the records below which a line hums",
+        "a narrow band of noise has 0.52 (Rayleigh)";
+    HUM_COHERENCE: f64 = 0.5, "coherence",
+        "coherence of the halves of all records from which a line hums",
+        "noise of the band's width has none";
+    HUM_FADES: f64 = 3.0, "ratio",
+        "power of one half over the other up to which a hum is steady",
+        "judgement: a hum neither fades nor swells";
+    MAINS_MULTIPLES: f64 = 12.0, "multiples",
+        "multiples of the mains that are taken for hum",
+        "rectifiers give 6 and 12";
+    MAINS_OFF_HZ: f64 = 0.2, "Hz",
+        "distance from a multiple within which a frequency is one",
+        "judgement: mains wander by a tenth of a hertz";
+    COUNT_OF_NOISE: f64 = 0.01, "share",
+        "noise power from which an encoder's count is worth a word",
+        "below it nothing is gained by saying it";
+    TORQUE_NOISE_AHEAD: f64 = 40.0, "twice log-likelihood",
+        "lead of torque noise over any noise of the sensor",
+        "judgement: far beyond what the few numbers of either explain by chance";
+    TORQUE_NOISE_LOUD: f64 = 2.0, "ratio",
+        "power over that of the sensor's noise, where it is strongest, from which torque noise is reported",
+        "judgement";
+    CORNERS_TOLD: f64 = 4.0, "twice log-likelihood",
+        "fall that tells two corners",
+        "the 95 % interval of one number, rounded up from 3.84";
+    NOISE_WITH_SPEED: f64 = 0.2, "share",
+        "growth of the noise power from rest to the highest speed that is reported",
+        "judgement";
+    NOISE_SLOPE: f64 = 7.0, "standard deviations",
+        "growth of the noise with the speed from which it is no chance",
+        "judgement: a normal number never does";
+    NOISE_DEPARTED: f64 = 1.3, "ratio",
+        "level over the stated one from which noise has departed",
+        "judgement: levels from a few repeats err by a tenth";
+    NOISE_LARGER: f64 = 4.0, "ratio",
+        "power of the error over that of the sensor's white noise from which torque noise is by far the larger part",
+        "judgement: half of the amplitude at most is the sensor's";
+}

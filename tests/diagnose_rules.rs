@@ -1,0 +1,60 @@
+//! The decision rules: what the program prints, what `specs/rules.md` says, and what the code uses are one.
+#![allow(clippy::unwrap_used)]
+
+mod program_common;
+
+use program_common::{root, servotune};
+use serde_json::Value;
+use servotune::diagnose::decision_rules;
+use std::collections::BTreeSet;
+
+#[test]
+fn the_page_carries_what_the_program_prints() {
+    let page = std::fs::read_to_string(root("specs/rules.md")).unwrap();
+    let ran = servotune(&["diagnose", "--rules"]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    let (_, tables) = page.split_once("\n## ").unwrap();
+    assert_eq!(
+        format!("## {tables}"),
+        ran.out,
+        "write the output of `servotune diagnose --rules` below the introduction"
+    );
+}
+
+#[test]
+fn the_document_has_every_rule() {
+    let ran = servotune(&["diagnose", "--rules", "--json"]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    let all: Value = serde_json::from_str(&ran.out).unwrap();
+    let names: Vec<&str> = all.as_array().unwrap().iter().map(|r| r["name"].as_str().unwrap()).collect();
+    let rules: Vec<&str> = decision_rules().map(|r| r.name).collect();
+    assert_eq!(names, rules);
+    assert!(all[0]["threshold"].is_number() && all[0]["floor"] == "data", "{}", all[0]);
+}
+
+/// A row that no code reads, or a number that stands beside its row, would make the table a description.
+#[test]
+fn every_rule_decides_somewhere() {
+    let folder = root("crates/servotune/src/diagnose");
+    let mut words = BTreeSet::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "rs") {
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).unwrap();
+        // Imports alone decide nothing.
+        let code = text.split(';').filter(|s| !s.trim_start().starts_with("use ")).collect::<Vec<_>>().join(";");
+        words.extend(code.split(|c: char| !c.is_alphanumeric() && c != '_').map(str::to_owned));
+    }
+    let (mut names, mut idle) = (BTreeSet::new(), Vec::new());
+    for rule in decision_rules() {
+        assert!(names.insert(rule.name), "{} stands twice", rule.name);
+        assert!(rule.threshold.is_finite() && !rule.why.is_empty() && !rule.statistic.is_empty(), "{}", rule.name);
+        if !words.contains(rule.name) {
+            idle.push(rule.name);
+        }
+    }
+    assert!(idle.is_empty(), "no code decides by {idle:?}");
+    assert!(names.len() > 100, "{}", names.len());
+}
