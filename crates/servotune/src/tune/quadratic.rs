@@ -271,9 +271,7 @@ fn substitute(a: &[Lanes], n: usize, width: usize, x: &mut [Lanes]) {
         // Entries of x up to k are spoiled in the same lanes and set again.
         let kept = x[from];
         add(&mut x[from..], -value, &row[from..]);
-        for l in 0..k % LANES {
-            x[from][l] = kept[l];
-        }
+        x[from][..k % LANES].copy_from_slice(&kept[..k % LANES]);
         x[from][k % LANES] = value;
     }
     for k in (0..n).rev() {
@@ -292,7 +290,8 @@ mod tests {
         // min |z - (2, 1)|²/2 with x + y <= 1: the foot (1, 0) of the perpendicular, multiplier 1.
         let mut p = Quadratic::new(2, vec![]);
         (0..2).for_each(|j| p.curve(j, j, 1.0));
-        (p.pull(0, -2.0), p.pull(1, -1.0));
+        p.pull(0, -2.0);
+        p.pull(1, -1.0);
         p.row(&[1.0, 1.0], 1.0);
         p.row(&[-1.0, 0.0], 5.0);
         let (z, m) = p.solve();
