@@ -94,6 +94,12 @@ pub fn classified_page(v: &ClassifiedView<'_>) -> Result<Page, ReportError> {
             blocks.push(Block::Notice(Colour::Fail, words));
         }
     }
+    let probability: Vec<f64> = v.rows.iter().map(|r| r.probability).collect();
+    if !probability.is_empty() {
+        let group = [Group { name: "machines", values: &probability }];
+        let caption = "Calibrated probability of the class that was said.";
+        blocks.push(Block::Figure(histogram("How sure the gate is", caption, ("Probability", ""), &group, BINS)?));
+    }
     blocks.push(Block::Table(table(v.rows, |action| {
         let cell = Cell::from(action.word());
         match action {
@@ -102,12 +108,6 @@ pub fn classified_page(v: &ClassifiedView<'_>) -> Result<Page, ReportError> {
             _ => cell,
         }
     })?));
-    let probability: Vec<f64> = v.rows.iter().map(|r| r.probability).collect();
-    if !probability.is_empty() {
-        let group = [Group { name: "machines", values: &probability }];
-        let caption = "Calibrated probability of the class that was said.";
-        blocks.push(Block::Figure(histogram("How sure the gate is", caption, ("Probability", ""), &group, BINS)?));
-    }
     let section = |heading: &str, blocks| Section { heading: heading.into(), blocks };
     Ok(Page {
         title: format!("Machines: {}", v.name),

@@ -1,0 +1,51 @@
+#!/bin/sh
+# Pictures of the main pages, made by the program itself and taken by headless Chromium: on a desk and on a phone, light and dark.
+#   scripts/pictures.sh DIR    SERVOTUNE names the program; else target/release/servotune, else target/debug/servotune
+# Ends with 3, and says so, where there is no Chromium or no program.
+set -eu
+cd "$(dirname "$0")/.."
+out=$1
+program=${SERVOTUNE:-}
+for found in target/release/servotune target/debug/servotune; do
+    [ -z "$program" ] && [ -x "$found" ] && program=$PWD/$found
+done
+[ -n "$program" ] || { echo "no program: cargo build --release first, or name it by SERVOTUNE" >&2; exit 3; }
+browser=
+for name in chromium chromium-browser google-chrome; do
+    [ -z "$browser" ] && command -v "$name" >/dev/null && browser=$name
+done
+[ -n "$browser" ] || { echo "no pictures: chromium is not installed" >&2; exit 3; }
+mkdir -p "$out"
+out=$(cd "$out" && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# The pages: one machine from its sweep to the certificate, a write, a line of machines.
+cd "$work"
+"$program" -q init spiral . >/dev/null
+"$program" -q identify sweep.csv --out plant.toml --report identify.html >/dev/null
+"$program" -q tune --plant plant.toml --spec spec.toml --controller controller.toml --out gains.toml --report tune.html >/dev/null || [ $? = 1 ]
+"$program" -q verify gains.toml --plant plant.toml --spec spec.toml --report verify.html >/dev/null || [ $? = 1 ]
+"$program" -q simulate --plant plant.toml --controller gains.toml --profile profile.toml --spec spec.toml --report simulate.html >/dev/null
+"$program" -q budget --plant plant.toml --controller controller.toml --profile profile.toml --predict gains.toml --report budget.html >/dev/null
+"$program" -q margins --plant plant.toml --controller controller.toml --controller gains.toml --report margins.html >/dev/null
+"$program" -q twin line --out line --count 120 >/dev/null
+"$program" -q features line --out features.csv >/dev/null
+"$program" -q train features.csv --label label --hidden 32 --epochs 40 --out gate.json --report train.html >/dev/null
+"$program" -q classify features.csv --gate gate.json --report classify.html >/dev/null || [ $? = 1 ]
+
+# A window is at least 500 px wide: a phone stands in the middle of one.
+take() { # page, window, scheme, picture
+    "$browser" --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir="$work/profile" --window-size="$2" \
+        --blink-settings=preferredColorScheme="$3" --virtual-time-budget=3000 --screenshot="$4" "file://$1" >/dev/null 2>&1
+}
+for name in identify tune verify simulate budget margins train classify; do
+    printf '<!doctype html><body style="margin:0;background:#777"><iframe style="display:block;margin:0 auto;border:0;width:390px;height:1200px" src="%s.html"></iframe></body>' "$name" >"$name.phone.html"
+    for scheme in light dark; do
+        number=1
+        [ $scheme = dark ] && number=0
+        take "$work/$name.html" 1300,1400 $number "$out/${name}_desk_$scheme.png"
+        take "$work/$name.phone.html" 500,1200 $number "$out/${name}_phone_$scheme.png"
+    done
+done
+echo "$(ls "$out" | wc -l) pictures in $out"
