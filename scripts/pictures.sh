@@ -1,6 +1,6 @@
 #!/bin/sh
 # Pictures of the main pages, made by the program itself and taken by headless Chromium: on a desk and on a phone, light and dark.
-#   scripts/pictures.sh DIR    SERVOTUNE names the program; else target/release/servotune, else target/debug/servotune
+#   scripts/pictures.sh DIR    SERVOTUNE names the program by its whole path; else target/release/servotune, else target/debug/servotune
 # Ends with 3, and says so, where there is no Chromium or no program.
 set -eu
 cd "$(dirname "$0")/.."

@@ -1,8 +1,9 @@
 // One frequency in all pictures of a section: where the pointer reads a curve over frequency, or a point of a Nyquist curve, the others show the same place.
 function overFrequency(p) { return p.data.xl === "Frequency" && p.data.xu === "Hz"; }
+// The narrow twin of this picture is one of them: it is out of sight, and cleared with the rest.
 Plot.prototype.partners = function () {
   var self = this, section = this.fig.closest("section[id]");
-  if (!this.near) this.near = every.filter(function (q) { return q.fig !== self.fig && q.fig.closest("section[id]") === section; });
+  if (!this.near) this.near = every.filter(function (q) { return q !== self && q.fig.closest("section[id]") === section; });
   return this.near;
 };
 Plot.prototype.tell = function (hz) {
