@@ -110,6 +110,12 @@ fn gains(c: &Controller) -> Vec<(String, f64, &'static str)> {
         let named = [("b0", b.b0), ("b1", b.b1), ("b2", b.b2), ("a1", b.a1), ("a2", b.a2)];
         all.extend(named.map(|(key, x)| (format!("own section {} {key}", i + 1), x, "")));
     }
+    if let Some(f) = &c.feedforward {
+        all.push(("feed-forward factor".to_owned(), f.factor, ""));
+        all.push(("feed-forward of velocity".to_owned(), f.velocity_s, "command s/position"));
+        all.push(("feed-forward of acceleration".to_owned(), f.acceleration_s2, "command s²/position"));
+        all.push(("feed-forward ahead".to_owned(), f64::from(f.ahead_samples), "samples"));
+    }
     all
 }
 

@@ -19,8 +19,8 @@ pub(super) type Exact<'a> = dyn Fn(&[f64], f64) -> f64 + 'a;
 const TRIES: usize = 12;
 const TRIES_A_NOTCH: usize = 4;
 /// Rounds without a better end after which it is over, where the best has repeated and where it has not.
-const PATIENCE: usize = 6;
-const LONG_PATIENCE: usize = 16;
+const PATIENCE: usize = 12;
+const LONG_PATIENCE: usize = 24;
 /// The same while no end meets the limits.
 const HOPELESS_PATIENCE: usize = 6;
 /// Polishes that must have ended at the best before it counts as repeated.

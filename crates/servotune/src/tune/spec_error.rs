@@ -47,7 +47,7 @@ pub enum SpecError {
     Band,
     /// The record ends before the limit can be judged.
     #[error(
-        "limits.move: the move and its settling take {needed_s} s, but the record ends at spiral.duration_s = {duration_s} s; expected a longer record"
+        "limits.move: the move and its settling take {needed_s:.4} s, but the record ends at spiral.duration_s = {duration_s} s; expected a longer record"
     )]
     Short { needed_s: f64, duration_s: f64 },
     /// A disturbance that is none of the two kinds.
