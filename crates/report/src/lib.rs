@@ -17,6 +17,7 @@ mod layout;
 mod limit_cards;
 mod marks;
 mod palette;
+mod proven_room;
 mod ticks;
 mod words;
 
