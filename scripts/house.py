@@ -121,7 +121,8 @@ def figures(root: Path) -> list[tuple[str, str]]:
         (f"functions above {LONG_FUNCTION} lines", f"{len(long)}"),
         ("of these in `diagnose`", f"{sum('/diagnose/' in f[2] for f in long)}"),
         ("names of effects as text outside `physics`", f"{effects(files)}"),
-        ("named thresholds (numeric constants) in `diagnose`", str(thresholds(code))),
+        ("numeric constants in `diagnose` outside its table of rules", str(thresholds(code))),
+        ("decision rules in that table (`servotune diagnose --rules`)", str(rules(code))),
         ("words of `specs/`", f"{sum(len(p.split()) for p in pages)}"),
         (f"sentences above {LONG_SENTENCE} words", f"{sum(len(s.split()) > LONG_SENTENCE for s in said)}"),
         ("longest sentence, words", f"{max(len(s.split()) for s in said)}"),
@@ -130,6 +131,12 @@ def figures(root: Path) -> list[tuple[str, str]]:
         ("size of `results/`, kB", f"{size / 1000:.0f}"),
         ("test lines per 100 lines of code", f"{100 * (tests + unit) / lines:.0f}"),
     ]
+
+
+def rules(code: dict[str, str]) -> int:
+    """Rows of the table of decision rules."""
+    row = re.compile(r"^    [A-Z_]+: (?:f64|usize) = ", re.M)
+    return sum(len(row.findall(t)) for p, t in code.items() if "/diagnose/rules/" in p)
 
 
 def thresholds(code: dict[str, str]) -> int:

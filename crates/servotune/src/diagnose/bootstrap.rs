@@ -8,8 +8,9 @@
 use super::bench::Bench;
 use super::fitted::refit_from;
 use super::judge::{Judged, error};
+use super::model::Model;
 use super::run::Run;
-use super::select::{Model, strongest};
+use super::worth::strongest;
 use crate::numeric::random::Random;
 use crate::physics::Effect;
 use rayon::prelude::*;

@@ -10,9 +10,9 @@ use super::corrected::Corrected;
 use super::fitted::fitted;
 use super::held_out::HeldOut;
 use super::judge::Judged;
+use super::model::{Model, Selection};
 use super::refit::Chosen;
 use super::rules::{LAW_FAR, LAW_SAYS, LAW_SHORT};
-use super::select::{Model, Selection};
 use crate::lti::LtiError;
 use serde::Serialize;
 

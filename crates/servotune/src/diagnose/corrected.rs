@@ -6,9 +6,9 @@
 use super::bench::Bench;
 use super::judge::Judged;
 use super::linear::{LinearForm, body_numbers};
+use super::model::Selection;
 use super::refit::Chosen;
 use super::rules::FREE_BODY;
-use super::select::Selection;
 use crate::lti::{Body, PhysicsEntry, Plant};
 use crate::physics::{Effect, Scene, Setting, effect};
 

@@ -2,10 +2,10 @@
 
 use super::bench::Bench;
 use super::leftover::in_simulation;
+use super::model::{Model, Step};
 use super::refit::Chosen;
 use super::rules::{FAR_FROM_NOISE, PUSH_MOVES, PUSH_TOGETHER, REFIT_HIDES};
 use super::scan::{Candidate, Ground};
-use super::select::{Model, Step};
 use super::simulated::simulated;
 use crate::physics::{Effect, Port};
 

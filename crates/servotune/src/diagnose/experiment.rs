@@ -3,8 +3,8 @@
 use super::bench::Bench;
 use super::finding::{Diagnosis, NextExperiment, Verdict};
 use super::judge::{Judged, error};
+use super::model::Selection;
 use super::run::Run;
-use super::select::Selection;
 use super::whiten::Whitener;
 use crate::physics::{Effect, Scene, facts};
 
@@ -64,8 +64,8 @@ pub(super) fn propose(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
     d.next_experiment = NextExperiment { what, expected_separation: best.0 };
 }
 
-fn difference(bench: &Bench, run: &Run, a: &super::select::Model, b: &super::select::Model) -> f64 {
-    let simulate = |m: &super::select::Model| {
+fn difference(bench: &Bench, run: &Run, a: &super::model::Model, b: &super::model::Model) -> f64 {
+    let simulate = |m: &super::model::Model| {
         let fixed = super::corrected::corrected(&bench.form, &m.refitted.p, &m.chosen, &bench.scene);
         let effects: Vec<(&dyn Effect, _)> = fixed.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
         let scene: &Scene = &bench.scene;

@@ -5,8 +5,9 @@
 use super::bench::Bench;
 use super::differing::differing;
 use super::linear::Knob;
+use super::model::Model;
 use super::refit::Chosen;
-use super::select::{Model, begun};
+use super::worth::begun;
 use rayon::prelude::*;
 use std::f64::consts::LN_2;
 

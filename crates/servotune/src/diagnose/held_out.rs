@@ -5,6 +5,7 @@ use super::corrected::Corrected;
 use super::finding::Finding;
 use super::judge::Judged;
 use super::linear::free_motions;
+use super::model::{Model, Selection};
 use super::place::{Part, place_of};
 use super::rules::{
     ASTRAY_SHARE, ASTRAY_SIGMA, BEYOND_FAR, BEYOND_LEFT, HELD_OUT_CLEAR, HELD_OUT_FAR, HELD_OUT_LEFT,
@@ -12,7 +13,6 @@ use super::rules::{
 };
 use super::run::Run;
 use super::scan::log_tail;
-use super::select::{Model, Selection};
 use super::stack::Segment;
 use crate::lti::LtiError;
 use crate::numeric::least_squares::dot;

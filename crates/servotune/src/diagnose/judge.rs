@@ -7,8 +7,8 @@ use super::bench::Bench;
 use super::columns::raw_columns;
 use super::linear::{Sampled, free_motions};
 use super::lines::Line;
+use super::model::Model;
 use super::run::Run;
-use super::select::Model;
 use super::trajectory::Trajectory;
 use crate::controller::Law;
 use crate::lti::{Body, DiscretePlant, LtiError, Plant, PlantState, step_chain};
@@ -223,7 +223,9 @@ impl<'a> Begun<'a> {
                 break;
             }
         }
-        Ok(best.map_or_else(Started::default, |b| b.1))
+        // So far away that its square is no number: nothing was found, and whoever asks sees a machine that runs away.
+        let away = || Started { error: vec![f64::INFINITY; self.run.len()], free };
+        Ok(best.map_or_else(away, |b| b.1))
     }
 
     /// A better start from one that is near, and what its motions come to there.

@@ -3,9 +3,10 @@
 
 use super::bench::Bench;
 use super::deep::scan;
+use super::model::{Model, Step};
 use super::scan::{Candidate, Ground};
-use super::select::{Model, Step, hums};
 use super::simulated::simulation_error;
+use super::worth::hums;
 use crate::physics::Effect;
 use serde::Serialize;
 

@@ -6,8 +6,8 @@
 use super::bench::Bench;
 use super::columns::white_columns;
 use super::linear::Sampled;
+use super::model::Model;
 use super::rules::{DRIFT_FOLLOWS_MOTION, DRIFT_REPEATS};
-use super::select::Model;
 use super::stack::Basis;
 use crate::numeric::least_squares::dot;
 use nalgebra::{DMatrix, DVector};

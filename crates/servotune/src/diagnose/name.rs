@@ -5,6 +5,7 @@ use super::columns::position_columns;
 use super::finding::{Estimate, Finding, Where};
 use super::line_finding::mains;
 use super::linear::Sampled;
+use super::model::Selection;
 use super::place::place;
 use super::refit::Chosen;
 use super::rival::Rival;
@@ -14,7 +15,6 @@ use super::rules::{
 };
 use super::run::Run;
 use super::scan::log_tail;
-use super::select::Selection;
 use crate::physics::{Effect, Entry, Facts, Parameter, Setting, Share, effect, facts, library};
 use std::collections::BTreeMap;
 

@@ -4,11 +4,12 @@
 //! amplifier, a spring and a torque factor. Simulated from the recorded commands each feels the motion that it makes.
 
 use super::bench::Bench;
+use super::model::{Model, Step, gain_of};
 use super::name::family_width;
 use super::refit::Chosen;
 use super::rules::{OWN_OF_RECORD, RIVAL_BETTER, RIVAL_DOUBT, SIMULATION_NO_JUDGE, USUAL_LAW};
-use super::select::{Model, Step, begun, gain_of};
 use super::simulated::simulated;
+use super::worth::begun;
 
 /// Another law in the place of one effect of the model, everything else refitted.
 #[derive(Clone)]

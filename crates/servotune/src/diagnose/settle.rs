@@ -3,11 +3,14 @@
 use super::bench::Bench;
 use super::deep::scan_at;
 use super::fitted::{fitted, fitted_from_both};
+use super::model::{Model, Step, gain_of};
 use super::refit::Chosen;
 use super::rival::{Rival, more, numbers};
-use super::rules::{OWN_OF_RECORD, RIVAL_BETTER, RIVAL_TRIED, RIVAL_TRIED_WITHOUT_REPEATS, SMALL_BESIDE_DRAG};
-use super::select::{MINOR, Model, Step, begun, gain_of};
+use super::rules::{
+    OWN_OF_RECORD, RIVAL_BETTER, RIVAL_TRIED, RIVAL_TRIED_WITHOUT_REPEATS, SECOND_ADDS, SMALL_BESIDE_DRAG,
+};
 use super::simulated::simulated;
+use super::worth::begun;
 use crate::physics::{Effect, library};
 
 /// Takes effects out again that later ones made needless.
@@ -23,7 +26,7 @@ pub(super) fn prune(bench: &Bench, model: &mut Model, before: f64, iterations: u
         let Some((i, best)) = all.into_iter().enumerate().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost)) else { return };
         let c = &model.chosen[i];
         let numbers = (c.setting.strengths.len() + c.setting.inner.len()) as f64;
-        if best.cost - model.cost > (price * numbers).max(MINOR[1] * (before - best.cost)) {
+        if best.cost - model.cost > (price * numbers).max(SECOND_ADDS * (before - best.cost)) {
             return;
         }
         *model = best;
@@ -58,7 +61,7 @@ pub(super) fn spare(
         let Some((at, less, s)) = without.into_iter().min_by(|a, b| a.2.cost.total_cmp(&b.2.cost)) else { return };
         let c = &model.chosen[at];
         let numbers = (c.setting.strengths.len() + c.setting.inner.len()) as f64;
-        if s.cost - by_simulation.cost > (price * numbers).max(MINOR[1] * (before - s.cost)) {
+        if s.cost - by_simulation.cost > (price * numbers).max(SECOND_ADDS * (before - s.cost)) {
             return;
         }
         rivals.remove(at);

@@ -10,9 +10,9 @@
 use super::bench::Bench;
 use super::judge::size;
 use super::linear::Knob;
+use super::model::Model;
 use super::refit::Refitted;
 use super::rules::{RUNS_AWAY, SIMULATION_SILENT};
-use super::select::Model;
 use super::simulation_problem::{Problem, places};
 use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
 

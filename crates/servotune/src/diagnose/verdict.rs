@@ -6,6 +6,7 @@ use super::held_out::{HeldOut, astray, contradicts, unseen};
 use super::judge::Simulation;
 use super::line_finding::{line_findings, same_line};
 use super::linear_story::linear_story;
+use super::model::{Model, Selection};
 use super::name::{finding, same_drag, unexplained};
 use super::reported::Reported;
 use super::rules::{
@@ -13,7 +14,6 @@ use super::rules::{
     HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER, LOOP_EXPLAINS, LOOP_LEFT, NAMED_SHARE,
     NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE,
 };
-use super::select::{Model, Selection};
 use super::swing::swing;
 use crate::lti::Plant;
 use crate::physics::{Port, library};

@@ -299,6 +299,16 @@ pub trait Effect: Sync {
         false
     }
 
+    /// Whether it falls into a single record at a time of its own: a push.
+    fn once(&self) -> bool {
+        false
+    }
+
+    /// Whether it is a tone of one frequency, which a narrow band of noise looks like.
+    fn hums(&self) -> bool {
+        false
+    }
+
     /// Whether strengths of each record's own must not follow the motion: what comes anew with every repeat of one move is made by the move.
     fn strays(&self) -> bool {
         false

@@ -72,6 +72,10 @@ impl Effect for LineDisturbance {
         true
     }
 
+    fn hums(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         let [a, b] = [setting.strengths[0], setting.strengths[1]];
         vec![

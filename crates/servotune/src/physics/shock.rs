@@ -69,6 +69,10 @@ impl Effect for Shock {
         true
     }
 
+    fn once(&self) -> bool {
+        true
+    }
+
     fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
         vec![
             Parameter::new("peak_command", setting.strengths[0], Unit::Command),

@@ -1,0 +1,122 @@
+//! Which laws of a scan are worth a full refit.
+//!
+//! In: a step's scan and the model before it. Out: places in the scan, best first. Convention: chances are upper bounds (Chernoff, Bonferroni).
+//! Spec: `specs/mismatch.md`, step 8.
+
+use super::bench::Bench;
+use super::deep::{FELT, scan, together};
+use super::model::{Model, Step};
+use super::name::same_drag;
+use super::rival::numbers as free_numbers;
+use super::rules::{CONFOUNDED, CONFOUNDED_NEAR_NOISE, FAR_FROM_NOISE, GAIN_WITHOUT_REPEATS, NEAR_NOISE};
+use super::scan::Candidate;
+use super::select::SelectSettings;
+use crate::physics::{Effect, Setting};
+
+/// What the candidates of one step are judged by.
+pub(super) struct Worth<'a> {
+    pub bench: &'a Bench,
+    /// Laws that are scanned.
+    pub laws: usize,
+    pub settings: &'a SelectSettings,
+    /// The model before the step.
+    pub model: &'a Model,
+    /// Whether it stands by simulation.
+    pub felt: bool,
+}
+
+impl Worth<'_> {
+    /// Places of the candidates that are refitted in full.
+    pub fn of(&self, step: &Step) -> Vec<usize> {
+        let mut worth: Vec<usize> = Vec::new();
+        for (i, c) in step.candidates.iter().enumerate() {
+            if self.sound(c) && self.turn(step, c, &worth) {
+                worth.push(i);
+            }
+        }
+        if self.felt {
+            worth.truncate(FELT);
+        }
+        worth
+    }
+
+    /// Whether a machine may have it beside the model, these records tell it, and chance does not make it.
+    fn sound(&self, c: &Candidate) -> bool {
+        let concealed = if self.model.excess_sigma() < NEAR_NOISE { CONFOUNDED_NEAR_NOISE } else { CONFOUNDED };
+        self.new(c) && c.effect.possible(&c.setting, &[]) && self.beyond_chance(c) && c.concealed < concealed
+    }
+
+    /// Whether it is another thing than the effects of the model.
+    fn new(&self, c: &Candidate) -> bool {
+        let name = c.effect.facts().name;
+        let other = self.model.chosen.iter().all(|m| {
+            let known = m.effect.facts().name;
+            !same_drag(name, known) && (known != name || again(c, &m.setting))
+        });
+        // A push falls into one record; what every repeat shows at the same time is none.
+        other && (!c.effect.once() || self.bench.stack.segments.iter().any(|s| s.runs.len() == 1) || together(c))
+    }
+
+    fn beyond_chance(&self, c: &Candidate) -> bool {
+        let limit = self.settings.false_alarm.ln();
+        c.log_p_value(self.laws) < limit && hums(self.bench, c, c.gain, self.laws) < limit
+            || (!self.bench.levels.from_repeats && c.gain > GAIN_WITHOUT_REPEATS)
+    }
+
+    /// Whether its law has not had its turns, one for each law and two for the leading one, and whether there is room.
+    fn turn(&self, step: &Step, c: &Candidate, worth: &[usize]) -> bool {
+        let name = |i: usize| step.candidates[i].effect.facts().name;
+        let own = c.effect.facts().name;
+        let seen = worth.iter().filter(|&&j| name(j) == own).count();
+        let leads = worth.first().is_none_or(|&j| name(j) == own);
+        let turn = match (leads, seen) {
+            (true, 0) => true,
+            (true, 1) => self.best_form(step, c) || self.best_form(step, &step.candidates[worth[0]]),
+            (false, 0) => self.best_form(step, c),
+            _ => false,
+        };
+        turn && (worth.len() < self.settings.refits
+            || c.effect.drag() && seen == 0 && self.model.excess_sigma() > FAR_FROM_NOISE)
+    }
+
+    /// Of two forms of one law, the one that is worth its numbers most: each number is paid for (Schwarz 1978).
+    fn best_form(&self, step: &Step, c: &Candidate) -> bool {
+        let price = (self.bench.stack.total as f64).ln();
+        let net = |c: &Candidate| c.gain - price * free_numbers(&c.chosen(0)) as f64;
+        let forms = step.candidates.iter().filter(|o| o.effect.facts().name == c.effect.facts().name);
+        forms.map(net).fold(f64::NEG_INFINITY, f64::max) <= net(c)
+    }
+}
+
+/// Numbers of each record's own that an effect brings with it: motions that a record may begin in.
+pub(super) fn begun(bench: &Bench, inner: &[f64], effect: &dyn Effect) -> usize {
+    effect.free(inner, &bench.scene, 1).len() * bench.stack.segments.len()
+}
+
+/// Free numbers of a candidate.
+pub(super) fn numbers(c: &Candidate) -> f64 {
+    let strengths = if c.effect.facts().fixed { 0 } else { c.setting.strengths.iter().filter(|s| **s != 0.0).count() };
+    (strengths + c.setting.inner.iter().filter(|v| **v != 0.0).count()) as f64
+}
+
+/// Logarithm of the chance of a hum's gain where the noise itself is stronger near its frequency, a narrow band of it being no hum;
+/// -infinity for all other effects.
+pub(super) fn hums(bench: &Bench, c: &Candidate, gain: f64, effects: usize) -> f64 {
+    if !c.effect.hums() {
+        return f64::NEG_INFINITY;
+    }
+    let fair = Candidate { gain: gain / bench.noise_near(c.setting.inner[0]), ..c.clone() };
+    fair.log_p_value(effects)
+}
+
+/// Whether a second one of the same effect can be another thing: another line, another mode.
+fn again(c: &Candidate, first: &Setting) -> bool {
+    c.effect.several() && (first.inner[0] - c.setting.inner[0]).abs() > 0.02 * first.inner[0].abs()
+}
+
+/// Logarithm of the closed-form bound of the strongest candidate beside a model.
+pub(super) fn strongest(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> f64 {
+    let step = scan(bench, library, model);
+    let possible = step.candidates.iter().filter(|c| c.effect.possible(&c.setting, &[]) && c.concealed < CONFOUNDED);
+    possible.map(|c| c.log_p_value(library.len())).fold(0.0, f64::min)
+}
