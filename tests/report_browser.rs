@@ -254,13 +254,13 @@ fn floor_page() -> String {
             dft: both(1e-4 * wave(0.9)),
             worst: both(0.01 * wave(0.4) - 0.3),
             limit: "gain_crossover_hz at 40 deg C with the model's uncertainty".into(),
-            shared: if k % 3 == 0 { "table_2".into() } else { String::new() },
-            note: if k % 5 == 0 {
+            shared: if k.is_multiple_of(3) { "table_2".into() } else { String::new() },
+            note: if k.is_multiple_of(5) {
                 "a limit is not proved: gain_margin_db at most 5.81 dB is proved ".repeat(3)
             } else {
                 String::new()
             },
-            report: (k % 7 == 0).then(|| format!("slots/T{k}.html")),
+            report: k.is_multiple_of(7).then(|| format!("slots/T{k}.html")),
         }
     };
     let slots: Vec<SlotLine> = (0..96).map(slot).collect();

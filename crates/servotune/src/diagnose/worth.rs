@@ -43,11 +43,11 @@ impl Worth<'_> {
     /// Whether a machine may have it beside the model, these records tell it, and chance does not make it.
     fn sound(&self, c: &Candidate) -> bool {
         let concealed = if self.model.excess_sigma() < NEAR_NOISE { CONFOUNDED_NEAR_NOISE } else { CONFOUNDED };
-        self.new(c) && c.effect.possible(&c.setting, &[]) && self.beyond_chance(c) && c.concealed < concealed
+        self.is_new(c) && c.effect.possible(&c.setting, &[]) && self.beyond_chance(c) && c.concealed < concealed
     }
 
     /// Whether it is another thing than the effects of the model.
-    fn new(&self, c: &Candidate) -> bool {
+    fn is_new(&self, c: &Candidate) -> bool {
         let name = c.effect.facts().name;
         let other = self.model.chosen.iter().all(|m| {
             let known = m.effect.facts().name;
