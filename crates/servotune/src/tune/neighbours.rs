@@ -18,9 +18,9 @@ pub(super) type Exact<'a> = dyn Fn(&[f64], f64) -> f64 + 'a;
 /// Tries a round, and further ones for each notch.
 const TRIES: usize = 12;
 const TRIES_A_NOTCH: usize = 4;
-/// Rounds without a better end after which it is over, where the best has repeated and where it has not.
-const PATIENCE: usize = 12;
-const LONG_PATIENCE: usize = 24;
+/// Rounds without a better end after which it is over, where the best has repeated and where it has not: with one notch at most, and with several,
+/// which make many more optima.
+const PATIENCE: [[usize; 2]; 2] = [[6, 16], [12, 24]];
 /// The same while no end meets the limits.
 const HOPELESS_PATIENCE: usize = 6;
 /// Polishes that must have ended at the best before it counts as repeated.
@@ -51,13 +51,15 @@ pub(super) fn improve(
     let mut waited = 0;
     let mut judged = Judged::default();
     judged.parents(problem, &mut found.ends, exact);
-    let tries = TRIES + TRIES_A_NOTCH * notches(problem).len();
+    let count = notches(problem).len();
+    let tries = TRIES + TRIES_A_NOTCH * count;
+    let [short, long] = PATIENCE[usize::from(count > 1)];
     for round in 0..effort.rounds {
         let parents = judged.parents(problem, &mut found.ends, exact);
         let Some(best) = parents.first().map(|p| p.score) else { break };
         let repeated = found.at_best(BETTER);
-        let patience = if !best.meets() { HOPELESS_PATIENCE } else { LONG_PATIENCE };
-        let patience = if repeated >= REPEATS { patience.min(PATIENCE) } else { patience };
+        let patience = if !best.meets() { HOPELESS_PATIENCE } else { long };
+        let patience = if repeated >= REPEATS { patience.min(short) } else { patience };
         if waited >= patience {
             break;
         }
