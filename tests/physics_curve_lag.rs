@@ -1,6 +1,9 @@
 //! An amplifier's curve with a lag behind it: simulated as an independent integrator does, and refused at any other port.
 #![allow(clippy::unwrap_used)]
 
+mod physics_common;
+
+use physics_common::runge_kutta;
 use servotune::document::parse_toml;
 use servotune::lti::{Plant, PlantFile};
 use servotune::physics::{Context, Machine, Restored};
@@ -33,19 +36,7 @@ fn truth(u: &[f64]) -> Vec<f64> {
     let (w, z, dc) = (380.0f64, 0.2, 60.0);
     let slope =
         |u: f64, s: [f64; 3]| [(bent(u) - s[0]) / LAG, s[2], dc * w * w * s[0] - 2.0 * z * w * s[2] - w * w * s[1]];
-    let add = |s: [f64; 3], k: [f64; 3], h: f64| -> [f64; 3] { std::array::from_fn(|i| s[i] + h * k[i]) };
-    let (mut s, h, mut out) = ([0.0; 3], T / STEPS as f64, Vec::new());
-    for u in u {
-        out.push(s[1]);
-        for _ in 0..STEPS {
-            let k1 = slope(*u, s);
-            let k2 = slope(*u, add(s, k1, 0.5 * h));
-            let k3 = slope(*u, add(s, k2, 0.5 * h));
-            let k4 = slope(*u, add(s, k3, h));
-            s = std::array::from_fn(|i| s[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
-        }
-    }
-    out
+    runge_kutta(u, T, STEPS, slope).iter().map(|s| s[1]).collect()
 }
 
 #[test]

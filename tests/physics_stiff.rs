@@ -1,6 +1,9 @@
 //! A dry drag that holds the arm on stiff bristles: simulated as an independent integrator does, though arm and bristles swing at some 3 kHz.
 #![allow(clippy::unwrap_used)]
 
+mod physics_common;
+
+use physics_common::runge_kutta;
 use servotune::document::parse_toml;
 use servotune::lti::{Plant, PlantFile};
 use servotune::physics::{Context, Machine, Restored};
@@ -34,19 +37,7 @@ fn truth(u: &[f64]) -> Vec<f64> {
     let ([b, k, c], [level, length]) = (BODY, DRAG);
     let slope =
         |u: f64, s: [f64; 3]| [s[1], b * (u - level * s[2]) - c * s[1] - k * s[0], (s[1] - s[1].abs() * s[2]) / length];
-    let add = |s: [f64; 3], k: [f64; 3], h: f64| -> [f64; 3] { std::array::from_fn(|i| s[i] + h * k[i]) };
-    let (mut s, h, mut out) = ([0.0; 3], T / STEPS as f64, Vec::new());
-    for u in u {
-        out.push(s[0]);
-        for _ in 0..STEPS {
-            let k1 = slope(*u, s);
-            let k2 = slope(*u, add(s, k1, 0.5 * h));
-            let k3 = slope(*u, add(s, k2, 0.5 * h));
-            let k4 = slope(*u, add(s, k3, h));
-            s = std::array::from_fn(|i| s[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
-        }
-    }
-    out
+    runge_kutta(u, T, STEPS, slope).iter().map(|s| s[0]).collect()
 }
 
 #[test]

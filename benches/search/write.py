@@ -84,18 +84,19 @@ class Scene:
         for order, amplitude, phase in p.runout:
             self.target = self.target + amplitude * np.cos(2 * np.pi * order * p.spindle_hz * at + phase)
         every = int(p.duration / s.t) + 1
-        times = np.arange(every) * s.t
-        self.r = p.reference(times)
-        before, after = p.reference(times - s.t), p.reference(times + s.t)
-        self.speed, self.acceleration = (after - before) / (2 * s.t), (after - 2 * self.r + before) / s.t**2
+        self.times = np.arange(every) * s.t
+        self.r = p.reference(self.times)
 
     def quiet(self, law: Law) -> tuple[np.ndarray, np.ndarray]:
         """PES of the window, and every command of the whole write, without noise."""
         c, f = close(self.s, law.rows()), law.feedforward
         ahead = np.zeros(len(self.r))
         if f:
+            t, seen = self.s.t, self.times + f.get("ahead_samples", 0) * self.s.t
+            before, now, after = (self.profile.reference(seen + i * t) for i in (-1, 0, 1))
             ahead = f.get("factor", 0.0) * (
-                f.get("velocity_s", 0.0) * self.speed + f.get("acceleration_s2", 0.0) * self.acceleration
+                f.get("velocity_s", 0.0) * (after - before) / (2 * t)
+                + f.get("acceleration_s2", 0.0) * (after - 2 * now + before) / t**2
             )
         x = np.zeros((len(self.r) + 1, len(c.a)))
         driven = np.outer(self.r, c.b_r) + np.outer(ahead, c.b_w)

@@ -64,3 +64,25 @@ pub fn df(name: &str, inner: &[f64], strength: f64, amplitude: f64, w: f64) -> C
 pub fn close(found: Complex<f64>, expected: Complex<f64>, tolerance: f64) {
     assert!((found - expected).norm() <= tolerance * expected.norm(), "{found} against {expected}");
 }
+
+/// The states at every sample, from rest under a held input, by the classical method of Runge and Kutta with `steps` steps a sample.
+pub fn runge_kutta(
+    u: &[f64],
+    sample_time_s: f64,
+    steps: usize,
+    slope: impl Fn(f64, [f64; 3]) -> [f64; 3],
+) -> Vec<[f64; 3]> {
+    let add = |s: [f64; 3], k: [f64; 3], h: f64| -> [f64; 3] { std::array::from_fn(|i| s[i] + h * k[i]) };
+    let (mut s, h, mut out) = ([0.0; 3], sample_time_s / steps as f64, Vec::new());
+    for u in u {
+        out.push(s);
+        for _ in 0..steps {
+            let k1 = slope(*u, s);
+            let k2 = slope(*u, add(s, k1, 0.5 * h));
+            let k3 = slope(*u, add(s, k2, 0.5 * h));
+            let k4 = slope(*u, add(s, k3, h));
+            s = std::array::from_fn(|i| s[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+        }
+    }
+    out
+}

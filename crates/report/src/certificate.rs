@@ -7,6 +7,19 @@ use servotune::verify::{
     Bounded, CaseProof, Certificate, Finding, ProvenLimit, Stability, Verdict, WriteBox, WriteOpen,
 };
 
+/// Columns of a table of limits with what is proved of each.
+pub(super) fn proven_columns(digits: NumberFormat) -> Vec<Column> {
+    vec![
+        Column::words("figure"),
+        Column::words("required"),
+        Column::numbers("proven low", "", digits),
+        Column::numbers("proven high", "", digits),
+        Column::numbers("at", "Hz", digits),
+        Column::words("unit"),
+        Column::words("verdict"),
+    ]
+}
+
 /// One table a machine, then the findings and the verdict.
 pub fn certificate_text(c: &Certificate) -> Result<String, ReportError> {
     let digits = NumberFormat::Significant(6);
@@ -20,18 +33,7 @@ pub fn certificate_text(c: &Certificate) -> Result<String, ReportError> {
             case.sha256.get(..12).unwrap_or_default(),
             case.bounds.cells
         );
-        let mut table = Table::new(
-            "Bounds that hold at every frequency",
-            vec![
-                Column::words("figure"),
-                Column::words("required"),
-                Column::numbers("proven low", "", digits),
-                Column::numbers("proven high", "", digits),
-                Column::numbers("at", "Hz", digits),
-                Column::words("unit"),
-                Column::words("verdict"),
-            ],
-        );
+        let mut table = Table::new("Bounds that hold at every frequency", proven_columns(digits));
         for l in &case.limits {
             let side = if l.side == "at_least" { "at least" } else { "at most" };
             let verdict = match l.verdict {

@@ -4,7 +4,7 @@
 //! below 0 where it misses it; nothing but "proved" is green. Spec: `specs/report.md`, `specs/certificate.md`.
 
 use super::ReportError;
-use super::certificate::{certificate_sentence, open_reason, sentence, stability_words, write_line};
+use super::certificate::{certificate_sentence, open_reason, proven_columns, sentence, stability_words, write_line};
 use super::limit_cards::first_upper;
 use super::number::{MISSING, NumberFormat, typographic};
 use super::page::{Block, Card, Page, Section};
@@ -209,15 +209,7 @@ fn case_blocks(v: &CertificateView<'_>, case: &CaseProof) -> Result<Vec<Block>, 
         stability_words(b.stability),
         b.cells
     ))];
-    let mut columns = vec![
-        Column::words("figure"),
-        Column::words("required"),
-        Column::numbers("proven low", "", DIGITS),
-        Column::numbers("proven high", "", DIGITS),
-        Column::numbers("at", "Hz", DIGITS),
-        Column::words("unit"),
-        Column::words("verdict"),
-    ];
+    let mut columns = proven_columns(DIGITS);
     let some_open = case.limits.iter().any(|l| l.verdict == Proven::NotProved);
     if some_open {
         columns.push(Column::words("left open"));

@@ -72,7 +72,7 @@ impl Quadratic {
 
 struct Solve<'a>(&'a Quadratic);
 
-/// Residuals and matrix at one iterate.
+/// Where the way to the minimum stands.
 struct Iterate {
     z: Vec<Lanes>,
     /// Of the rows, then of the box's upper ends, then of its lower ends.
