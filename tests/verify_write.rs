@@ -1,14 +1,16 @@
 //! The write over a box against members of the box, simulated by partial fractions: another algorithm than the proof's.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-use servotune::controller::Controller;
-use servotune::lti::{Body, Mode, Plant};
+use nalgebra::Complex;
+use servotune::controller::{Controller, Pid};
+use servotune::lti::{Body, Mode, Plant, Rational};
 use servotune::numeric::random::Random;
 use servotune::pes::{Profile, figures, simulate};
 use servotune::twin::{MachineClass, nominal_controller, paper_machine, paper_profile};
 use servotune::verify::{
     BoxSettings, BoxedLoop, Stability, Uncertainty, VerifySettings, WriteBox, WriteOpen, bound_write, prove_loop,
 };
+use std::f64::consts::TAU;
 
 /// dft_low, dft_high, the box's harmonics, command peak.
 fn exact(plant: &Plant, c: &Controller, profile: &Profile, bins: &[usize]) -> Vec<f64> {
@@ -103,6 +105,70 @@ fn a_free_inertia_and_a_light_mode_are_bounded() {
     let u = Uncertainty { gain: 0.01, frequency: 0.02, damping: 0.05, delay: 0.01 };
     let ratios = none_above("free", &plant, &c, &profile, &u);
     assert!(ratios[..2].iter().all(|r| *r < 1.45), "{ratios:?}");
+}
+
+/// A body given by its roots: each list holds what lies on or above the real axis, in rad/s.
+fn rooted(gain: f64, zeros: &[[f64; 2]], poles: &[[f64; 2]]) -> Plant {
+    let all = |roots: &[[f64; 2]]| -> Vec<Complex<f64>> {
+        let one = |[re, im]: &[f64; 2]| {
+            let upper = Complex::new(*re, *im);
+            if *im == 0.0 { vec![upper] } else { vec![upper, upper.conj()] }
+        };
+        roots.iter().flat_map(one).collect()
+    };
+    let body = Body::Rational(Rational { gain, zeros: all(zeros), poles: all(poles) });
+    Plant { body, modes: vec![], ..free().0 }
+}
+
+#[test]
+fn bodies_of_other_roots_are_bounded() {
+    let (_, c) = free();
+    let profile = paper_profile(MachineClass::Healthy).unwrap();
+    let (mode, dip) = ([-70.0, 11_600.0], [-70.0, 11_300.0]);
+    let lag = 25_000.0;
+    // An amplifier's lag on a spring; two pairs of poles and a zero each side of the axis; a plain double integrator whose far pair is overdamped
+    // within the box.
+    let plants = [
+        ("lag", rooted(9e6 * lag, &[dip], &[[-40.0, 370.0], [-lag, 0.0], mode])),
+        ("pairs", rooted(-8.1e6, &[[-5e4, 0.0], [4e4, 0.0], dip], &[[-40.0, 370.0], [-3e4, 3e4], mode])),
+        ("overdamped", rooted(9e6 * 9e8, &[dip], &[[0.0, 0.0], [-20.0, 0.0], [-29_850.0, 3_000.0], mode])),
+    ];
+    for (name, plant) in &plants {
+        for u in [[0.02, 0.0, 0.0, 0.02], [0.01, 0.01, 0.05, 0.01]] {
+            let u = Uncertainty { gain: u[0], frequency: u[1], damping: u[2], delay: u[3] };
+            let ratios = none_above(name, plant, &c, &profile, &u);
+            assert!(ratios[..2].iter().all(|r| *r < 1.45), "{name} {ratios:?}");
+        }
+    }
+}
+
+#[test]
+fn an_unstable_bearing_in_a_stable_loop_is_bounded() {
+    let (unstable, amplifier) = (TAU * 30.0, TAU * 2400.0);
+    let bearing = rooted(2e7 * amplifier, &[], &[[unstable, 0.0], [-unstable, 0.0], [-amplifier, 0.0]]);
+    let c = Controller {
+        sample_time_s: 1e-4,
+        output_limit: None,
+        pid: Pid { kp: 0.016, ki_per_s: 0.8, kd_s: 5e-5, derivative_filter_s: 5e-5 },
+        lowpass: vec![],
+        notch: vec![],
+        biquad: vec![],
+        feedforward: None,
+    };
+    let profile = paper_profile(MachineClass::Healthy).unwrap();
+    let u = Uncertainty { gain: 0.02, delay: 0.05, ..Uncertainty::default() };
+    let ratios = none_above("bearing", &bearing, &c, &profile, &u);
+    assert!(ratios[..2].iter().all(|r| *r < 1.45), "{ratios:?}");
+}
+
+#[test]
+fn a_plant_that_falls_with_one_power_is_left_open() {
+    let (_, mut c) = free();
+    c.pid = Pid { kp: 0.3, ki_per_s: 300.0, kd_s: 0.0, derivative_filter_s: 0.0 };
+    let profile = paper_profile(MachineClass::Healthy).unwrap();
+    let slow = rooted(500.0, &[], &[[-300.0, 0.0]]);
+    let u = Uncertainty { gain: 0.02, ..Uncertainty::default() };
+    assert_eq!(bounded(&slow, &c, &profile, &u, 3).open, Some(WriteOpen::ShallowRollOff));
 }
 
 #[test]

@@ -107,8 +107,8 @@ fn machine(
             let why = match why {
                 WriteOpen::NotProvedStable => "the box is not proved stable",
                 WriteOpen::MayClip => "a member may clip its command",
-                WriteOpen::NoDecay => "a pole does not decay",
-                WriteOpen::OtherRoots => "real poles or zeros beside body and pairs",
+                WriteOpen::NoDecay => "a pair of poles does not decay",
+                WriteOpen::ShallowRollOff => "the plant falls with less than 1/s²",
                 WriteOpen::TooLong => "the record is too long",
             };
             text += &format!("| {name} | {percent} % | {why} | | | | | | | {seconds:.1} |\n");

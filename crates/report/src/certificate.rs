@@ -156,8 +156,8 @@ pub(super) fn write_line(w: &WriteBox) -> String {
             let why = match why {
                 WriteOpen::NotProvedStable => "the box is not proved stable",
                 WriteOpen::MayClip => "a member may reach output_limit",
-                WriteOpen::NoDecay => "a pole of the plant does not decay",
-                WriteOpen::OtherRoots => "the plant has real poles or zeros beside its body and its resonance pairs",
+                WriteOpen::NoDecay => "a pair of the plant's poles does not decay",
+                WriteOpen::ShallowRollOff => "the plant falls with less than 1/s²",
                 WriteOpen::TooLong => "the record is too long",
             };
             format!("The write has no bound over the box: {why}.")

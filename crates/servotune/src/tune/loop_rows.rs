@@ -48,9 +48,11 @@ impl Row {
 pub(super) const FAR: f64 = 0.5;
 /// Violation of a crossover that does not exist.
 const NOTHING: f64 = 1.0;
-/// Weight of a crossing far from the range: where nothing meets every limit, the edge of the range may give, a crossing decades away may not. With
-/// the distance that is kept, |L| stays off 1 there up to a compromise that misses by half.
-const FAR_CROSSING: f64 = 50.0;
+/// Weight of a crossing far from the range: |L| stays off 1 there before the edge of the range gives.
+pub(super) const FAR_CROSSING: f64 = 10.0;
+/// The same where nothing meets every limit: the edge of the range may give, a crossing decades away may not. With the distance that is kept, |L|
+/// stays off 1 there up to a compromise that misses by half. A search that may still meet every limit is held back by so steep a row.
+pub(super) const FAR_CROSSING_OF_COMPROMISE: f64 = 50.0;
 
 /// A frequency at which a limit begins or ends, with the plant there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,6 +75,8 @@ pub(super) struct LoopLimits<'a> {
     pub curves: &'a [CurveLimit],
     /// Ranges in which |L| may cross 1 outside the crossover range (rad/s).
     pub stabilised: &'a [[f64; 2]],
+    /// Weight of a crossing of 1 away from the crossover range.
+    pub far_crossing: f64,
     pub places: &'a [Place],
     /// ln of each curve's level at the grid's points, NaN outside it.
     pub levels: &'a [Vec<f64>],
@@ -215,7 +219,7 @@ fn crossover_rows(
         // The first point of the loop is an end of its own; the edge of the range stands among the places.
         if g >= a && g >= b && before != i {
             let ln = 0.5 * refined([a.ln(), g.ln(), b.ln()]);
-            put(grid[i], FAR_CROSSING * (ln + away), real(FAR_CROSSING * sign));
+            put(grid[i], l.far_crossing * (ln + away), real(l.far_crossing * sign));
         }
     }
     if w.side == Side::AtMost && on.quick.gain_crossings.is_empty() {

@@ -21,8 +21,6 @@ const TRIES_A_NOTCH: usize = 4;
 /// Rounds without a better end after which it is over, where the best has repeated and where it has not: with one notch at most, and with several,
 /// which make many more optima.
 const PATIENCE: [[usize; 2]; 2] = [[6, 16], [12, 24]];
-/// The same while no end meets the limits.
-const HOPELESS_PATIENCE: usize = 6;
 /// Polishes that must have ended at the best before it counts as repeated.
 const REPEATS: usize = 4;
 /// Ends whose neighbours are tried.
@@ -58,7 +56,7 @@ pub(super) fn improve(
         let parents = judged.parents(problem, &mut found.ends, exact);
         let Some(best) = parents.first().map(|p| p.score) else { break };
         let repeated = found.at_best(BETTER);
-        let patience = if !best.meets() { HOPELESS_PATIENCE } else { long };
+        let patience = if best.meets() { long } else { effort.hopeless_rounds };
         let patience = if repeated >= REPEATS { patience.min(short) } else { patience };
         if waited >= patience {
             break;

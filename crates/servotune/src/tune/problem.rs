@@ -3,7 +3,7 @@
 //! In: a decision vector. Out: the objective and the largest violation. One [`TuningWork`] a thread holds every buffer, so that a
 //! candidate allocates nothing once they have grown.
 
-use super::loop_rows::{LoopLimits, Moves, Place, Row, loop_rows, places};
+use super::loop_rows::{FAR_CROSSING, LoopLimits, Moves, Place, Row, loop_rows, places};
 use super::machine::{Buffers, Prepared};
 use super::objective::Minimise;
 use super::parameters::chain_of;
@@ -33,6 +33,8 @@ pub struct TuningProblem {
     guard: f64,
     /// Whether the objective is the first machine's alone; else the worst one's counts.
     pub(super) nominal_first: bool,
+    /// Weight of a crossing of 1 away from the crossover range.
+    pub(super) far_crossing: f64,
 }
 
 /// The limits of one machine as the search aims at them.
@@ -115,6 +117,7 @@ impl TuningProblem {
             rooms: Vec::new(),
             guard: spec.guard,
             nominal_first: false,
+            far_crossing: FAR_CROSSING,
         };
         problem.rooms = (0..problem.wanted.len())
             .map(|i| spec.further_room.get(i).map_or(spec.guard, |r| r.max(spec.guard)))
@@ -234,6 +237,7 @@ impl TuningProblem {
             guard: self.guard,
             curves: &self.curves,
             stabilised: &self.stabilised,
+            far_crossing: self.far_crossing,
             places: &aimed.places,
             levels: &aimed.levels,
         }

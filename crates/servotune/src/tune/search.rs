@@ -66,6 +66,8 @@ pub(super) struct Effort {
     pub polish_steps: usize,
     /// Rounds around the best ends at most.
     pub rounds: usize,
+    /// Rounds without a better end after which it is over while no end meets the limits.
+    pub hopeless_rounds: usize,
 }
 
 /// Edge of the first simplex (ln of a parameter).

@@ -4,6 +4,7 @@ use super::bounds::{Ranges, crossover_hz};
 use super::ending::{Ending, Settled};
 use super::feedforward::best_feedforward;
 use super::judge::lasting_objective;
+use super::loop_rows::FAR_CROSSING_OF_COMPROMISE;
 use super::neighbours::{BETTER, spread};
 use super::outcome::{Outcome, Reached, Tuned, Work};
 use super::polish::{Goal, polish};
@@ -45,6 +46,9 @@ impl Default for TuneSettings {
 /// How many times wider the search is before the limits are called infeasible, and what its seed differs by.
 const SECOND_SEARCH: usize = 4;
 const SECOND_SEED: u64 = 0x5eed_0002;
+/// Rounds without a better end after which a search that meets no limit is over: the first, and the second, whose word is the last.
+const HOPELESS_ROUNDS: usize = 2;
+const HOPELESS_ROUNDS_OF_SECOND: usize = 6;
 /// Ends of the search that are judged at most.
 const ENDS: usize = 8;
 /// Share of the guard that a table with the most room must have before the guard is tried again from it.
@@ -135,6 +139,7 @@ fn tune_feedback(
         simplex_steps: settings.simplex_steps,
         polish_steps: settings.polish_steps,
         rounds: settings.rounds,
+        hopeless_rounds: HOPELESS_ROUNDS,
     };
     let given: Vec<Vec<f64>> =
         start.into_iter().chain(near).filter(|c| parameters.fits(c)).map(|c| parameters.vector(c)).collect();
@@ -171,7 +176,9 @@ fn tune_feedback(
     if !best.as_ref().is_some_and(|b| b.passes) {
         // "Infeasible" is a grave word: it is said only after a second, wider search under a seed of its own.
         problem.aim_guarded(false);
-        let wider = Effort { starts: effort.starts * SECOND_SEARCH, ..effort };
+        problem.far_crossing = FAR_CROSSING_OF_COMPROMISE;
+        let starts = effort.starts * SECOND_SEARCH;
+        let wider = Effort { starts, hopeless_rounds: HOPELESS_ROUNDS_OF_SECOND, ..effort };
         let starts: Vec<Vec<f64>> = given.iter().cloned().chain(best.iter().map(|b| b.x.clone())).collect();
         let mut second = search(&problem, &starts, seed ^ SECOND_SEED, &wider, &exact, watch);
         if let Some(other) = settled(&mut ending, &mut problem, &mut second, false)?

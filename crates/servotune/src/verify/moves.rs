@@ -63,6 +63,13 @@ impl Pair {
         Pair { zero: self.zero.map(|[w, d]| [w * f, d * dz]), pole: [self.pole[0] * f, self.pole[1] * dp] }
     }
 
+    /// Roots of the poles' polynomial.
+    pub fn poles(&self) -> [Complex<f64>; 2] {
+        let [w, d] = self.pole;
+        let apart = Complex::new(d * d - 1.0, 0.0).sqrt() * w;
+        [apart - d * w, -apart - d * w]
+    }
+
     /// Bound of the whole move at every |s| of `w` or more, far above the pair.
     pub fn far(&self, w: f64, [f, dz, dp]: Shares) -> f64 {
         let stir = |[w0, d]: [f64; 2], by: f64| {

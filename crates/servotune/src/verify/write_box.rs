@@ -10,7 +10,7 @@ use super::spectrum_box::Beside;
 use super::write::{Bands, bands, of_window, simulate};
 use super::write_piece::{Piece, Question};
 use crate::controller::Controller;
-use crate::lti::{Body, Plant, Section};
+use crate::lti::{Plant, Section};
 use crate::pes::Profile;
 use serde::{Deserialize, Serialize};
 
@@ -44,10 +44,10 @@ pub enum WriteOpen {
     NotProvedStable,
     /// A member may clip its command at `output_limit`.
     MayClip,
-    /// A pole of the plant does not decay.
+    /// A pair of the plant's poles does not decay.
     NoDecay,
-    /// The plant has roots that no resonance pair and no body of second order holds.
-    OtherRoots,
+    /// The plant falls with less than 1/s².
+    ShallowRollOff,
     /// The record is too long for the circles that the proof has.
     TooLong,
 }
@@ -134,13 +134,12 @@ const TURNED: f64 = 1e-9;
 pub fn bound_write(l: &BoxedLoop<'_>, harmonics: &[usize], settings: &BoxSettings, watch: &BoxWatch<'_>) -> WriteBox {
     let Some(ms) = l.max_sensitivity else { return WriteBox::open(WriteOpen::NotProvedStable) };
     let plant = &l.plant.paired();
-    if let Body::Rational(r) = &plant.body {
-        let why = if r.unstable_poles() > 0 { WriteOpen::NoDecay } else { WriteOpen::OtherRoots };
-        return WriteBox::open(why);
-    }
     let family = Family::of(plant, l.controller.sample_time_s);
     if !family.decays() {
         return WriteBox::open(WriteOpen::NoDecay);
+    }
+    if family.falls() < 2 {
+        return WriteBox::open(WriteOpen::ShallowRollOff);
     }
     let ranges = family.ranges(l.uncertainty);
     let task = Task::of(l.controller, l.sections, l.profile);
