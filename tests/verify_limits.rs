@@ -256,6 +256,59 @@ fn an_integrator_has_its_closed_forms() {
     assert!(certificate.proved);
 }
 
+/// Members drawn from the box, corners among them, stepped by partial fractions: none goes further, or settles later, than is proved of the box; and the
+/// bound is near what they show.
+#[test]
+fn no_member_of_a_box_steps_worse_than_its_bound() {
+    let profile = "[spiral]\nvelocity = 350.0\ndistance = 3.0\nacceleration_time_s = 2e-3\nstart_s = 1e-3\nduration_s = 0.06\n\
+                   [pes]\nsample_rate_hz = 25000.0\nwindow = [100, 200]\n";
+    let spec_text = format!(
+        "profile = \"profile.toml\"\nsample_time_s = {T:?}\n[objective]\nminimise = \"integral\"\n[limits]\novershoot_percent = 1000.0\nsettling_s = 10.0\n\
+         [limits.move]\novershoot = 10.0\nsettling_s = 0.04\nband = 0.05\n"
+    );
+    let spec = Spec::parse(&spec_text, Some(profile)).unwrap();
+    let mut r = Random::new(91);
+    let (mut told, mut ratios) = (0, Vec::new());
+    for round in 0..6 {
+        let (plant, text, mut c) = random_loop(&mut r);
+        if round % 3 == 1 {
+            c.feedforward = Some(Feedforward {
+                factor: 1.0,
+                velocity_s: 0.0,
+                acceleration_s2: 1e-7 * r.uniform(),
+                ahead_samples: 2,
+            });
+        }
+        let share = [0.05, 0.02, 0.01][round % 3];
+        let [frequency, damping] = if round % 2 == 0 { [0.0; 2] } else { [0.2 * share, share] };
+        let u = Uncertainty { gain: share, frequency, damping, delay: share };
+        let certificate = proof_of_write(&text, &c, &spec_text, Some(profile), u);
+        let names = ["overshoot_percent", "settling_s", "move.overshoot", "move.settling_s"];
+        let bounds = names.map(|n| limit(&certificate, n).proven.high);
+        let mut worst = [0.0f64; 4];
+        for _ in 0..25 {
+            let proof = judge(&Machine::Model(&u.draw(&plant, &mut r)), &c, &spec).unwrap();
+            let member = proof.judged.found;
+            let found = [member.overshoot_percent, member.settling_s, member.move_overshoot, member.move_settling_s];
+            for (w, x) in worst.iter_mut().zip(found) {
+                *w = w.max(x.unwrap());
+            }
+        }
+        for (i, (b, w)) in bounds.iter().zip(worst).enumerate() {
+            let Some(b) = b else { continue };
+            told += 1;
+            assert!(w <= b + 1e-6 * b.max(1.0), "{round} {}: drawn {w}, bound {b}; {u:?}", names[i]);
+            if i == 0 && w > 1.0 {
+                ratios.push(b / w);
+            }
+        }
+    }
+    // A box whose stability is not proved has no bound; most have.
+    assert!(told >= 18, "{told}");
+    ratios.sort_by(f64::total_cmp);
+    assert!(ratios.len() > 2 && ratios[ratios.len() / 2] < 1.05, "{ratios:?}");
+}
+
 /// An integrator under kp with feed-forward ahead of a move: position and error by the recursion y += T (kp e + v r'), written out here.
 #[test]
 fn the_end_of_a_move_is_that_of_an_integrator_s_recursion() {

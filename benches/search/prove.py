@@ -74,7 +74,14 @@ def verify(program: str, folder: Path, name: str, table: Path) -> dict:
         out["error"] = (done.stderr.strip().splitlines() or ["nothing said"])[-1][:200]
     try:
         said = json.loads(done.stdout)
-        out["said"] = said.get("verdict", said.get("proved"))
+        out["lacks"] = [
+            f"{l['name']}: {l['verdict'].replace('_', ' ')}, at most {high:.5g} proved, {l['required']:.5g} asked for"
+            if l["side"] == "at_most" and (high := l["proven"].get("high")) is not None
+            else f"{l['name']}: {l['verdict'].replace('_', ' ')}"
+            for case in said["cases"]
+            for l in case["limits"]
+            if l["verdict"] != "proved"
+        ]
     except json.JSONDecodeError:
         pass
     return out
@@ -88,8 +95,9 @@ def main() -> None:
     a.add_argument("--count", type=int, default=200)
     w = a.parse_args()
     os.environ.setdefault("RAYON_NUM_THREADS", "1")
-    tables = sorted((w.folder / "tables" / w.tables).glob("*.toml"))[: w.count]
-    names = [t.stem for t in tables]
+    outcomes = json.loads((w.folder / "runs" / f"{w.tables}.json").read_text())
+    names = sorted(o["id"] for o in outcomes if o["verdict"] == "tuned")[: w.count]
+    refused = Counter(o["verdict"] for o in outcomes if o["verdict"] != "tuned")
     with ThreadPoolExecutor(2) as pool:
         rows = list(
             pool.map(lambda n: verify(w.program, w.folder, n, w.folder / "tables" / w.tables / f"{n}.toml"), names)
@@ -104,13 +112,16 @@ def main() -> None:
     lines = [
         "# Search: tables proved over a box",
         "",
-        f"Made by `python benches/search/prove.py`. `servotune verify --uncertainty {BOX}` of {len(rows)} tables, each tuned over the same box;",
-        "beside it the judge at the four corners of the box.",
+        f'Made by `python benches/search/run.py --words "--uncertainty {BOX}" --label boxed` and `python benches/search/prove.py --count {w.count}`: `servotune verify',
+        f"--uncertainty {BOX}` of {len(rows)} tables, each tuned over the same box and said to meet its limits; beside it the judge at the four corners of the box.",
         "",
         f"Proved: {len(proved)} of {len(rows)}. Proved, yet a limit fails at a corner by the judge: {len(wrong)}"
         + (f" ({', '.join(r['id'] for r in wrong[:10])})." if wrong else "."),
         "",
     ]
+    if refused:
+        said = ", ".join(f"{n} {v}" for v, n in sorted(refused.items()))
+        lines += [f"Of {len(outcomes)} specs tuned over the box the others came to no such table: {said}.", ""]
     if rows:
         lines += [
             f"Time of a proof: median {np.median([r['time_s'] for r in rows]):.2f} s, longest {max(r['time_s'] for r in rows):.2f} s.",
@@ -122,11 +133,11 @@ def main() -> None:
     if short:
         lines += [
             "",
-            "| not proved | machine | what verify says | worst at a corner, by the judge |",
+            "| not proved | machine | what lacks | worst at a corner, by the judge |",
             "|---|---|---|---|",
         ]
         lines += [
-            f"| {r['id']} | {r['machine']} | {r.get('error', r.get('said'))} | {r['corner_of']} {r['corner']:+.2e} |"
+            f"| {r['id']} | {r['machine']} | {r.get('error') or '; '.join(r.get('lacks', []))} | {r['corner_of']} {r['corner']:+.2e} |"
             for r in short
         ]
     (machines.ROOT / "results/search_proofs.md").write_text("\n".join(lines) + "\n", encoding="utf-8")

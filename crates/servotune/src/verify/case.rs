@@ -2,10 +2,11 @@
 //!
 //! In: the table, the sections that the firmware holds, a plant or a sweep. Out: [`CaseProof`] with findings. Spec: `specs/certificate.md`.
 
-use super::bounds::{Bounded, Stability};
+use super::bounds::{Bounded, Bounds, Stability};
 use super::certificate::CaseProof;
 use super::prove::prove;
 use super::proven_limits::{Known, Magnitudes, proven_limits};
+use super::step_box::Members;
 use super::table::{self, Finding};
 use super::write::{Bands, write};
 use super::write_box::{BoxSettings, BoxWatch, BoxedLoop, bound_write};
@@ -65,7 +66,7 @@ impl Job<'_> {
             };
             bound_write(&boxed, &self.bins(), &BoxSettings::default(), self.watch)
         });
-        let (step, at_end, command_rms) = if stable { self.records(plant) } else { Default::default() };
+        let (step, at_end, command_rms) = if stable { self.records(plant, &bounds) } else { Default::default() };
         let known = Known {
             bounds: &bounds,
             magnitudes: &magnitudes,
@@ -121,17 +122,25 @@ impl Job<'_> {
         self.wanted.iter().filter_map(bin).collect()
     }
 
-    /// Overshoot and settling of a step and of the move, and the command's rms under the disturbance, where limits ask for them: of a box the plant as it
-    /// stands only, which bounds from below.
-    fn records(&self, plant: &Plant) -> ([Bounded; 2], [Bounded; 2], Bounded) {
+    /// Overshoot and settling of a step and of the move, and the command's rms under the disturbance, where limits ask for them: the last one of a box by the
+    /// plant as it stands only, which bounds from below.
+    fn records(&self, plant: &Plant, bounds: &Bounds) -> ([Bounded; 2], [Bounded; 2], Bounded) {
         let (c, limits) = (self.controller, &self.spec.limits);
+        let members = Members {
+            plant,
+            sections: self.held,
+            controller: c,
+            uncertainty: self.uncertainty,
+            max_sensitivity: bounds.max_sensitivity.high,
+        };
+        let members = self.uncertainty.any().then_some(&members);
         let own = |b: Bounded| if self.uncertainty.any() { Bounded { high: None, ..b } } else { b };
         let stepped = limits.overshoot_percent.is_some() || limits.settling_s.is_some();
-        let of_step = if stepped { step::step(plant, self.held, c).map(own) } else { Default::default() };
+        let of_step = if stepped { step::step(plant, self.held, c, members) } else { Default::default() };
         let of_end = match &self.spec.profile {
             Some(profile) if limits.at_end.any() => {
                 let band = limits.at_end.band.unwrap_or(f64::INFINITY);
-                step::move_end(plant, self.held, c, profile, band).map(own)
+                step::move_end(plant, self.held, c, profile, band, members)
             }
             _ => Default::default(),
         };

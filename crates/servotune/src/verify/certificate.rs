@@ -240,7 +240,7 @@ fn assumptions(i: &Inputs<'_>) -> Vec<String> {
             "figures of the write are those of the profile's one draw of the noise, on {}",
             if i.uncertainty.any() { "every member of the box" } else { "the plant as it stands" }
         ),
-        "a step is watched until it rests, on the plant as it stands, rounding taken as 1e-9 of it".to_owned(),
+        "a step is watched until the plant as it stands rests, a box with it for half as long again, rounding taken as 1e-9 of it".to_owned(),
         "the firmware computes its sections without overflow; rounding inside a section is not in the bounds"
             .to_owned(),
     ];

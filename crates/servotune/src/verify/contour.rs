@@ -34,15 +34,23 @@ pub(super) struct Contour {
     pub kernel_most: f64,
 }
 
+/// What enters a loop, a number a controller sample; the reference stays at its last.
+pub(super) struct Entering<'a> {
+    pub sections: &'a [Section],
+    /// Sample time (s).
+    pub t: f64,
+    pub reference: Vec<f64>,
+    pub encoder: Vec<f64>,
+    /// Feed-forward and windage.
+    pub added: Vec<f64>,
+}
+
 /// The write as numbers that the circle is laid through.
 pub(super) struct Task<'a> {
     pub c: &'a Controller,
-    pub sections: &'a [Section],
     pub profile: &'a Profile,
     pub clock: Clock,
-    reference: Vec<f64>,
-    encoder: Vec<f64>,
-    added: Vec<f64>,
+    pub entering: Entering<'a>,
 }
 
 /// Instants of a window: its first (s), their number, their rate (Hz).
@@ -54,6 +62,14 @@ pub(super) struct Window {
 }
 
 impl Window {
+    /// No instant: for what is asked at the controller's samples only.
+    pub const NONE: Window = Window { first_s: 0.0, n: 0, rate: 1.0 };
+
+    /// The instants (s).
+    pub fn instants(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..self.n).map(|j| self.first_s + j as f64 / self.rate)
+    }
+
     /// Σ e^{-2 pi i k n/N} e^{s t_n}.
     pub fn kernel(&self, s: Complex<f64>, bin: f64) -> Complex<f64> {
         let step = s / self.rate - Complex::new(0.0, TAU * bin / self.n as f64);
@@ -79,13 +95,7 @@ impl<'a> Task<'a> {
         let all = rests.max(clock.ticks);
         let reference: Vec<f64> = (0..all).map(|k| reference(profile, k as f64 * t)).collect();
         let added = (0..all).map(|k| forward(c, profile, k) + windage.get(k).copied().unwrap_or_default()).collect();
-        Task { c, sections, profile, clock, reference, encoder, added }
-    }
-
-    /// Instants of the window (s).
-    pub fn instants(&self) -> impl Iterator<Item = f64> + '_ {
-        let [first, last] = self.clock.window;
-        (first..last).map(|j| j as f64 / self.profile.pes.sample_rate_hz)
+        Task { c, profile, clock, entering: Entering { sections, t, reference, encoder, added } }
     }
 
     /// The window as its kernels see it.
@@ -93,10 +103,22 @@ impl<'a> Task<'a> {
         let ([first, last], rate) = (self.clock.window, self.profile.pes.sample_rate_hz);
         Window { first_s: first as f64 / rate, n: last - first, rate }
     }
+}
+
+impl Entering<'_> {
+    /// Bound of the reference's transform anywhere on Re s = `right`.
+    pub fn moved(&self, right: f64) -> f64 {
+        self.reference.iter().fold(0.0f64, |m, x| m.max(x.abs())) / (1.0 - (-right * self.t).exp())
+    }
+
+    /// Bound of what is added to the command.
+    pub fn pushed(&self) -> f64 {
+        self.added.iter().map(|x| x.abs()).sum()
+    }
 
     /// Bound of |what enters| anywhere on Re s = `right`.
     pub fn most(&self, right: f64) -> f64 {
-        let back = (-right * self.c.sample_time_s).exp();
+        let back = (-right * self.t).exp();
         let law: f64 = self
             .sections
             .iter()
@@ -105,15 +127,13 @@ impl<'a> Task<'a> {
                 (s.b0.abs() + s.b1.abs() * back + s.b2.abs() * back * back) / below
             })
             .product();
-        let sum = |x: &[f64]| x.iter().map(|x| x.abs()).sum::<f64>();
-        let moved = self.profile.spiral.distance / (1.0 - back);
-        law * (moved + sum(&self.encoder)) + sum(&self.added)
+        law * (self.moved(right) + self.encoder.iter().map(|x| x.abs()).sum::<f64>()) + self.pushed()
     }
 }
 
 impl Contour {
-    pub fn of(task: &Task<'_>, points: usize, right: f64, bins: &[usize]) -> Contour {
-        let t = task.c.sample_time_s;
+    pub fn of(e: &Entering<'_>, window: &Window, points: usize, right: f64, bins: &[usize]) -> Contour {
+        let t = e.t;
         let s: Vec<Complex<f64>> =
             (0..=points / 2).map(|i| Complex::new(right, TAU * i as f64 / points as f64 / t)).collect();
         let back: Vec<Complex<f64>> = s.iter().map(|s| (s * -t).exp()).collect();
@@ -130,25 +150,35 @@ impl Contour {
             }
             z
         };
-        let law: Vec<Complex<f64>> =
-            back.iter().map(|b| task.sections.iter().map(|s| s.at_delay(*b)).product()).collect();
-        let reference = on(&task.reference, task.reference.last().copied().unwrap_or_default());
-        let (encoder, added) = (on(&task.encoder, 0.0), on(&task.added, 0.0));
+        let law: Vec<Complex<f64>> = back.iter().map(|b| e.sections.iter().map(|s| s.at_delay(*b)).product()).collect();
+        let reference = on(&e.reference, e.reference.last().copied().unwrap_or_default());
+        let (encoder, added) = (on(&e.encoder, 0.0), on(&e.added, 0.0));
         let inputs = (0..s.len()).map(|i| law[i] * (reference[i] - encoder[i]) + added[i]).collect();
-        let window = task.window();
         let kernel = |bin: f64| -> Vec<Complex<f64>> { s.iter().map(|s| window.kernel(*s, bin)).collect() };
         let kernels: Vec<[Vec<Complex<f64>>; 2]> =
             bins.iter().map(|k| [kernel(*k as f64), kernel(-(*k as f64))]).collect();
         let sizes = kernels.iter().map(|[a, b]| a.iter().zip(b).map(|(a, b)| size(*a) + size(*b)).collect()).collect();
-        let kernel_most = task.instants().map(|at| (right * at).exp()).sum();
+        let kernel_most = window.instants().map(|at| (right * at).exp()).sum();
         Contour { points, t, right, s, law, inputs, kernels, sizes, kernel_most }
+    }
+
+    /// The first `n` samples of what has these values on the upper half, its ends halved.
+    pub fn samples(&self, half: &[Complex<f64>], n: usize) -> Vec<f64> {
+        let mut whole = vec![Complex::new(0.0, 0.0); self.points];
+        for (i, x) in half.iter().enumerate() {
+            // Both halves of the circle; the ends, halved before, meet themselves.
+            whole[i] += x;
+            whole[(self.points - i) % self.points] += x.conj();
+        }
+        spectrum::backward(&mut whole);
+        (0..n).map(|k| whole[k % self.points].re * (self.right * self.t * k as f64).exp()).collect()
     }
 
     /// Points and Re s of a circle on which a sum is worth an integral: what has turned round is below `enough` (window, command)
     /// where `rough` bounds both on a line of given Re s. None where no circle of bearable size does.
-    pub fn wrapped(task: &Task<'_>, rough: &dyn Fn(f64) -> [f64; 2], enough: [f64; 2]) -> Option<(usize, f64)> {
-        let t = task.c.sample_time_s;
-        let end = task.instants().last().unwrap_or_default();
+    ///
+    /// `t`: sample time; `end`: the last instant asked for (s).
+    pub fn wrapped(t: f64, end: f64, rough: &dyn Fn(f64) -> [f64; 2], enough: [f64; 2]) -> Option<(usize, f64)> {
         let fits = |points: usize| {
             (4..100).map(|i| 2.0 * f64::from(i) / (t * points as f64)).find(|right| {
                 let turned = (-0.875 * right * t * points as f64).exp();

@@ -10,10 +10,13 @@ use super::family::{DELAY, Family, GAIN, PAIRS, share};
 use super::moves::{Move, Pair, Shares, size as modulus};
 use nalgebra::Complex;
 
-/// Aliases beside the first, bounded once over the whole box at every point.
+/// Aliases beside the first, bounded over a box at every point.
 pub(super) struct Beside {
     /// Bound of how far the sums of two members lie apart.
     apart: Vec<f64>,
+    /// Their sum's linear part along each coordinate at its half width, and what is not linear.
+    linear: Vec<Vec<Complex<f64>>>,
+    bent: Vec<f64>,
     /// For each bin the same two, each alias weighed with the sizes of its own two kernels.
     pub heard: Vec<[Vec<f64>; 2]>,
     /// Aliases summed one by one on each side.
@@ -36,20 +39,22 @@ fn hold(x: &Contour, i: usize, k: i64) -> (Complex<f64>, Complex<f64>) {
 impl Beside {
     pub fn of(x: &Contour, window: &Window, bins: &[usize], family: &Family, ranges: &[Range]) -> Beside {
         let whole = family.whole() + NEARBY;
-        let most = |s: Complex<f64>| {
-            let late = (s * family.delay_s() * share(&ranges[DELAY])).norm();
+        // Linear part of an alias's move along each coordinate, and the sizes of all of it.
+        let moved = |s: Complex<f64>, linear: &mut [Complex<f64>]| {
+            let mut all = Sum::default();
+            linear[GAIN] = share(&ranges[GAIN]).into();
+            all.add(share(&ranges[GAIN]), 0.0);
+            linear[DELAY] = s * -(family.delay_s() * share(&ranges[DELAY]));
             // |e^x - 1| <= e^|x| - 1, and neither |e^-s delay| is above 1.
-            let late = late.exp_m1().min(2.0);
-            let pairs: f64 = family
-                .pairs
-                .iter()
-                .enumerate()
-                .map(|(j, p)| {
-                    let shares = Family::shares(ranges, j);
-                    1.0 + p.moved(s, shares, p.reach(s, shares)).most
-                })
-                .product();
-            (1.0 + share(&ranges[GAIN])) * (1.0 + late) * pairs - 1.0
+            let late = modulus(linear[DELAY]);
+            all.add(late.exp_m1().min(2.0 + late), (late.exp_m1() - late).min(2.0 + late));
+            for (j, p) in family.pairs.iter().enumerate() {
+                let shares = Family::shares(ranges, j);
+                let m = p.moved(s, shares, p.reach(s, shares));
+                linear[PAIRS + 3 * j..][..3].copy_from_slice(&m.linear);
+                all.add(m.most, m.rest);
+            }
+            all
         };
         // Beyond the last one summed one by one: sizes by the asymptote, moves by the pairs' at the nearest and the dead time's at each.
         let w = std::f64::consts::TAU * (whole as f64 + 0.5) / x.t;
@@ -66,16 +71,24 @@ impl Beside {
             far_moves += one * (still * (1.0 + turned) - 1.0).min(2.0);
         }
         let n = x.s.len();
-        let mut apart = Vec::with_capacity(n);
+        let (mut apart, mut bent) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let mut linear = vec![vec![Complex::new(0.0, 0.0); n]; ranges.len()];
+        let mut along = vec![Complex::new(0.0, 0.0); ranges.len()];
         let mut heard = vec![[Vec::with_capacity(n), Vec::with_capacity(n)]; bins.len()];
         for i in 0..n {
             let held = modulus(1.0 - (x.s[i] * -x.t).exp());
             let mut moves = far_moves * held;
+            let mut beyond = moves;
             let loudest = 2.0 * held * x.kernel_most;
             let mut own = vec![[far * loudest, far_moves * loudest]; bins.len()];
             for k in (1..=whole).flat_map(|k| [k, -k]) {
                 let (s, hold) = hold(x, i, k);
-                let (p, m) = (modulus(hold * family.value(s)), most(s));
+                let (value, sizes) = (hold * family.value(s), moved(s, &mut along));
+                for (all, one) in linear.iter_mut().zip(&along) {
+                    all[i] += value * one;
+                }
+                let (p, m) = (modulus(value), sizes.most());
+                beyond += p * sizes.beyond();
                 let (p, a) = (p * (1.0 + m), 2.0 * p * m);
                 moves += a;
                 for (own, bin) in own.iter_mut().zip(bins) {
@@ -85,12 +98,13 @@ impl Beside {
                 }
             }
             apart.push(moves);
+            bent.push(beyond);
             for (heard, own) in heard.iter_mut().zip(own) {
                 heard[0].push(own[0]);
                 heard[1].push(own[1]);
             }
         }
-        Beside { apart, heard, whole, far }
+        Beside { apart, linear, bent, heard, whole, far }
     }
 }
 
@@ -121,10 +135,14 @@ pub(super) struct OnCircle {
     pub second: Vec<([usize; 2], Vec<Complex<f64>>)>,
     /// The same as the series for the command: -P V S C.
     pub command: Vec<Complex<f64>>,
+    /// For each coordinate what the other aliases' linear parts add to the command.
+    pub command_linear: Vec<Vec<Complex<f64>>>,
     /// Weight of the kernels' sizes for what is not linear, the near points of cut pairs aside.
     pub rest: Vec<f64>,
     /// The same for the command, with every pair taken as one piece.
     pub command_rest: Vec<f64>,
+    /// For the command, what is left beyond the second order; of no use where a pair is cut.
+    pub command_third: Vec<f64>,
     /// Weight of what each bin hears of the other aliases, and of what it hears of their moves.
     pub aside: [Vec<f64>; 2],
     pub cuts: Vec<Cut>,
@@ -186,8 +204,10 @@ impl OnCircle {
             series: Vec::with_capacity(n),
             second: core.pairs().into_iter().map(|p| (p, Vec::with_capacity(n))).collect(),
             command: Vec::with_capacity(n),
+            command_linear: vec![Vec::with_capacity(n); ranges.len()],
             rest: Vec::with_capacity(n),
             command_rest: Vec::with_capacity(n),
+            command_third: Vec::with_capacity(n),
             aside: [Vec::with_capacity(n), Vec::with_capacity(n)],
             cuts,
         };
@@ -262,14 +282,19 @@ impl OnCircle {
             }
             all.aside[0].push(scale * (1.0 + plain) * (modulus(one) * most + apart) * closed);
             all.aside[1].push(scale * (1.0 + plain));
+            let moved = closed * modulus(one);
+            all.command_third
+                .push(scale * (moved * (rest + 2.0 * blurred * most) + closed * (beside.bent[i] + apart * plain)));
             let (most, rest) = (whole.most(), whole.beyond());
             let (_, round) = again(most);
-            let moved = closed * modulus(one);
             let loose = moved * (rest + 2.0 * blurred * most) + closed * apart;
             all.command_rest.push(scale * (loose + round * (moved * most + closed * apart)));
             let signed = entered / x.points as f64 * ends;
             all.series.push(signed * one * about);
             all.command.push(-signed * one * law * sensitivity);
+            for (into, aliases) in all.command_linear.iter_mut().zip(&beside.linear) {
+                into.push(-signed * law * sensitivity * aliases[i]);
+            }
         }
         all
     }

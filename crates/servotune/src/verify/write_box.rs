@@ -162,19 +162,21 @@ pub fn bound_write(l: &BoxedLoop<'_>, harmonics: &[usize], settings: &BoxSetting
         let peak = nominal.command.iter().fold(0.0f64, |m, u| m.max(u.abs()));
         [TURNED * l.profile.spiral.distance * n as f64, TURNED * peak]
     };
+    let window = task.window();
     let end = task.clock.ticks as f64 * task.c.sample_time_s;
+    let last_instant = window.instants().last().unwrap_or_default();
     // Of two members: each |S| is at most Ms, by the maximum principle outside the unit circle too.
     let rough = |right: f64| {
-        let entered = 2.0 * ms * task.most(right);
-        let kernels: f64 = task.instants().map(|at| (right * at).exp()).sum();
+        let entered = 2.0 * ms * task.entering.most(right);
+        let kernels: f64 = window.instants().map(|at| (right * at).exp()).sum();
         [entered * kernels * family.roughly(right, &ranges), entered * (right * end).exp()]
     };
     let enough = [window_enough, command_enough];
-    let Some((points, right)) = Contour::wrapped(&task, &rough, enough) else {
+    let Some((points, right)) = Contour::wrapped(task.c.sample_time_s, last_instant, &rough, enough) else {
         return WriteBox::open(WriteOpen::TooLong);
     };
-    let circle = Contour::of(&task, points, right, &bins);
-    let beside = Beside::of(&circle, &task.window(), &bins, &family, &ranges);
+    let circle = Contour::of(&task.entering, &window, points, right, &bins);
+    let beside = Beside::of(&circle, &window, &bins, &family, &ranges);
     let question = Question {
         task: &task,
         circle: &circle,
@@ -262,7 +264,7 @@ fn branch(
 
 /// Simulates one member and keeps what it shows.
 fn look(q: &Question<'_>, at: &[f64], seen: &mut [f64]) {
-    let record = simulate(&q.family.member(at), q.task.sections, q.task.c, q.task.profile);
+    let record = simulate(&q.family.member(at), q.task.entering.sections, q.task.c, q.task.profile);
     let peak = record.command.iter().fold(0.0f64, |m, u| m.max(u.abs()));
     let w = of_window(&record.window, q.task.profile.pes.sample_rate_hz, &q.bands_hz, peak, 0.0);
     let figures = [w.dft_low, w.dft_high].into_iter().chain(q.bins.iter().map(|k| w.harmonics[k - 1])).chain([peak]);

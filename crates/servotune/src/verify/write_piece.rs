@@ -8,7 +8,6 @@ use super::family::{Family, PAIRS, Ranges};
 use super::moves::size;
 use super::spectrum_box::{Beside, Cut, OnCircle};
 use super::write::{Bands, bin, simulate};
-use crate::numeric::spectrum;
 use nalgebra::Complex;
 
 /// What is asked of a write.
@@ -144,7 +143,7 @@ impl Piece {
     pub fn of(q: &Question<'_>, ranges: Ranges) -> Option<Piece> {
         let at = middle(&ranges);
         let family = q.family.about(&at);
-        let record = simulate(&q.family.member(&at), q.task.sections, q.task.c, q.task.profile);
+        let record = simulate(&q.family.member(&at), q.task.entering.sections, q.task.c, q.task.profile);
         let limit = q.task.c.output_limit.unwrap_or(f64::INFINITY);
         if record.command.iter().any(|u| u.abs() >= limit) {
             return None;
@@ -214,7 +213,6 @@ impl Piece {
 
     /// The command's peak.
     fn command(&mut self, q: &Question<'_>, on: &OnCircle, sizes: &[Vec<f64>], command: &[f64], at: &[f64]) {
-        let points = q.circle.points;
         let swell = |k: usize| (q.circle.right * q.circle.t * k as f64).exp();
         let along: Vec<Option<Vec<f64>>> = on
             .linear
@@ -224,14 +222,7 @@ impl Piece {
                 if series.iter().all(|x| x.norm_sqr() == 0.0) {
                     return None;
                 }
-                let mut whole = vec![Complex::new(0.0, 0.0); points];
-                for (i, x) in series.iter().enumerate() {
-                    // Both halves of the circle; the ends, halved before, meet themselves.
-                    whole[i] += x;
-                    whole[(points - i) % points] += x.conj();
-                }
-                spectrum::backward(&mut whole);
-                Some((0..command.len()).map(|k| whole[k % points].re * swell(k)).collect())
+                Some(q.circle.samples(&series, command.len()))
             })
             .collect();
         let rest = 2.0 * on.command_rest.iter().sum::<f64>();
@@ -256,7 +247,7 @@ impl Piece {
 }
 
 /// The coordinate whose linear part holds the largest share of the weight.
-fn widest(linear: &[Vec<f64>], weight: &dyn Fn(usize) -> f64) -> usize {
+pub(super) fn widest(linear: &[Vec<f64>], weight: &dyn Fn(usize) -> f64) -> usize {
     let weights: Vec<f64> = (0..linear[0].len()).map(weight).collect();
     let all: Vec<f64> = linear.iter().map(|l| l.iter().zip(&weights).map(|(l, w)| l * w).sum()).collect();
     (0..all.len()).max_by(|a, b| all[*a].total_cmp(&all[*b])).unwrap_or_default()
