@@ -13,6 +13,10 @@ use std::f64::consts::TAU;
 
 /// Rounds of back-off: each removes the whole difference between quick and exact figures, to second order.
 const BACK_OFFS: usize = 8;
+/// Difference of room (share of a limit) between what the search holds by shares and what it does not that is worth another polish; how much of it the
+/// next aim takes away, the others giving as they do.
+const ROOM_MISS: f64 = 1e-3;
+const HALF_WAY: f64 = 0.6;
 /// Miss of an aim (share of the limit) from which on the limits are in conflict there.
 const CONFLICT: f64 = 1e-3;
 /// How far beyond a miss the next polish aims.
@@ -37,7 +41,7 @@ pub(super) struct Ending<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct Settled {
     pub x: Vec<f64>,
-    /// ln of the objective, as the search scores it; of the bandwidth by the exact judgement; of `room` the largest violation by either.
+    /// ln of the objective, as the search scores it; of the bandwidth and of `room` by the exact judgement.
     pub objective: f64,
     /// Largest violation of a limit with its guard, by the exact judgement.
     pub worst: f64,
@@ -92,10 +96,6 @@ impl<'a> Ending<'a> {
                     }
                 }
             }
-            if problem.minimise == Minimise::Room {
-                // A dip of |T| between two points of the grid is less room than the search saw.
-                objective = objective.max(worst);
-            }
             round += 1;
             let passes = worst <= MET;
             if passes || !moved || round > BACK_OFFS {
@@ -113,6 +113,41 @@ impl<'a> Ending<'a> {
                 }
             }
         }
+    }
+
+    /// The same for the objective `room`. The search holds a crossing by |L| at the range's end and a settling time by its envelope there, which are no
+    /// shares of the limit: where they leave less room than the others, they are aimed further inside, until all have the same.
+    pub fn settle_room(&mut self, problem: &mut TuningProblem, x: &[f64]) -> Result<Settled, TuneError> {
+        let mut inside = vec![problem.rooms(false); problem.machines.len()];
+        let mut best: Option<Settled> = None;
+        let (mut x, mut work) = (x.to_vec(), problem.work());
+        for _ in 0..=BACK_OFFS {
+            let proofs = judged(self.machines, &problem.parameters.controller(&x), self.spec)?;
+            let worst = proofs.iter().map(|p| p.judged.worst()).fold(f64::NEG_INFINITY, f64::max);
+            if best.as_ref().is_none_or(|b| worst < b.worst) {
+                best = Some(Settled { x: x.clone(), objective: worst, worst, passes: worst <= MET });
+            }
+            let limits = || proofs.iter().flat_map(|p| &p.judged.limits);
+            let plain = limits().filter(|l| l.wanted.what.held_by_share()).map(|l| l.violation);
+            let plain = plain.fold(f64::NEG_INFINITY, f64::max);
+            if worst <= plain + ROOM_MISS || !worst.is_finite() || !plain.is_finite() {
+                break;
+            }
+            for (p, inside) in proofs.iter().zip(&mut inside) {
+                for (l, inside) in p.judged.limits.iter().zip(inside) {
+                    if !l.wanted.what.held_by_share() {
+                        *inside += HALF_WAY * (l.violation - plain).max(0.0);
+                    }
+                }
+            }
+            self.back_offs += 1;
+            problem.aim(&inside);
+            let Some(p) = refine(problem, &x, self.steps, &mut work) else { break };
+            x = p.x;
+        }
+        self.evaluations += work.evaluations;
+        problem.aim_guarded(false);
+        best.ok_or(TuneError::NoMachine)
     }
 
     /// The parameters that lie on their bounds.

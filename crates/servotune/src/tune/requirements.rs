@@ -148,6 +148,11 @@ const NOTHING: f64 = 1.0;
 pub const MET: f64 = 1e-6;
 
 impl What {
+    /// Whether the search's own figure of it is the share of the limit that the room is counted in.
+    pub(super) fn held_by_share(self) -> bool {
+        !matches!(self, What::GainCrossover | What::Settling | What::MoveSettling)
+    }
+
     /// The unit in which limit and found value stand.
     pub fn unit(self) -> &'static str {
         match self {

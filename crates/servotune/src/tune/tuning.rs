@@ -249,7 +249,10 @@ fn settled(
             // What comes later is worse before any back-off.
             break;
         }
-        let now = ending.settle(problem, &end.x, guarded)?;
+        let now = match problem.minimise {
+            Minimise::Room => ending.settle_room(problem, &end.x)?,
+            _ => ending.settle(problem, &end.x, guarded)?,
+        };
         let better = best.as_ref().is_none_or(|b| match (now.passes, b.passes) {
             (true, true) => now.objective < b.objective,
             (false, false) => now.worst < b.worst,
