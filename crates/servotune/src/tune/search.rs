@@ -5,7 +5,7 @@
 //! any number of threads. Spec: `specs/tuning.md`.
 
 use super::neighbours::{Exact, improve};
-use super::placement::refine_placed;
+use super::placement::{notches, refine_placed};
 use super::polish::{Goal, Polished, polish};
 use super::problem::UNSTABLE;
 use super::starts::starts;
@@ -113,7 +113,8 @@ pub(super) fn best_of(problem: &TuningProblem, starts: Vec<Vec<f64>>, work: &mut
 /// Starts that are drawn for one further polish.
 pub(super) const DRAWN: usize = SCREENED;
 
-/// Searches from the given vectors, by rule, and from strata under `seed`.
+/// Searches from the given vectors, by rule, and from strata under `seed`. With several notches twice, in populations that do not see each other,
+/// and then in both together: the neighbours of one population soon lie in one valley.
 pub(super) fn search(
     problem: &TuningProblem,
     given: &[Vec<f64>],
@@ -122,6 +123,23 @@ pub(super) fn search(
     exact: &Exact<'_>,
     watch: &SearchWatch<'_>,
 ) -> Found {
+    let mut whole = population(problem, given, seed, effort);
+    improve(problem, &mut whole, effort, seed, exact, watch);
+    if notches(problem).len() > 1 {
+        let mut other = population(problem, &[], seed ^ OTHER_SEED, effort);
+        improve(problem, &mut other, effort, seed ^ OTHER_SEED, exact, watch);
+        whole.join(other);
+        improve(problem, &mut whole, effort, seed ^ JOINT_SEED, exact, watch);
+    }
+    whole
+}
+
+/// What the seeds of the second population and of both together differ by.
+const OTHER_SEED: u64 = 0x5eed_0004;
+const JOINT_SEED: u64 = 0x5eed_0005;
+
+/// Polished starts, best first.
+fn population(problem: &TuningProblem, given: &[Vec<f64>], seed: u64, effort: &Effort) -> Found {
     let from = starts(problem, given, seed, effort.starts * SCREENED);
     let from = screened(problem, from, given.len() + BY_RULE, effort.starts);
     let ends: Vec<(Option<Polished>, usize)> = from
@@ -139,7 +157,6 @@ pub(super) fn search(
     ends.into_iter().for_each(|end| found.take(end));
     // The sort is stable: of equals the earlier start stays ahead.
     found.ends.sort_by(|a, b| order(&a.score, &b.score));
-    improve(problem, &mut found, effort, seed, exact, watch);
     found
 }
 
