@@ -43,6 +43,16 @@ def functions(text: str) -> list[tuple[int, str]]:
     return found
 
 
+def rooms(use: str) -> set[str]:
+    """First names of the paths of `use super::...`: what lies behind them may bear a file's name too."""
+    depth, parts = 0, [""]
+    for c in re.sub(r"\s", "", use[1:-1] if use.startswith("{") else use):
+        depth += (c == "{") - (c == "}")
+        parts += [""] if c == "," and depth == 0 else []
+        parts[-1] += c if c != "," or depth else ""
+    return {p.split("::")[0] for p in parts}
+
+
 def circles(root: Path) -> int:
     """Files that import one another in a circle within their folder."""
     count = 0
@@ -52,7 +62,7 @@ def circles(root: Path) -> int:
             n: {
                 m
                 for use in re.findall(r"^use super::(.*?);", without_tests((folder / f"{n}.rs").read_text()), re.M | re.S)
-                for m in re.findall(r"\b(\w+)(?=::|\b)", use)
+                for m in rooms(use)
                 if m in names and m != n
             }
             for n in names

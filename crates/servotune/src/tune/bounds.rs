@@ -3,7 +3,7 @@
 //! In: `search.bounds`, a plant's |P| over frequency, the range in which the loop is to cross over. Out: a range for every number.
 //! A gain that puts |L| = 1 at f alone is 1/|P(f)| (proportional), 2 pi f/|P| (integral) or 1/(2 pi f |P|) (derivative).
 
-use super::spec::interval;
+use super::spec_error::interval;
 use super::{Spec, SpecError};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;

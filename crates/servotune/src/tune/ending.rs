@@ -4,10 +4,10 @@
 //! limit that the grid's figure met, the search aims inside by the difference and polishes again.
 
 use super::judge::judge_loop;
+use super::judge::judged;
 use super::outcome::{AtBound, Infeasible, Reached, RelaxedLimit, Work};
+use super::polish::refine;
 use super::requirements::{Found, MET, Requirement};
-use super::search::refine;
-use super::tuning::judged;
 use super::{Judged, JudgedLimit, Machine, Minimise, Proof, Side, Spec, TuneError, TuningProblem};
 use std::f64::consts::TAU;
 

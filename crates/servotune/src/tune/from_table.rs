@@ -3,8 +3,8 @@
 //! In: a [`TuningProblem`], a table of its shape. Out: the table that meets the problem's limits with the smallest objective near it, by the search's grid.
 //! Nothing is judged exactly here: whoever takes the table proves it. A fleet tunes most of its slots this way.
 
+use super::polish::refine;
 use super::polish::{Goal, polish};
-use super::search::refine;
 use super::{Score, TuningProblem, TuningWork};
 use crate::controller::Controller;
 

@@ -167,3 +167,7 @@ pub(super) fn lasting_objective(
     let weights = super::record_figures::band_weights(spec);
     Ok(Some(spec.objective.bands_hz.iter().zip(weights).map(|(b, w)| w * s.dft().band(&amplitude, *b)).sum()))
 }
+
+pub(super) fn judged(machines: &[Machine<'_>], c: &Controller, spec: &Spec) -> Result<Vec<Proof>, TuneError> {
+    machines.iter().map(|m| judge(m, c, spec)).collect()
+}

@@ -1,7 +1,7 @@
 //! What a spec demands: `[margins]`, `[limits]` and the curves over frequency.
 
 use super::SpecError;
-use super::spec::{interval, range};
+use super::spec_error::{interval, range};
 use crate::feedback::CurveLimit;
 use crate::pes::{Profile, Reference};
 use serde::{Deserialize, Serialize};

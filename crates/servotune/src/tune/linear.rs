@@ -3,11 +3,12 @@
 //! Limits of the loop: analytic, Re(pull_by d ln C) at the row's frequency. Figures of records: one backward pass a figure, which gives slopes
 //! in the coefficients of every section. Both reach the parameters through the slopes of the sections' coefficients.
 
-use super::loop_rows::{Moves, Row};
 use super::objective::Minimise;
 use super::parameters::chain_of;
-use super::problem::UNSTABLE;
 use super::requirements::What;
+use super::row::{Moves, Row};
+use super::score::UNSTABLE;
+use super::section_slope::{SECTION_STEP, SectionSlope};
 use super::{Score, TuningProblem, TuningWork};
 use crate::lti::Section;
 use nalgebra::Complex;
@@ -27,29 +28,8 @@ pub(super) struct Linear {
     pub rows: Vec<LinearRow>,
 }
 
-/// How the section that a parameter acts on moves with it: d of b0, b1, b2, a1, a2 over the parameter's logarithm.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct SectionSlope {
-    pub section: usize,
-    pub of: [f64; 5],
-    /// The section a little to either side.
-    pub around: [Section; 2],
-}
-
-/// Step of a parameter's logarithm for the slopes of coefficients, central: errors of 1e-10 by curvature and 1e-11 by rounding.
-pub(super) const SECTION_STEP: f64 = 1e-5;
 /// Rows beyond this many worst ones cannot decide a step.
 const ROWS: usize = 48;
-
-impl SectionSlope {
-    /// d ln of the section's response over the parameter, at z^-1 = `back`.
-    fn pull(&self, section: &Section, back: Complex<f64>) -> Complex<f64> {
-        let [b0, b1, b2, a1, a2] = self.of;
-        let top = section.b0 + back * (section.b1 + back * section.b2);
-        let under = 1.0 + back * (section.a1 + back * section.a2);
-        (b0 + back * (b1 + back * b2)) / top - back * (a1 + back * a2) / under
-    }
-}
 
 /// One limit near a candidate.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,9 +1,10 @@
 //! What is tuned: a plant model or a measured response, prepared once for thousands of candidates.
 
-use super::linear::SectionSlope;
 use super::objective::Minimise;
 use super::record_figures::{Asked, RecordFigure};
 use super::requirements::{Requirement, What};
+use super::section_slope::SectionSlope;
+use super::section_slope::in_parameters;
 use super::step_figures::{MoveEnd, envelope_from, overshoot, worst_outside};
 use super::write_figures::{WriteBuffers, WriteSource};
 use super::{Spec, TuneError};
@@ -343,15 +344,6 @@ impl Prepared {
 /// The settling limit of a step or of the move that is aimed at (s).
 fn settling(aimed: &[Requirement], what: What) -> f64 {
     aimed.iter().find(|w| w.what == what).map_or(f64::INFINITY, |w| w.limit)
-}
-
-/// Slopes in parameters from slopes in coefficients.
-pub(super) fn in_parameters(sections: &Slopes, slopes: &[SectionSlope], out: &mut Vec<f64>) {
-    out.clear();
-    out.extend(slopes.iter().map(|s| {
-        let of = &sections.sections[s.section];
-        of.iter().zip(&s.of).map(|(a, b)| a * b).sum::<f64>()
-    }));
 }
 
 /// Expected root mean square of the command under a disturbance at the plant's input (command_unit).

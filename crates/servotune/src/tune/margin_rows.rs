@@ -4,8 +4,8 @@
 //! and a negative one misses every limit. So every positive crossing keeps its distance, and every negative one stays farther away than the
 //! nearest positive one: two limits that move steadily, where the named figure itself jumps as two crossings change places.
 
-use super::loop_rows::{FAR, Moves, Row, real};
 use super::requirements::{Requirement, What};
+use super::row::{FAR, Moves, Row, real};
 use crate::feedback::{Event, GRAZE, Graze, QuickMargins};
 use nalgebra::Complex;
 use std::f64::consts::LOG10_E;

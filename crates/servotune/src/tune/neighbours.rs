@@ -4,9 +4,11 @@
 //! end, or shakes every number; its polish ends in the next optimum. Each neighbour has random numbers of its own, and the best are taken by merit
 //! and then by index, so the result has the same bytes for any number of threads.
 
+use super::found::Polished;
+use super::found::{Effort, Found, fresh, order};
 use super::placement::{notches, placed, refine_placed};
-use super::polish::Polished;
-use super::search::{DRAWN, Effort, Found, best_of, fresh, order, simplex, walk_back};
+use super::simplex::{best_of, simplex, walk_back};
+use super::starts::DRAWN;
 use super::starts::further;
 use super::{Minimise, Parameter, Score, SearchStep, SearchWatch, TuningProblem, TuningWork};
 use crate::numeric::random::Random;

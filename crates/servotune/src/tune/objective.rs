@@ -4,7 +4,7 @@
 //! Values and units: `specs/tuning.md`.
 
 use super::SpecError;
-use super::spec::{interval, range};
+use super::spec_error::{interval, range};
 use crate::pes::{HIGH_BAND_HZ, LOW_BAND_HZ, coloured, tabulated};
 use serde::{Deserialize, Serialize};
 use std::path::Path;

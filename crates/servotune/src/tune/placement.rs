@@ -3,8 +3,10 @@
 //! In: a polished end with a notch that does nothing there. Out: the same with that notch somewhere else. A flat notch has no slope in its centre and
 //! width, so no local method moves it; what one step of the polish promises with a shallow notch at a place says what that place is worth.
 
-use super::polish::{Goal, Polished, promise};
-use super::search::{order, refine};
+use super::found::Polished;
+use super::found::order;
+use super::polish::refine;
+use super::polish::{Goal, promise};
 use super::{Minimise, Parameter, Score, TuningProblem, TuningWork};
 use crate::numeric::random::Random;
 

@@ -3,10 +3,11 @@
 //! Exact penalty on the largest violation; Hessian of the Lagrangian by damped BFGS; a second-order correction where the
 //! limits bend away (Nocedal & Wright, Numerical Optimization, ch. 18). Worst case over machines through one bound for all.
 
+use super::found::{Polished, order};
 use super::linear::{Linear, linearise};
-use super::loop_rows::Row;
-use super::problem::{INSIDE, UNSTABLE};
 use super::quadratic::Quadratic;
+use super::row::Row;
+use super::score::{INSIDE, UNSTABLE};
 use super::{Score, TuningProblem, TuningWork};
 
 /// What the polish is after.
@@ -18,15 +19,6 @@ pub(super) enum Goal {
     Reach,
     /// The most room to the nearest limit, whatever the objective.
     Room,
-}
-
-/// Where a polish ended.
-#[derive(Clone, Debug)]
-pub(super) struct Polished {
-    pub x: Vec<f64>,
-    pub score: Score,
-    /// From a start of its own, rather than from a neighbour of an end.
-    pub fresh: bool,
 }
 
 /// Trust region at the start and at the end (ln of a parameter).
@@ -270,4 +262,21 @@ fn update(b: &mut [f64], d: &[f64], y: &[f64]) {
             b[j * n + k] += r[j] * r[k] / dr - bd[j] * bd[k] / dbd;
         }
     }
+}
+
+/// Polishes for the objective; where limits stay missed, first for the limits alone.
+pub(super) fn refine(problem: &TuningProblem, x: &[f64], steps: usize, work: &mut TuningWork) -> Option<Polished> {
+    if problem.minimise == super::Minimise::Room {
+        return polish(problem, x, Goal::Room, steps, work);
+    }
+    let first = polish(problem, x, Goal::Best, steps, work)?;
+    if first.score.meets() {
+        return Some(first);
+    }
+    let reached = polish(problem, &first.x, Goal::Reach, steps, work)?;
+    if !reached.score.meets() {
+        return Some(reached);
+    }
+    let again = polish(problem, &reached.x, Goal::Best, steps, work)?;
+    Some(if order(&again.score, &reached.score).is_le() { again } else { reached })
 }

@@ -77,3 +77,18 @@ pub enum SpecError {
     #[error("{}: {source}", file.display())]
     File { file: PathBuf, source: Box<SpecError> },
 }
+
+/// Refuses a number out of its range by its key.
+pub(super) fn range(key: &'static str, found: f64, good: bool, expected: &'static str) -> Result<(), SpecError> {
+    if good { Ok(()) } else { Err(SpecError::Range { key, found, expected }) }
+}
+
+/// Refuses what is no interval of numbers above 0; `off` allows [0, 0].
+pub(super) fn interval(key: &'static str, [from, to]: [f64; 2], off: bool) -> Result<(), SpecError> {
+    let good = from.is_finite() && to.is_finite() && 0.0 < from && from <= to;
+    if good || (off && from == 0.0 && to == 0.0) {
+        return Ok(());
+    }
+    let expected = if off { "0 < from <= to, or [0, 0] for none" } else { "0 < from <= to" };
+    Err(SpecError::Interval { key, from, to, expected })
+}

@@ -201,3 +201,9 @@ fn nearest(m: &SampledPlant, w: f64) -> Complex<f64> {
     let i = m.w_rad_s().partition_point(|x| *x < w).min(m.w_rad_s().len() - 1);
     m.value(i)
 }
+
+/// Starts drawn for each one that is polished; scoring one costs a hundredth of polishing it.
+pub(super) const SCREENED: usize = 6;
+
+/// Starts that are drawn for one further polish.
+pub(super) const DRAWN: usize = SCREENED;

@@ -4,7 +4,7 @@
 //! All kinds run in the PID's section; how their numbers become kp, ki and kd: [`super::parameters`].
 
 use super::SpecError;
-use super::spec::interval;
+use super::spec_error::interval;
 use serde::{Deserialize, Serialize};
 
 /// Kind of the controller.

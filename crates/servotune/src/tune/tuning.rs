@@ -3,14 +3,15 @@
 use super::bounds::{Ranges, crossover_hz};
 use super::ending::{Ending, Settled};
 use super::feedforward::best_feedforward;
-use super::judge::lasting_objective;
+use super::found::{Effort, Found};
+use super::judge::{judged, lasting_objective};
 use super::loop_rows::FAR_CROSSING_OF_COMPROMISE;
 use super::neighbours::{BETTER, spread};
 use super::outcome::{Outcome, Reached, Tuned, Work};
 use super::polish::{Goal, polish};
-use super::problem::UNSTABLE;
-use super::search::{Effort, Found, search};
-use super::{Machine, Minimise, Parameters, Proof, SearchWatch, Spec, TuneError, TuningProblem, judge, unwatched};
+use super::score::UNSTABLE;
+use super::search::search;
+use super::{Machine, Minimise, Parameters, Proof, SearchWatch, Spec, TuneError, TuningProblem, unwatched};
 use crate::controller::Controller;
 
 /// How the search is run; what it looks for stands in the spec.
@@ -203,7 +204,7 @@ fn tune_feedback(
             _ => score.objective.exp(),
         };
         // Ends of this objective or better ones; those of another guard count where they are as good.
-        let near = |e: &&super::polish::Polished| e.score.meets() && e.score.objective <= score.objective + BETTER;
+        let near = |e: &&super::found::Polished| e.score.meets() && e.score.objective <= score.objective + BETTER;
         let starts_at_best = found.ends.iter().filter(near).count().max(1);
         Reached { name: problem.minimise, value, starts: found.starts, starts_at_best }
     };
@@ -364,8 +365,4 @@ fn error_of_grid(machines: &[Machine<'_>], c: &Controller, spec: &Spec, objectiv
         Ok(if found.unstable_poles == 0 { worst.max(unseen).max(lasting).max(0.0) } else { f64::INFINITY })
     };
     machines.iter().map(|m| of(m).unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
-}
-
-pub(super) fn judged(machines: &[Machine<'_>], c: &Controller, spec: &Spec) -> Result<Vec<Proof>, TuneError> {
-    machines.iter().map(|m| judge(m, c, spec)).collect()
 }

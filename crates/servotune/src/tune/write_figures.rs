@@ -4,10 +4,10 @@
 //! expected power, the limits are of the second, which is what `simulate` reports. Response: the write read off the spectrum, noise by its
 //! expected power throughout. A search whose objective looked at one draw alone would learn it by heart.
 
-use super::linear::{SECTION_STEP, SectionSlope};
-use super::machine::in_parameters;
 use super::objective::Minimise;
 use super::record_figures::{Asked, RecordFigure};
+use super::section_slope::in_parameters;
+use super::section_slope::{SECTION_STEP, SectionSlope};
 use crate::controller::Controller;
 use crate::feedback::{LoopOnGrid, Pulls, ResponseCurve, SampledPlant};
 use crate::lti::{DiscretePlant, Section};
