@@ -1,6 +1,6 @@
 //! The controller as a C99 header in double precision.
 
-use super::export::{Exported, numbers};
+use super::exported::{Exported, numbers};
 use servotune::controller::{Feedforward, Law};
 use std::fmt::Write;
 

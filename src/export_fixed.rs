@@ -4,7 +4,7 @@
 //! that an integrator loses nothing.
 
 use super::Failure;
-use super::export::{Exported, numbers};
+use super::exported::{Exported, numbers};
 use serde::Serialize;
 use servotune::controller::Law;
 use servotune::feedback::{Margins, ModelLoop, confirmed_margins};

@@ -1,6 +1,6 @@
 //! The controller as a MATLAB function, which Octave runs too.
 
-use super::export::{Exported, numbers};
+use super::exported::{Exported, numbers};
 use servotune::controller::Law;
 
 /// The function: sections, sample time, and its own test.

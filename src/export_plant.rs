@@ -1,7 +1,7 @@
 //! `servotune export plant.toml`: the plant in the forms of MATLAB, python-control and JSON, read back before it is said to be right.
 
 use super::Failure;
-use super::export::numbers;
+use super::exported::numbers;
 use super::start_arguments::ExportForm;
 use nalgebra::Complex;
 use serde_json::json;

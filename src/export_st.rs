@@ -1,6 +1,6 @@
 //! The controller as a function block in structured text (IEC 61131-3).
 
-use super::export::Exported;
+use super::exported::Exported;
 use servotune::controller::Law;
 
 /// The block, its test vector in a comment.

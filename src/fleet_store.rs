@@ -1,9 +1,9 @@
 //! `servotune fleet runs | history | diff | check | approve | apply | rollback`: what the store knows, and revisions by hand.
 
-use super::fleet::stamp;
 use super::fleet_arguments::{
     FleetCheckArguments, FleetDiffArguments, FleetHistoryArguments, FleetReviseArguments, FleetRunsArguments,
 };
+use super::stamp::stamp;
 use super::{Ending, Failure, Screen};
 use serde::Serialize;
 use servotune_fleet::{Action, End, FleetError, Healed, Order, Revision, Run, SlotRow, Store, Which};

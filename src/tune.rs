@@ -6,7 +6,7 @@ use super::tune_text::{physical_text, text};
 use super::{Ending, Failure, Screen, load, proof, tune_machines, verify};
 use servotune::controller::Controller;
 use servotune::document::{FileSet, check_target, read_text, sha256_hex};
-use servotune::identify::{self, IdentifySettings};
+use servotune::identify;
 use servotune::tune::{Hold, InputDigest, Machine, SearchStep, Spec, TuneError, TuneSettings, sample_time_s, tune};
 use servotune::verify::{Source, Watched};
 use servotune_answer::slot::{self, Slot};
@@ -116,16 +116,6 @@ fn given(
         }
         (None, None) => Err(Failure::NoMachine),
     }
-}
-
-/// Settings of the model that continues the sweep: a sweep with the hold in it has it divided out first.
-pub(super) fn model_settings(a: &TuneArguments, sample_time_s: f64) -> IdentifySettings {
-    let asked = a.model.settings();
-    let hold = match (a.hold_included, asked.hold) {
-        (true, identify::Hold::NotIncluded) => identify::Hold::Included { sample_time_s },
-        (_, hold) => hold,
-    };
-    IdentifySettings { hold, ..asked }
 }
 
 fn report(

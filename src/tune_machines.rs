@@ -2,7 +2,7 @@
 
 use super::arguments::TuneArguments;
 use super::gated::{self, Fate, Job, Row};
-use super::{Ending, Failure, Screen, load, tune::model_settings};
+use super::{Ending, Failure, Screen, load};
 use serde::Serialize;
 use servotune::document::{read_text, sha256_hex};
 use servotune::gate::Gate;
@@ -57,4 +57,14 @@ pub(super) fn run(a: &TuneArguments, machines: &Path, gate: &Path, screen: &mut 
     let text = format!("{}\n{}\n", gated::sheet(&rows)?.text(), gated::summary(&rows));
     screen.result(&document, &text)?;
     Ok(if not_tuned == 0 { Ending::Accepted } else { Ending::Rejected })
+}
+
+/// Settings of the model that continues the sweep: a sweep with the hold in it has it divided out first.
+pub(super) fn model_settings(a: &TuneArguments, sample_time_s: f64) -> servotune::identify::IdentifySettings {
+    let asked = a.model.settings();
+    let hold = match (a.hold_included, asked.hold) {
+        (true, servotune::identify::Hold::NotIncluded) => servotune::identify::Hold::Included { sample_time_s },
+        (_, hold) => hold,
+    };
+    servotune::identify::IdentifySettings { hold, ..asked }
 }

@@ -29,13 +29,14 @@ const LIBRARY: &str = "crates/servotune/src/";
 /// Outside crates and the places where they may be named.
 const HOMES: [(&str, &[&str]); 12] = [
     ("clarabel", &["crates/servotune/src/tune/feedforward.rs"]),
-    ("argmin", &["crates/servotune/src/tune/search.rs"]),
+    ("argmin", &["crates/servotune/src/tune/simplex.rs"]),
     ("rustfft", &["crates/servotune/src/numeric/spectrum.rs"]),
     (
         "rayon",
         &[
             "crates/servotune/src/tune/search.rs",
             "crates/servotune/src/tune/neighbours.rs",
+            "crates/servotune/src/verify/step_box.rs",
             "crates/servotune/src/gate/",
             "crates/servotune/src/twin/",
             "crates/servotune/src/diagnose/",

@@ -3,19 +3,14 @@
 //! In: the pilots with their cases. Out: groups with their centres, and a table each. Alike is near in ln P(jw) over the frequencies that a loop
 //! of this kind feels; groups are those of k-means from starts that lie farthest apart (Gonzalez, TCS 38, 1985), so no draw is needed.
 
+use super::look::{distance, nearest};
 use super::slot::Prepared;
 use super::{Context, Ready};
-use serde::{Deserialize, Serialize};
 use servotune::controller::Controller;
-use servotune::lti::{FrequencyResponse, Plant};
 use servotune::tune::{Machine, TuningProblem, roomiest_table};
-use std::f64::consts::TAU;
 
 /// Numbers of groups.
 pub const LEVELS: [usize; 6] = [1, 2, 3, 4, 6, 8];
-/// Frequencies at which plants are compared (Hz): the decade around the crossover, and on to the modes that limit it.
-const COMPARED_HZ: [f64; 2] = [150.0, 3000.0];
-const COMPARED: usize = 24;
 /// Members that a group's table is tuned on at most: those farthest apart.
 const MEMBERS: usize = 5;
 /// Rounds of k-means.
@@ -23,40 +18,6 @@ const ROUNDS: usize = 30;
 /// Tables from which a group's polish starts.
 const STARTS: usize = 2;
 const STEPS: usize = 25;
-
-/// One number of groups.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Level {
-    /// Centre of each group in [`looks`].
-    pub centres: Vec<Vec<f64>>,
-    /// Candidate of each group in the library; none where nothing was found for it.
-    pub candidates: Vec<Option<usize>>,
-}
-
-/// What a plant looks like to a loop: ln |P| and phase (rad) over the compared frequencies.
-pub fn looks(plant: &Plant) -> Vec<f64> {
-    let step = (COMPARED_HZ[1] / COMPARED_HZ[0]).powf(1.0 / (COMPARED - 1) as f64);
-    let mut all = Vec::with_capacity(2 * COMPARED);
-    let mut phase = 0.0f64;
-    for i in 0..COMPARED {
-        let v = plant.at(TAU * COMPARED_HZ[0] * step.powi(i as i32));
-        // Continued from point to point.
-        let turned = v.arg() - phase;
-        phase += turned - TAU * (turned / TAU).round();
-        all.extend([v.norm().ln(), phase]);
-    }
-    all
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
-}
-
-/// The centre nearest to a look; of equals the first.
-pub fn nearest(look: &[f64], centres: &[Vec<f64>]) -> Option<usize> {
-    (0..centres.len())
-        .min_by(|&a, &b| distance(look, &centres[a]).total_cmp(&distance(look, &centres[b])).then(a.cmp(&b)))
-}
 
 /// `count` of the looks that lie farthest apart, beginning with the one nearest to the mean.
 fn apart(looks: &[&Vec<f64>], count: usize) -> Vec<usize> {

@@ -2,7 +2,7 @@
 //!
 //! In: what the pilots found. Out: [`Library`].
 
-use super::cluster::{Level, nearest};
+use super::look::{Level, nearest};
 use serde::{Deserialize, Serialize};
 use servotune::controller::Controller;
 use servotune::lti::{Plant, PlantFile};

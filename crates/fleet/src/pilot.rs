@@ -4,9 +4,10 @@
 //! from their number alone, so the library is the same for any number of threads and after any interruption.
 
 use super::Context;
-use super::cluster::{LEVELS, Level, group_table, groups, looks, useful};
+use super::cluster::{LEVELS, group_table, groups, useful};
 use super::grow::{Scout, grown};
 use super::library::{Candidate, Library};
+use super::look::{Level, looks};
 use super::row::{ModelRow, OwnTable};
 use super::slot::{Prepared, evidence, gate_action, search};
 use super::source::SlotSource;

@@ -3,9 +3,9 @@
 //! In: the rows of a run and its library. Out: [`Shared`]: coverage over K with bounds, the choice, and the comparison with one table for all,
 //! a table for each slot, and groups tuned together. A slot counts as served only by a table that is proven in it.
 
-use super::cluster::{looks, nearest};
 use super::cover::{Choice, Collect};
 use super::library::{Candidate, Library};
+use super::look::{looks, nearest};
 use super::row::{SlotRow, Verdict};
 use super::store_run::Part;
 use super::{Context, FleetError, Store};

@@ -4,8 +4,8 @@
 //! it out, on whichever thread, in whichever order. What goes wrong with a slot is written into its row.
 
 use super::certified::certified;
-use super::cluster::looks;
 use super::library::Library;
+use super::look::looks;
 use super::prove::prove;
 use super::ready::{Quick, Ready};
 use super::row::{GateRow, ModelRow, OwnTable, Serves, SlotRow, Verdict, Way};

@@ -26,6 +26,7 @@ mod measured;
 mod model_grid;
 mod nyquist;
 mod open_loop;
+mod piece;
 mod poles;
 mod pull;
 mod refine;

@@ -4,8 +4,8 @@
 //! shares of the sample rate; the top and the sides of every mode; then intervals are halved until the cubic in ln w that the ends draw
 //! meets ln P within [`ERROR`]. Sections are computed exactly between points, so that filters ask for no points of their own.
 
-use super::sampled::{Piece, with_slope};
-use crate::lti::DiscretePlant;
+use super::piece::Piece;
+use crate::lti::{DiscretePlant, FrequencyResponse};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
@@ -107,4 +107,10 @@ impl Grid {
             self.push(right);
         }
     }
+}
+
+/// The plant and d ln P / d ln w at `w` by a central difference, up to half the sample rate, where a step back is taken.
+pub(super) fn with_slope(plant: &DiscretePlant, w: f64) -> (Complex<f64>, Complex<f64>) {
+    let h = 1e-5;
+    (plant.at(w), (plant.at(w * (1.0 + h)) / plant.at(w * (1.0 - h))).ln() / (2.0 * h))
 }

@@ -4,7 +4,8 @@
 //! points: the sections exactly, ln P as a cubic in ln w (from its own slopes for a model, through four neighbours for a sweep). What is
 //! read off stands in [`super::judge`]; spec: `specs/tuning.md`.
 
-use crate::lti::{DiscretePlant, FrequencyResponse, Section};
+use super::piece::Piece;
+use crate::lti::{DiscretePlant, Section};
 use crate::numeric::wide::{Wide, widest};
 use nalgebra::Complex;
 
@@ -13,26 +14,6 @@ use super::{Event, QuickMargins};
 
 /// Numbers handled side by side.
 pub(super) const LANES: usize = 8;
-
-/// ln P over one interval: its change, and its slopes in ln w at both ends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Piece {
-    pub step: Complex<f64>,
-    pub left: Complex<f64>,
-    pub right: Complex<f64>,
-}
-
-impl Piece {
-    /// Value above the left end, and slope, at the share `t` of an interval `h` long.
-    #[inline]
-    pub fn at(&self, t: f64, h: f64) -> (Complex<f64>, Complex<f64>) {
-        let (t2, r) = (t * t, 1.0 - t);
-        let value = self.step * (t2 * (3.0 - 2.0 * t)) + (self.left * (t * r * r) - self.right * (t2 * r)) * h;
-        let slope =
-            self.step * (6.0 * t * r / h) + self.left * (r * (1.0 - 3.0 * t)) + self.right * (t * (3.0 * t - 2.0));
-        (value, slope)
-    }
-}
 
 /// A plant's response on a fixed ascending grid, each quantity in an array of its own.
 #[derive(Clone, Debug, PartialEq)]
@@ -327,10 +308,4 @@ fn pieces(x: &[f64], value: &[Complex<f64>]) -> Vec<Piece> {
             Piece { step: step(i), left: slope(x[i]), right: slope(x[right]) }
         })
         .collect()
-}
-
-/// The plant and d ln P / d ln w at `w` by a central difference, up to half the sample rate, where a step back is taken.
-pub(super) fn with_slope(plant: &DiscretePlant, w: f64) -> (Complex<f64>, Complex<f64>) {
-    let h = 1e-5;
-    (plant.at(w), (plant.at(w * (1.0 + h)) / plant.at(w * (1.0 - h))).ln() / (2.0 * h))
 }

@@ -3,7 +3,7 @@
 //! In: nothing. Out: [`FrfError`]. Spec: `specs/frf.md`.
 
 use super::causality::Evidence;
-use super::dead::{Channel, Dead};
+use super::channel::{Channel, Dead};
 use super::response::FrfShapeError;
 use super::settings::Measured;
 use crate::document::size_limits::quoted;

@@ -6,6 +6,7 @@
 mod algebra;
 mod bytes;
 mod causality;
+mod channel;
 mod closed_loop;
 mod columns;
 mod dead;
@@ -34,8 +35,8 @@ mod write;
 
 pub use algebra::{feedback, product, ratio};
 pub use causality::{Evidence, Misfit, Reading};
+pub use channel::{Channel, Dead};
 pub use closed_loop::{Opened, open_loop, scatter};
-pub use dead::{Channel, Dead};
 pub use error::{Doubt, FrfError, NotText, Question};
 pub use estimate::{Estimate, PeriodicSettings, SegmentSettings, periodic, segments};
 pub use gather::{GATHERED_ABOVE, Gathered, gathered};

@@ -12,6 +12,7 @@ mod finish;
 mod groups;
 mod growth;
 mod held_out;
+mod interval;
 mod ladder;
 mod near;
 mod noise;
@@ -26,7 +27,8 @@ mod trust;
 
 pub use error::IdentifyError;
 pub use finish::identify;
+pub use interval::{Interval, Intervals, ModeIntervals};
 pub use near::{Near, identify_near};
-pub use result::{BodyEvidence, HeldOut, Identified, Interval, Intervals, LadderRung, ModeIntervals, Work};
+pub use result::{BodyEvidence, HeldOut, Identified, LadderRung, Work};
 pub use settings::{BodyChoice, Hold, IdentifySettings, OrderChoice, ZeroSide};
 pub use trust::{BandEdge, BandReason, TrustedBand};

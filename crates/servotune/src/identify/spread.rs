@@ -3,7 +3,7 @@
 //! In: the factors of the Jacobian at the solution and the residuals. Out: intervals and plants.
 //! Covariance = factor (JᵀJ)⁻¹, factor = reduced chi square x correlation inflation.
 
-use super::result::{Interval, Intervals, ModeIntervals};
+use super::interval::{Interval, Intervals, ModeIntervals};
 use super::shape::{BodyForm, Shape};
 use crate::lti::Plant;
 use crate::numeric::random::Random;

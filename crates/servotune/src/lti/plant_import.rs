@@ -4,7 +4,8 @@
 //! Spec: `specs/files.md`, "Plants of other programs".
 
 use super::PlantFile;
-use super::script::{Call, Cell, Language, names};
+use super::script::{Call, Cell, names};
+use super::script_words::Language;
 use crate::document::DocumentError;
 use serde_json::{Map, Value, json};
 use std::path::Path;

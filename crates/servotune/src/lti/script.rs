@@ -3,15 +3,9 @@
 //! In: text. Out: the names assigned, in order. Nothing is run: what is not a number, a matrix or one of these calls is refused with its place.
 //! Spec: `specs/files.md`, "Plants of other programs".
 
+use super::script_words::{Language, Misread};
 use super::script_words::{Place, Token, tokens};
 use nalgebra::Complex;
-
-/// Whose text it is: they differ in comments, in what separates the elements of a row, and in strings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Language {
-    Matlab,
-    Python,
-}
 
 /// A value.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,14 +24,6 @@ pub(super) struct Call {
     pub given: Vec<Cell>,
     /// `'InputDelay', 1e-4` or `dt=0.1`.
     pub named: Vec<(String, Cell)>,
-}
-
-/// What stands where something else should.
-#[derive(Debug)]
-pub(super) struct Misread {
-    pub place: Place,
-    pub found: String,
-    pub expected: &'static str,
 }
 
 /// Deepest nesting of brackets.

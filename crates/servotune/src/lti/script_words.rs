@@ -1,6 +1,5 @@
 //! MATLAB's and Python's text cut into words: numbers, names, strings, signs, ends of lines, each with its place.
 
-use super::script::{Language, Misread};
 use nalgebra::Complex;
 use std::fmt;
 
@@ -171,4 +170,19 @@ fn number_at(rest: &str) -> Option<(Token, usize)> {
         }
         _ => Some((Token::Number(Complex::new(value, 0.0)), end)),
     }
+}
+
+/// Whose text it is: they differ in comments, in what separates the elements of a row, and in strings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Language {
+    Matlab,
+    Python,
+}
+
+/// What stands where something else should.
+#[derive(Debug)]
+pub(super) struct Misread {
+    pub place: Place,
+    pub found: String,
+    pub expected: &'static str,
 }

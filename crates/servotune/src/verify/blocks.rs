@@ -1,9 +1,8 @@
 //! A plant with roots of any kind as a chain of blocks of first and second order, for the write.
 //!
-//! In: a plant whose body is rational. Out: [`Cascade`]. Each block is up/down of degree 1 or 2; one of equal degrees hands its input on, the last ones
+//! In: a plant whose body is rational. Out: the rates and the output of a cascade. Each block is up/down of degree 1 or 2; one of equal degrees hands its input on, the last ones
 //! do not. States of a second-order block are w/q and s/q, w² the size of its last coefficient, so that all are of one size.
 
-use super::cascade::Cascade;
 use crate::lti::{Plant, Rational};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -61,7 +60,8 @@ impl Chain {
         Chain { blocks, gain: p.resonance_gain * r.gain }
     }
 
-    pub fn cascade(&self) -> Cascade {
+    /// [[A, B], [0, 0]] and C.
+    pub fn cascade(&self) -> (DMatrix<f64>, DVector<f64>) {
         let n: usize = self.blocks.iter().map(|b| b.down.len() - 1).sum();
         let mut rates = DMatrix::zeros(n + 1, n + 1);
         // What enters the present block: a row over the states before, and over the input.
@@ -102,7 +102,7 @@ impl Chain {
             at += degree;
         }
         let output = DVector::from_fn(n, |j, _| gain * entering[j]);
-        Cascade { rates, output }
+        (rates, output)
     }
 }
 
@@ -111,6 +111,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::lti::{Body, FrequencyResponse, Mode};
+    use crate::verify::cascade::Cascade;
 
     #[test]
     fn the_chain_has_the_plants_response() {

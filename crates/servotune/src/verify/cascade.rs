@@ -21,7 +21,8 @@ impl Cascade {
     pub fn of(p: &Plant) -> Cascade {
         let p = &p.paired();
         if let Body::Rational(r) = &p.body {
-            return Chain::of(p, r).cascade();
+            let (rates, output) = Chain::of(p, r).cascade();
+            return Cascade { rates, output };
         }
         let n = 2 * (p.modes.len() + 1);
         let mut rates = DMatrix::zeros(n + 1, n + 1);

@@ -3,7 +3,7 @@
 //! In: the table, the sections that the firmware holds, a plant or a sweep. Out: [`CaseProof`] with findings. Spec: `specs/certificate.md`.
 
 use super::bounds::{Bounded, Bounds, Stability};
-use super::certificate::CaseProof;
+use super::case_proof::CaseProof;
 use super::prove::prove;
 use super::proven_limits::{Known, Magnitudes, proven_limits};
 use super::step_box::Members;

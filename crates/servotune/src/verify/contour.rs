@@ -4,7 +4,8 @@
 //! the contour integral up to what has turned round once, which [`Contour::wrapped`] bounds (`specs/certificate.md`).
 
 use super::moves::size;
-use super::write::{Clock, draws, forward, reference};
+use super::write::{draws, forward, reference};
+use super::write_record::Clock;
 use crate::controller::Controller;
 use crate::lti::Section;
 use crate::numeric::spectrum;

@@ -3,10 +3,11 @@
 //! They move the loop at low frequencies, where the write is largest, so that a rest of the second order in absolute values would be far from what
 //! happens; theirs is of the third.
 
+use super::Range;
+use super::cut::Cut;
 use super::family::{DELAY, Family, GAIN, PAIRS, share};
+use super::moves::Pair;
 use super::moves::{Shares, size};
-use super::spectrum_box::Cut;
-use super::{Range, moves::Pair};
 use nalgebra::Complex;
 
 /// Which factors are in the core, and their half widths.

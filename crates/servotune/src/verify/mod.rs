@@ -9,12 +9,14 @@ mod blocks;
 mod bounds;
 mod cascade;
 mod case;
+mod case_proof;
 mod certificate;
 mod chain;
 mod clusters;
 mod contour;
 mod core_moves;
 mod curve;
+mod cut;
 mod error;
 mod expansion;
 mod family;
@@ -42,12 +44,12 @@ mod word;
 mod write;
 mod write_box;
 mod write_piece;
+mod write_record;
 
 pub use assured::{Assurance, Assured, Ground, Watched, tune_assured};
 pub use bounds::{Bounded, Bounds, ProvenCrossing, Stability};
-pub use certificate::{
-    CaseProof, Certificate, Inputs, ProvenLimit, SCHEMA, Source, Verdict, certify, certify_watched, choices,
-};
+pub use case_proof::{CaseProof, ProvenLimit, Verdict};
+pub use certificate::{Certificate, Inputs, SCHEMA, Source, certify, certify_watched, choices};
 pub use error::VerifyError;
 pub use range::Range;
 pub use settings::VerifySettings;

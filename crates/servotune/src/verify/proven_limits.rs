@@ -5,7 +5,7 @@
 
 use super::VerifySettings;
 use super::bounds::{Bounded, Bounds, ProvenCrossing, Stability};
-use super::certificate::{ProvenLimit, Verdict};
+use super::case_proof::{ProvenLimit, Verdict};
 use super::curve::{bound_bandwidth, bound_curve};
 use super::model::Enclosed;
 use super::write::WriteFigures;

@@ -5,7 +5,7 @@
 //! for each place where a residual enters (Higham, Accuracy and Stability of Numerical Algorithms, 3.1 and 3.5; `specs/certificate.md`).
 
 use super::cascade::Loop;
-use super::write::{Clock, Record};
+use super::write_record::{Clock, Record};
 use crate::controller::Controller;
 use crate::pes::Profile;
 use nalgebra::DVector;

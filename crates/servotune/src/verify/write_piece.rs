@@ -4,9 +4,10 @@
 //! each piece; pieces of different pairs never meet, so their number adds and does not multiply.
 
 use super::contour::{Contour, Task};
+use super::cut::Cut;
 use super::family::{Family, PAIRS, Ranges};
 use super::moves::size;
-use super::spectrum_box::{Beside, Cut, OnCircle};
+use super::spectrum_box::{Beside, OnCircle};
 use super::write::{Bands, bin, simulate};
 use nalgebra::Complex;
 
