@@ -96,8 +96,8 @@ def main() -> None:
     w = a.parse_args()
     os.environ.setdefault("RAYON_NUM_THREADS", "1")
     outcomes = json.loads((w.folder / "runs" / f"{w.tables}.json").read_text())
-    names = sorted(o["id"] for o in outcomes if o["verdict"] == "tuned")[: w.count]
-    refused = Counter(o["verdict"] for o in outcomes if o["verdict"] != "tuned")
+    names = sorted(o["id"] for o in outcomes if o.get("verdict") == "tuned")[: w.count]
+    refused = Counter(o.get("verdict", "stopped after 300 s") for o in outcomes if o.get("verdict") != "tuned")
     with ThreadPoolExecutor(2) as pool:
         rows = list(
             pool.map(lambda n: verify(w.program, w.folder, n, w.folder / "tables" / w.tables / f"{n}.toml"), names)

@@ -27,7 +27,14 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
     let gains = found.map_or(start, |t| &t.gains);
     let proved = found.map_or(current, |t: &OwnTable| &t.proved);
     let machine = Machine::Response { frf: &frf, hold: context.hold, continuation: Some(&plant) };
-    let work = Work { route: Route::Response, starts: 0, evaluations: 0, feasible_starts: 0, back_offs: 0 };
+    let work = Work {
+        route: Route::Response,
+        starts: 0,
+        evaluations: 0,
+        feasible_starts: 0,
+        back_offs: 0,
+        filter_searched: false,
+    };
     let outcome = Outcome::Tuned(Tuned {
         controller: gains.clone(),
         before: Some(vec![judge(&machine, start, &context.spec)?]),

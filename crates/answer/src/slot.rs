@@ -168,12 +168,20 @@ pub fn verdict(outcome: &Outcome) -> (Verdict, String) {
                 Outcome::Tuned(_) => "Every limit is met",
                 _ => "Every limit is met, but not with the room that `guard` asks for",
             };
+            let filter = if t.work.filter_searched {
+                " The derivative's filter was searched: no table with 0.3 sample times was found."
+            } else {
+                ""
+            };
             if t.at_bounds.is_empty() {
                 let verdict = if held.len() > 20 { Verdict::Warn } else { Verdict::Ok };
-                return (verdict, format!("{held}."));
+                return (verdict, format!("{held}.{filter}"));
             }
             let names: Vec<String> = t.at_bounds.iter().map(|b| b.parameter.to_string()).collect();
-            (Verdict::Warn, format!("{held}. Search bounds set {}: widening them may do better.", names.join(", ")))
+            (
+                Verdict::Warn,
+                format!("{held}. Search bounds set {}: widening them may do better.{filter}", names.join(", ")),
+            )
         }
         Outcome::Infeasible(i) => {
             let names: Vec<String> = i.conflicts.iter().map(|c| c.what.to_string()).collect();

@@ -192,7 +192,7 @@ impl<'a> Ending<'a> {
         let share = after.iter().map(|p| p.judged.worst()).fold(0.0, f64::max);
         let objective = Reached { name: problem.minimise, value: f64::NAN, starts: 0, starts_at_best: 0 };
         let route = self.machines[0].route();
-        let work = Work { route, starts: 0, evaluations: 0, feasible_starts: 0, back_offs: 0 };
+        let work = Work { route, starts: 0, evaluations: 0, feasible_starts: 0, back_offs: 0, filter_searched: false };
         Ok(Infeasible {
             controller: problem.parameters.controller(&x),
             before: None,

@@ -117,6 +117,8 @@ pub struct Work {
     pub feasible_starts: usize,
     /// Rounds in which the exact judgement moved a limit inside.
     pub back_offs: usize,
+    /// Whether the derivative's filter was searched, which nobody had said, because no table with the usual one met the limits.
+    pub filter_searched: bool,
 }
 
 impl Outcome {

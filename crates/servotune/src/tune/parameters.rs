@@ -67,8 +67,10 @@ pub const NOTCH_POLE_DAMPING: [f64; 2] = [0.05, 1.0];
 /// Range of a peak filter's height (gain at its centre) and of its pole damping.
 const PEAK_HEIGHT: [f64; 2] = [1.0, 30.0];
 const PEAK_POLE_DAMPING: [f64; 2] = [0.002, 0.1];
-/// Derivative filter where neither start controller nor spec names one, as a share of the sample time; the range of a lead's.
+/// Derivative filter where neither start controller nor spec names one, in sample times; the range of a PID's where that one meets no
+/// limit set, and of a lead's.
 const DERIVATIVE_FILTER: f64 = 0.3;
+pub(super) const PID_FILTER: [f64; 2] = [0.1, 10.0];
 const LEAD_FILTER: [f64; 2] = [0.1, 100.0];
 /// Damping of a low-pass where no start controller names one.
 pub const LOWPASS_DAMPING: f64 = 0.7;

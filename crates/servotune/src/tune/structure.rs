@@ -38,7 +38,8 @@ pub enum Setting {
 pub struct Structure {
     /// Kind.
     pub controller: Kind,
-    /// Time constant of the derivative filter (s); without it the start controller's, else 0.3 of the sample time.
+    /// Time constant of the derivative filter (s); without it the start controller's, else 0.3 of the sample time,
+    /// and searched where that meets no limit set.
     pub derivative_filter_s: Option<Setting>,
     /// Peak filters (a notch upside down) at the strongest run-out orders of the profile, 0 to 3.
     pub peaks: usize,

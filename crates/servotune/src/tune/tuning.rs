@@ -8,9 +8,11 @@ use super::judge::{judged, lasting_objective};
 use super::loop_rows::FAR_CROSSING_OF_COMPROMISE;
 use super::neighbours::{BETTER, spread};
 use super::outcome::{Outcome, Reached, Tuned, Work};
+use super::parameters::PID_FILTER;
 use super::polish::{Goal, polish};
 use super::score::UNSTABLE;
 use super::search::search;
+use super::structure::{Kind, Setting};
 use super::{Machine, Minimise, Parameters, Proof, SearchWatch, Spec, TuneError, TuningProblem, unwatched};
 use crate::controller::Controller;
 
@@ -124,7 +126,35 @@ pub fn tune_watched(
 /// Rounds of feed-forward and feedback in turn.
 const FORWARD_ROUNDS: usize = 2;
 
+/// Tunes the feedback. Where nobody says the filter of a PID's derivative, "infeasible" is said only after that was searched as well.
 fn tune_feedback(
+    machines: &[Machine<'_>],
+    spec: &Spec,
+    start: Option<&Controller>,
+    near: &[Controller],
+    settings: &TuneSettings,
+    watch: &SearchWatch<'_>,
+) -> Result<Outcome, TuneError> {
+    let outcome = tune_as_said(machines, spec, start, near, settings, watch)?;
+    let said = start.is_some() || spec.structure.controller != Kind::Pid;
+    let Outcome::Infeasible(missed) = &outcome else { return Ok(outcome) };
+    if said || spec.structure.derivative_filter_s.is_some() {
+        return Ok(outcome);
+    }
+    let mut free = spec.clone();
+    let t = missed.controller.sample_time_s;
+    free.structure.derivative_filter_s = Some(Setting::Range(PID_FILTER.map(|share| share * t)));
+    let near: Vec<Controller> = near.iter().chain([&missed.controller]).cloned().collect();
+    let mut searched = tune_as_said(machines, &free, start, &near, settings, watch)?;
+    match &mut searched {
+        Outcome::Infeasible(other) if other.share >= missed.share => return Ok(outcome),
+        Outcome::Infeasible(other) => other.work.filter_searched = true,
+        Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => t.work.filter_searched = true,
+    }
+    Ok(searched)
+}
+
+fn tune_as_said(
     machines: &[Machine<'_>],
     spec: &Spec,
     start: Option<&Controller>,
@@ -196,6 +226,7 @@ fn tune_feedback(
         evaluations: found.evaluations + ending.evaluations,
         feasible_starts: found.feasible_starts,
         back_offs: ending.back_offs,
+        filter_searched: false,
     };
     let reached = |problem: &TuningProblem, x: &[f64], after: &[Proof]| {
         let score = problem.score(x, &mut problem.work());
