@@ -13,12 +13,13 @@ use servotune::tune::{GainTable, Hold, Judged, Machine, Outcome, PhysicalTuning,
 use servotune_report::identified::{
     identified_figure, identified_sentences, ladder_table, order_table, parameter_table,
 };
+use servotune_report::loop_view::LoopView;
 use servotune_report::margins::interval_table;
 use servotune_report::page::{Block, Page, Section};
 use servotune_report::physical::{PriceView, amplitude_table, limit_cycle_sentences, price_table};
 use servotune_report::routes::{RouteView, routes_table};
 use servotune_report::sampled::sampled_table;
-use servotune_report::slot::{LoopView, SlotView, slot_page};
+use servotune_report::slot::{SlotView, slot_page};
 use servotune_report::table::Verdict;
 use servotune_report::tuned::{Units, conflicts_table, gains_table, sections_table};
 use std::f64::consts::TAU;

@@ -4,36 +4,12 @@
 //! A slot whose files are broken is loaded all the same, with what is wrong with it.
 
 use super::settings::Input;
+use super::slot_files::{CELSIUS, EXPECTED_CELSIUS, SlotFiles, SlotName};
 use super::{FleetError, table_source};
 use servotune::controller::Controller;
-use servotune::document::{check_name, parse_toml, printable, read_text, sha256_hex};
+use servotune::document::{parse_toml, printable, read_text, sha256_hex};
 use servotune::gate::features::{RawMachine, read_files};
 use std::path::{Path, PathBuf};
-
-/// Name of a slot.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct SlotName {
-    /// Its tester.
-    pub tester: String,
-    /// Its place in the tester.
-    pub slot: String,
-}
-
-impl SlotName {
-    /// Both in one word, `T001/S01`.
-    pub fn id(&self) -> String {
-        format!("{}/{}", self.tester, self.slot)
-    }
-
-    /// Holds both to the alphabet of names.
-    pub fn check(&self) -> Result<(), FleetError> {
-        let named = |what: &str, name: &str| {
-            check_name(name).map_err(|source| FleetError::Name { what: what.to_owned(), source })
-        };
-        named("tester", &self.tester)?;
-        named("slot", &self.slot)
-    }
-}
 
 /// One slot as loaded.
 #[derive(Clone, Debug, Default)]
@@ -62,20 +38,6 @@ pub trait SlotSource: Sync {
     fn load(&self, index: usize) -> Loaded;
 }
 
-/// The files of one slot.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct SlotFiles {
-    pub response: PathBuf,
-    pub pes: PathBuf,
-    pub log: PathBuf,
-    /// The gains in the slot, and whether their absence is an error.
-    pub controller: PathBuf,
-    pub controller_named: bool,
-    pub temperature_c: Option<f64>,
-    /// What is wrong with the slot's place in the input; then none of its files is read.
-    pub refused: Option<String>,
-}
-
 /// Slots in files.
 #[derive(Clone, Debug)]
 pub struct FileSource {
@@ -85,16 +47,12 @@ pub struct FileSource {
 /// Keys of a log that hold the temperature while the slot was measured (deg C), the first that is there.
 const TEMPERATURE: [&str; 2] = ["base_temperature_c", "temperature_c"];
 
-/// Temperatures of a base that are taken (deg C), and how that is said.
-pub(super) const CELSIUS: std::ops::RangeInclusive<f64> = -100.0..=200.0;
-pub(super) const EXPECTED_CELSIUS: &str = "degrees Celsius from -100 to 200";
-
 impl FileSource {
     /// The slots of a FLEET.toml's input; made-up ones are refused, the command line draws them.
     pub fn of(file: &Path, input: &Input) -> Result<FileSource, FleetError> {
         match (&input.tree, &input.table) {
             (Some(tree), _) => FileSource::tree(tree),
-            (_, Some(table)) => table_source::read(table),
+            (_, Some(table)) => Ok(FileSource { slots: table_source::read(table)? }),
             _ => Err(FleetError::TwinHere { file: file.into() }),
         }
     }
@@ -121,33 +79,6 @@ impl FileSource {
             return Err(FleetError::NoSlot { folder: folder.into() });
         }
         Ok(FileSource { slots })
-    }
-}
-
-impl SlotFiles {
-    /// A slot that is a row and nothing else: its name stands outside the alphabet of names, so that it is no other slot's and no path.
-    pub(super) fn refused(index: usize, why: String) -> (SlotName, SlotFiles) {
-        let name = SlotName { tester: "?".into(), slot: format!("input {}", index + 1) };
-        (name, SlotFiles { refused: Some(why), ..SlotFiles::default() })
-    }
-
-    /// What is no file to be read: a device, a pipe or a folder in its place.
-    fn irregular(&self) -> Vec<String> {
-        let files = [&self.response, &self.pes, &self.log, &self.controller];
-        let there = |f: &&&PathBuf| f.metadata().is_ok_and(|m| !m.is_file());
-        let words = |f: &PathBuf| format!("{}: found a folder, a pipe or a device; expected a file", f.display());
-        files.iter().filter(there).map(|f| words(f)).collect()
-    }
-
-    pub(super) fn in_folder(folder: &Path) -> SlotFiles {
-        SlotFiles {
-            response: folder.join("response.bod"),
-            pes: folder.join("pes.csv"),
-            log: folder.join("log.toml"),
-            controller: folder.join("controller.toml"),
-            controller_named: false,
-            ..SlotFiles::default()
-        }
     }
 }
 

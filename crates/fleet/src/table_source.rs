@@ -4,7 +4,7 @@
 //! Paths are relative to the table's folder; an empty field is absent. A Parquet table has the same columns.
 
 use super::FleetError;
-use super::source::{CELSIUS, EXPECTED_CELSIUS, FileSource, SlotFiles, SlotName};
+use super::slot_files::{CELSIUS, EXPECTED_CELSIUS, SlotFiles, SlotName};
 use servotune::document::size_limits::cut;
 use servotune::document::{printable, read_table};
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use std::path::Path;
 const NEEDED: [&str; 4] = ["tester", "slot", "response", "pes"];
 
 /// Reads a table of slots, in its own order.
-pub(super) fn read(file: &Path) -> Result<FileSource, FleetError> {
+pub(super) fn read(file: &Path) -> Result<Vec<(SlotName, SlotFiles)>, FleetError> {
     let parquet = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
     let (header, rows) = if parquet { parquet_rows(file)? } else { csv_rows(file)? };
     of_rows(file, &header, rows)
@@ -54,7 +54,7 @@ fn temperature_c(field: &str) -> Result<Option<f64>, String> {
     }
 }
 
-fn of_rows(file: &Path, header: &[String], rows: Vec<Vec<String>>) -> Result<FileSource, FleetError> {
+fn of_rows(file: &Path, header: &[String], rows: Vec<Vec<String>>) -> Result<Vec<(SlotName, SlotFiles)>, FleetError> {
     let place = |name: &str| header.iter().position(|h| h == name);
     for column in NEEDED {
         if place(column).is_none() {
@@ -99,5 +99,5 @@ fn of_rows(file: &Path, header: &[String], rows: Vec<Vec<String>>) -> Result<Fil
     if slots.is_empty() {
         return Err(FleetError::NoSlot { folder: file.into() });
     }
-    Ok(FileSource { slots })
+    Ok(slots)
 }

@@ -32,6 +32,7 @@ mod motor;
 pub mod mutation;
 mod plants;
 mod prediction;
+mod reached;
 mod reader_mutations;
 mod readers;
 mod recordings;
@@ -58,7 +59,8 @@ pub use mismatch::mismatch;
 pub use motor::motor;
 pub use plants::plants;
 pub use prediction::prediction;
-pub use reader_mutations::{Reached, Tally, reader_mutations};
+pub use reached::Reached;
+pub use reader_mutations::{Tally, reader_mutations};
 pub use recordings::recordings;
 pub use reliability_readers::readers;
 

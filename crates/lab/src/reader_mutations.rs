@@ -5,22 +5,12 @@
 
 use super::StudyError;
 use super::mutation::mutate;
+use super::reached::Reached;
 use super::readers::{Files, Reader, readers};
 use servotune::numeric::random::Random;
 use std::path::Path;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
-
-/// What a reader, and what stands behind it, made of a changed file.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Reached {
-    /// Read, and judged where that could be.
-    Accepted,
-    /// Refused with this message.
-    Refused(String),
-    /// Accepted, and it must not be: why.
-    Wrong(String),
-}
 
 /// Counts of one reader.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -4,7 +4,7 @@
 //! a changed table must not be proved beside its certificate, an identified plant must be one.
 
 use super::StudyError;
-use super::reader_mutations::Reached;
+use super::reached::Reached;
 use servotune::controller::Controller;
 use servotune::document::parse_toml;
 use servotune::feedback::{LoopVerdict, MeasuredLoop, ModelLoop, confirmed_margins, measured_margins};

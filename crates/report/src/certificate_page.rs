@@ -8,6 +8,7 @@ use super::certificate::{certificate_sentence, open_reason, proven_columns, sent
 use super::limit_cards::first_upper;
 use super::number::{MISSING, NumberFormat, typographic};
 use super::page::{Block, Card, Page, Section};
+use super::proven_limit::{name, word};
 use super::proven_room::{room, room_figure};
 use super::table::{Cell, Column, Table, Verdict};
 use super::tuned::Units;
@@ -86,15 +87,6 @@ fn machine_name(v: &CertificateView<'_>, i: usize) -> String {
     v.machines.get(i).cloned().unwrap_or_else(digest)
 }
 
-/// The verdict on one limit in a word, with its colour.
-pub(super) fn word(p: Proven) -> (Verdict, &'static str) {
-    match p {
-        Proven::Proved => (Verdict::Ok, "proved"),
-        Proven::Violated => (Verdict::Fail, "violated"),
-        Proven::NotProved => (Verdict::Warn, "not proved"),
-    }
-}
-
 /// A certificate keeps the field of the plant file in which the unit stands.
 fn unit<'a>(v: &CertificateView<'a>, unit: &'a str) -> &'a str {
     match unit {
@@ -107,13 +99,6 @@ fn unit<'a>(v: &CertificateView<'a>, unit: &'a str) -> &'a str {
 fn required(l: &ProvenLimit) -> String {
     let side = if l.side == "at_least" { "at least" } else { "at most" };
     format!("{side} {}", typographic(&l.required.to_string()))
-}
-
-/// Its name, with the side where both sides of one figure are limited.
-pub(super) fn name(case: &CaseProof, l: &ProvenLimit) -> String {
-    let twice = case.limits.iter().filter(|other| other.name == l.name).count() > 1;
-    let side = if l.side == "at_least" { "lowest" } else { "highest" };
-    if twice { format!("{}, {side}", l.name) } else { l.name.clone() }
 }
 
 fn cards(v: &CertificateView<'_>, verdict: Verdict) -> Vec<Card> {

@@ -8,67 +8,14 @@ use super::diagnosis_curve::curve_section;
 use super::diagnosis_error::{error_figure, spectrum_figure};
 use super::diagnosis_law::{amplitude_figure, law_figures, unexplained_figure};
 use super::diagnosis_place::{Map, time_map, zone_map};
+use super::diagnosis_shown::{Shown, figures, short, words};
 use super::diagnosis_tables::{confirmed_table, log_blocks, noise_table, records_table, search_blocks, where_table};
 use super::number::NumberFormat;
 use super::page::{Block, Card, Page, Section};
 use super::table::{Cell, Column, Table, Verdict as Badge};
 use super::{Figure, ReportError};
-use servotune::diagnose::{Diagnosed, Finding, FitFigures, Simulation, Verdict};
+use servotune::diagnose::{Diagnosed, Finding, Simulation, Verdict};
 use servotune::physics::facts;
-
-/// What all parts of the page share.
-pub(super) struct Shown<'a> {
-    /// The diagnosis with its ground.
-    pub made: &'a Diagnosed,
-    /// position_unit.
-    pub position: &'a str,
-    /// command_unit.
-    pub command: &'a str,
-    /// Index of the run that is drawn before and after.
-    pub run: usize,
-}
-
-impl Shown<'_> {
-    /// Noise floor of one record (position_unit rms): of the hold-out records where there are any.
-    pub fn floor(&self) -> f64 {
-        figures(self.made).noise_floor
-    }
-
-    /// Sample time (s).
-    pub fn sample_time_s(&self) -> f64 {
-        self.made.bench.scene.sample_time_s
-    }
-
-    /// Whether the laws in the model are findings; otherwise they are only the nearest ones.
-    pub fn named(&self) -> bool {
-        self.made.diagnosis.verdict != Verdict::LocatedUnexplained
-    }
-
-    /// Names of the three models: as given, refitted, with the findings.
-    pub fn models(&self) -> [&'static str; 3] {
-        let last = match (self.named(), &self.made.diagnosis.free_form) {
-            (true, _) => "with findings",
-            (false, Some(_)) => "with the curve",
-            (false, None) => "best model tried",
-        };
-        ["model as given", "linear refit", last]
-    }
-}
-
-/// The figures that count: of the hold-out records, else of the fit records.
-fn figures(made: &Diagnosed) -> &FitFigures {
-    made.diagnosis.fit.holdout.as_ref().unwrap_or(&made.diagnosis.fit.fit)
-}
-
-/// A name from the list of effects, as words.
-pub(super) fn words(effect: &str) -> String {
-    effect.replace('_', " ")
-}
-
-/// Three digits, for sentences.
-pub(super) fn short(value: f64) -> String {
-    NumberFormat::Significant(3).page(value)
-}
 
 /// The record to draw: the hold-out record that the given model misses most, else the fit record.
 fn drawn(made: &Diagnosed) -> usize {

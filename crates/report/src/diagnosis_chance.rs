@@ -3,7 +3,7 @@
 //! In: a diagnosis. Out: the bootstrap's draws beside the records themselves, and a sentence on what is left. Spec: `specs/mismatch.md`.
 
 use super::ReportError;
-use super::diagnosis::{Shown, short, words};
+use super::diagnosis_shown::{Shown, short, words};
 use super::figure::{Axis, Figure, Ink, RuleLine};
 use super::histogram::{Group, histogram};
 use super::page::Block;

@@ -4,7 +4,7 @@
 //! linear plant can hold is not in the curve. Spec: `specs/mismatch.md`, "Curves without a name".
 
 use super::ReportError;
-use super::diagnosis::short;
+use super::diagnosis_shown::short;
 use super::figure::{Axis, Figure, Ink, Kind, Panel, Series};
 use super::page::{Block, Section};
 use servotune::diagnose::{FreeForm, curve_title};

@@ -4,7 +4,7 @@
 //! drawn in. Spec: `specs/mismatch.md`.
 
 use super::ReportError;
-use super::diagnosis::Shown;
+use super::diagnosis_shown::Shown;
 use super::figure::{Axis, Figure, Ink, Kind, Panel, Scale, Series};
 use super::number::typographic;
 use super::time::{CurveKind, TimeCurve, TimePanel, time};

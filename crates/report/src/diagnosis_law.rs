@@ -4,7 +4,7 @@
 //! motion; each law on the record where it is strongest. Spec: `specs/mismatch.md`.
 
 use super::ReportError;
-use super::diagnosis::{Shown, short, words};
+use super::diagnosis_shown::{Shown, short, words};
 use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Scale, Series};
 use super::time::{CurveKind, TimeCurve, TimePanel, time};
 use servotune::diagnose::{Chosen, Trajectory};

@@ -4,8 +4,8 @@
 //! records compare; what any linear model with other numbers would explain is taken out first. Spec: `specs/mismatch.md`.
 
 use super::ReportError;
-use super::diagnosis::{Shown, words};
 use super::diagnosis_law::{added, own};
+use super::diagnosis_shown::{Shown, words};
 use super::figure::{Axis, Figure, Ink, Kind, Mark, Panel, Region, Series};
 use servotune::diagnose::Finding;
 use servotune::lti::{DiscretePlant, PlantState};

@@ -3,7 +3,7 @@
 //! In: a diagnosis. Out: tables with units. Spec: `specs/mismatch.md`.
 
 use super::ReportError;
-use super::diagnosis::{Shown, short, words};
+use super::diagnosis_shown::{Shown, short, words};
 use super::number::NumberFormat;
 use super::page::Block;
 use super::table::{Cell, Column, Table, Verdict as Badge};

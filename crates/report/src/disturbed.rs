@@ -7,7 +7,7 @@
 use super::bode::decibels;
 use super::error::ReportError;
 use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Scale, Series};
-use super::slot::LoopView;
+use super::loop_view::LoopView;
 use nalgebra::Complex;
 
 /// Decades below the largest density that are shown.

@@ -2,9 +2,11 @@
 //!
 //! In: a [`Figure`] and a [`Size`]. Out: rectangles, views and ticks in pixels. Spec: `specs/report.md`.
 
-use super::extent::{View, x_view, y_view};
+use super::extent::{x_view, y_view};
 use super::figure::{Direction, Figure, Ink, Kind, Mark, Panel};
+use super::text_width::{fitted, text_width};
 use super::ticks::{Tick, axis_ticks};
+use super::view::View;
 
 /// How large a picture is and how much fits into it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,38 +120,6 @@ pub(super) const SPACING: (f64, f64) = (62.0, 28.0);
 const RIGHT: f64 = 20.0;
 const ROW: f64 = 20.0;
 const WORD_ROW: f64 = 14.0;
-
-/// Estimated width of a text (px), rather too wide than too narrow, since the reader's font is not known.
-pub(super) fn text_width(text: &str, font_px: f64) -> f64 {
-    let em: f64 = text
-        .chars()
-        .map(|c| match c {
-            'i' | 'j' | 'l' | '.' | ',' | ':' | ';' | '|' | '\'' | '(' | ')' | '[' | ']' | ' ' | 't' | 'f' => 0.36,
-            'm' | 'w' | 'M' | 'W' => 0.92,
-            'A'..='Z' => 0.7,
-            _ => 0.61,
-        })
-        .sum();
-    em * font_px
-}
-
-/// The text, cut with an ellipsis where it is wider than the room for it (px).
-pub(super) fn fitted(text: &str, font_px: f64, room: f64) -> String {
-    if text_width(text, font_px) <= room {
-        return text.to_owned();
-    }
-    let mut cut = String::new();
-    let mut width = text_width("…", font_px);
-    for c in text.chars() {
-        width += text_width(c.encode_utf8(&mut [0; 4]), font_px);
-        if width > room {
-            break;
-        }
-        cut.push(c);
-    }
-    cut.push('…');
-    cut
-}
 
 /// Places a figure; with `title` its title stands on the picture itself.
 pub(super) fn place(figure: &Figure, size: Size, title: bool) -> Layout<'_> {

@@ -3,9 +3,10 @@
 //! In: words, tables and figures. Out: text to be written to a `.html` file. Convention: every text is escaped; the
 //! same page is the same bytes. Spec: `specs/report.md`.
 
+use super::escape::harmful;
 use super::figure::Figure;
 use super::html::{figure, script, style};
-use super::svg::{Size, harmful};
+use super::svg::Size;
 use super::table::{Table, Verdict};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

@@ -4,8 +4,8 @@
 //! where it misses it. Spec: `specs/report.md`.
 
 use super::ReportError;
-use super::certificate_page::{name, word};
 use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Series};
+use super::proven_limit::{name, word};
 use servotune::verify::{Certificate, ProvenLimit, Verdict as Proven};
 
 /// Machines drawn in one figure.

@@ -7,6 +7,7 @@ use super::bode::{BodeCurve, BodeMarks, bode};
 use super::disturbed::disturbed;
 use super::figure::{Figure, Ink, Kind, Region, Series};
 use super::limit_cards::limit_cards;
+use super::loop_view::LoopView;
 use super::margins::margins_table;
 use super::move_end::{MoveRecord, move_end};
 use super::number::{MISSING, NumberFormat};
@@ -18,34 +19,9 @@ use super::table::Verdict;
 use super::tuned::{Units, limits_table};
 use super::write::{NamedWrite, WriteView, write_blocks};
 use nalgebra::Complex;
-use servotune::feedback::{CurveSide, Magnitude, Margins};
-use servotune::pes::{ClosedLoop, PesFigures, Profile, coloured};
-use servotune::tune::{Judged, Spec};
-
-/// One controller on one machine, with all that is drawn of it.
-#[derive(Clone, Debug)]
-pub struct LoopView {
-    /// "before", "after", or a name.
-    pub name: String,
-    /// Frequencies of the curves (Hz).
-    pub hz: Vec<f64>,
-    /// L at them.
-    pub open_loop: Vec<Complex<f64>>,
-    /// The sampled plant at them.
-    pub plant: Vec<Complex<f64>>,
-    /// The controller's sample time (s).
-    pub sample_time_s: f64,
-    /// Its margins.
-    pub margins: Margins,
-    /// The write; none where the loop is unstable.
-    pub write: Option<(ClosedLoop, PesFigures)>,
-    /// Its steps; none where the loop is unstable.
-    pub steps: Option<StepResponses>,
-    /// The end of the profile's move; none where nothing is asked of it.
-    pub move_end: Option<MoveRecord>,
-    /// The limits, judged; none where there is no spec.
-    pub judged: Option<Judged>,
-}
+use servotune::feedback::{CurveSide, Magnitude};
+use servotune::pes::{Profile, coloured};
+use servotune::tune::Spec;
 
 /// What a slot's page shows.
 #[derive(Debug)]

@@ -3,10 +3,12 @@
 //! In: a figure and a [`Size`]. Out: an SVG document that stands alone, or the same picture for a page, whose script
 //! finds panels, views and legend entries in `data-` attributes. Spec: `specs/report.md`.
 
+use super::escape::escape;
 use super::figure::{Axis, Figure, Scale, Ticks};
-use super::layout::{Key, Layout, Placed, Swatch, fitted, place, text_width};
+use super::layout::{Key, Layout, Placed, Swatch, place};
 use super::marks::{draw, px};
 use super::palette::{LIGHT, class};
+use super::text_width::{fitted, text_width};
 use super::words::draw_words;
 use std::fmt::Write;
 
@@ -23,30 +25,6 @@ pub fn standalone(figure: &Figure, size: Size) -> String {
 /// The figure as an element of a page; `id` must be a word that no other element uses.
 pub(super) fn inline(figure: &Figure, size: Size, id: &str) -> String {
     render(figure, size, id, false)
-}
-
-/// Text that is safe between tags and between double quotes; characters that XML forbids become the replacement sign.
-pub fn escape(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '"' => safe.push_str("&quot;"),
-            '\'' => safe.push_str("&#39;"),
-            '\t' | '\n' | '\r' => safe.push(' '),
-            c if harmful(c) => safe.push('\u{fffd}'),
-            c => safe.push(c),
-        }
-    }
-    safe
-}
-
-/// Characters that XML forbids, that steer a terminal, or that turn the direction of the text after them.
-pub(super) fn harmful(c: char) -> bool {
-    (c.is_control() && !matches!(c, '\n' | '\t'))
-        || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{fffe}' | '\u{ffff}')
 }
 
 fn render(figure: &Figure, size: Size, id: &str, alone: bool) -> String {
@@ -108,7 +86,7 @@ fn legend_key(index: usize, key: &Key) -> String {
     )
 }
 
-fn view_data(axis: &Axis, view: &super::extent::View) -> String {
+fn view_data(axis: &Axis, view: &super::view::View) -> String {
     let scale = if axis.scale == Scale::Log10 { "log" } else { "lin" };
     let ticks = match axis.ticks {
         Ticks::Decimal => "dec",

@@ -4,8 +4,8 @@
 //! value is a dash, a flag stands in words beside its number. Spec: `specs/report.md`.
 
 use super::error::ReportError;
+use super::escape::harmful;
 use super::number::{MISSING, NumberFormat};
-use super::svg::harmful;
 use maud::{Markup, html};
 use servotune::document::size_limits::{CELL, cut};
 

@@ -4,10 +4,10 @@
 //! stretch that the reader has zoomed to. Convention: frequencies at 1, 2, 5 per decade, phases at 45, 90, ...
 //! Spec: `specs/report.md`.
 
-use super::extent::View;
 use super::figure::{Axis, Scale, Ticks};
-use super::layout::fitted;
 use super::number::typographic;
+use super::text_width::fitted;
+use super::view::View;
 
 /// One tick mark; without words it is a fine grid line.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,11 +3,12 @@
 //! In: a placed panel. Out: SVG text elements that know their place, so that zooming moves them with it.
 //! Spec: `specs/report.md`.
 
+use super::escape::escape;
 use super::figure::{Direction, Ink, Kind, Mark};
-use super::layout::{Placed, Rect, fitted, text_width};
+use super::layout::{Placed, Rect};
 use super::marks::px;
 use super::palette::class;
-use super::svg::escape;
+use super::text_width::{fitted, text_width};
 use std::fmt::Write;
 
 const FONT_PX: f64 = 11.0;

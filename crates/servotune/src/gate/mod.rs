@@ -11,6 +11,7 @@ mod calibrate;
 mod classes;
 mod clean;
 mod conformal;
+mod confusion;
 mod costs;
 mod crossfit;
 mod discriminant;
@@ -19,6 +20,7 @@ mod error;
 mod evidence;
 pub mod features;
 mod file;
+mod job;
 mod judge;
 mod member;
 mod network;
@@ -41,6 +43,7 @@ pub use calibrate::{Calibration, calibrate, calibration_error, log_loss, probabi
 pub use classes::{Action, Classes, Label, Labelled, labelled};
 pub use clean::{Cause, Removed, clean};
 pub use conformal::Conformal;
+pub use confusion::{Confusion, Confusions, accuracy, confusion};
 pub use costs::Costs;
 pub use crossfit::Fold;
 pub use discriminant::{Discriminant, discriminant};
@@ -54,8 +57,8 @@ pub use network::{Desk, Network, parameter_count, softmax};
 pub use novelty::{Novelty, Strangeness};
 pub use prepare::Ranked;
 pub use report::{
-    Baseline, CalibrationReport, Candidate, ConformalReport, Confusion, Confusions, Counts, Decisions, MissedBroken,
-    NoveltyReport, Published, TrainReport, accuracy, confusion, decisions,
+    Baseline, CalibrationReport, Candidate, ConformalReport, Counts, Decisions, MissedBroken, NoveltyReport, Published,
+    TrainReport, decisions,
 };
 pub use scale::Scale;
 pub use settings::{FitSettings, TrainSettings};

@@ -5,7 +5,7 @@
 //! by nobody before the end. Spec: `specs/gate.md`.
 
 use super::GateError;
-use super::adam::{Epoch, Fitted};
+use super::adam::Epoch;
 use super::classes::labelled;
 use super::clean::Cause;
 use super::conformal::Conformal;
@@ -13,15 +13,16 @@ use super::costs::Costs;
 use super::crossfit::crossfit;
 use super::drift::DriftReference;
 use super::evidence::Evidence;
+use super::job::Job;
 use super::judge::Gate;
 use super::member::{Member, Mix};
 use super::network::Desk;
 use super::novelty::{MOST_FEATURES, MOST_LOOKED_AT, Novelty};
 use super::parallel::each;
-use super::prepare::{PATIENCE, Prepared, learn, prepare, reach, seed_of};
-use super::report::{Baseline, Candidate, Confusions, Parts, Published, TrainReport};
+use super::prepare::{PATIENCE, prepare, reach};
+use super::report::{Baseline, Candidate, Parts, Published, TrainReport};
 use super::settings::TrainSettings;
-use super::split::{Split, folds, split};
+use super::split::{folds, split};
 use super::table::{Column, Table};
 
 /// A gate and how it was made.
@@ -35,40 +36,6 @@ pub struct Trained {
 
 /// Rows that a class needs: one in each part of the split.
 const LEAST: usize = 3;
-
-/// What every step is asked about.
-pub(super) struct Job<'a> {
-    pub table: &'a Table,
-    pub class: &'a [usize],
-    pub classes: usize,
-    pub split: &'a Split,
-    pub settings: &'a TrainSettings,
-}
-
-impl Job<'_> {
-    fn learn(
-        &self,
-        p: &Prepared<'_>,
-        hidden: &[usize],
-        settings: &TrainSettings,
-        patience: Option<usize>,
-        unit: u64,
-    ) -> Result<Fitted, GateError> {
-        let (s, seed) = (self.split, seed_of(self.settings.seed, unit));
-        learn(p, &s.train, &s.validate, self.class, self.classes, hidden, settings, patience, seed)
-    }
-
-    /// Most probable class of each row.
-    fn predict(&self, p: &Prepared<'_>, f: &Fitted, rows: &[usize]) -> Vec<usize> {
-        let mut desk = Desk::new(&f.network.sizes, self.settings.batch);
-        let z = f.network.logits(&p.scale.inputs(&p.chosen, rows), &mut desk);
-        z.chunks(self.classes).map(super::conformal::top).collect()
-    }
-
-    fn confusions(&self, p: &Prepared<'_>, f: &Fitted) -> Confusions {
-        Confusions::of(self.class, self.classes, self.split, |rows| self.predict(p, f, rows))
-    }
-}
 
 /// Trains a gate.
 pub fn train(table: &Table, settings: &TrainSettings) -> Result<Trained, GateError> {

@@ -9,10 +9,11 @@ mod log;
 mod measure;
 mod truth;
 mod unknown;
+mod unknown_kind;
 
 pub use files::{MachineFiles, machine_files};
 pub use truth::Truth;
-pub use unknown::UnknownKind;
+pub use unknown_kind::UnknownKind;
 
 pub(super) use measure::measured;
 

@@ -3,7 +3,7 @@
 //! In: a class and a random stream. Out: [`Truth`]. Severity 0 is healthy, 1 is the paper's machine of the class; between and
 //! beyond, frequencies, gains and noise go by the same ratios (`specs/gate_twin.md`).
 
-use super::unknown::UnknownKind;
+use super::unknown_kind::UnknownKind;
 use crate::controller::Controller;
 use crate::lti::{Body, Plant};
 use crate::numeric::random::Random;
@@ -86,16 +86,8 @@ impl Truth {
         Ok(truth)
     }
 
-    /// A machine of a kind that no class knows; it was healthy before.
-    pub fn unknown(kind: UnknownKind, random: &mut Random) -> Result<Truth, TwinError> {
-        let mut truth = Truth::healthy(random)?;
-        (truth.class, truth.kind) = (None, Some(kind));
-        kind.strike(&mut truth, random);
-        Ok(truth)
-    }
-
     /// A healthy machine with its own deviations.
-    fn healthy(random: &mut Random) -> Result<Truth, TwinError> {
+    pub(super) fn healthy(random: &mut Random) -> Result<Truth, TwinError> {
         let mut plant = paper_machine(MachineClass::Healthy)?;
         if let Body::SecondOrder { dc_gain, natural_frequency_rad_s, damping_ratio } = &mut plant.body {
             *dc_gain *= spread(random, SPREAD_GAIN);
