@@ -9,49 +9,13 @@ use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Scale, Series};
 use super::time::{CurveKind, TimeCurve, TimePanel, time};
 use servotune::diagnose::{Chosen, Trajectory};
 use servotune::lti::{Body, Plant};
-use servotune::physics::{COLUMNS, Effect, Entry, Sample, Scene, Setting, describing};
+use servotune::physics::{COLUMNS, Effect, Entry, Sample, Scene, Setting, ShownOver, describing};
 use std::f64::consts::TAU;
 
 /// Points of a curve that is no function of time and so is not thinned when drawn.
 const POINTS: usize = 5000;
 /// Share of the largest command below which a torque over the command says nothing.
 const ENOUGH: f64 = 0.15;
-
-/// What a law is drawn against.
-#[derive(Clone, Copy, PartialEq)]
-enum Against {
-    Position,
-    Velocity,
-    Time,
-    /// Output over input.
-    Input,
-    /// Torque per command over position.
-    FactorOverPosition,
-    /// Torque per command over time.
-    FactorOverTime,
-    /// Spindle angle.
-    Spindle,
-}
-
-fn against(name: &str) -> Against {
-    match name {
-        "aerodynamic_drag" => Against::Velocity,
-        "torque_factor_rolloff" => Against::FactorOverPosition,
-        "gain_drift" | "parametric_gain" => Against::FactorOverTime,
-        "current_saturation" | "dead_band" => Against::Input,
-        "repeatable_runout" => Against::Spindle,
-        "coulomb_friction"
-        | "pivot_friction"
-        | "bearing_bias"
-        | "cable_spring"
-        | "nonlinear_spring"
-        | "torque_ripple"
-        | "encoder_cyclic_error"
-        | "encoder_scale_error"
-        | "backlash" => Against::Position,
-        _ => Against::Time,
-    }
-}
 
 /// What an effect adds along a trajectory, strengths applied, at its place of entry.
 pub(super) fn added(
@@ -108,32 +72,32 @@ pub(super) fn law_figures(s: &Shown) -> Result<Vec<Figure>, ReportError> {
 fn law_figure(s: &Shown, c: &Chosen, segment: usize, value: &[f64]) -> Result<Figure, ReportError> {
     let (bench, facts) = (&s.made.bench, c.effect.facts());
     let motion = &bench.trajectories[segment].samples;
-    let way = against(facts.name);
+    let way = c.effect.shown_over();
     let largest = motion.iter().fold(0.0f64, |m, k| m.max(k.i.abs()));
     let (quantity, unit) = match (facts.entry, way) {
-        (_, Against::FactorOverPosition | Against::FactorOverTime) => ("Torque per command", "1"),
-        (_, Against::Input) => ("Output of the amplifier", s.command),
+        (_, ShownOver::FactorOverPosition | ShownOver::FactorOverTime) => ("Torque per command", "1"),
+        (_, ShownOver::Input) => ("Output of the amplifier", s.command),
         (Entry::Torque, _) => ("Torque added", s.command),
         (Entry::Command, _) => ("Command added", s.command),
         (Entry::Position, _) => ("Position added", s.position),
     };
     let (across, across_unit) = match way {
-        Against::Position | Against::FactorOverPosition => ("Position", s.position.to_owned()),
-        Against::Velocity => ("Velocity", format!("{}/s", s.position)),
-        Against::Time | Against::FactorOverTime => ("Time", "s".to_owned()),
-        Against::Input => ("Command", s.command.to_owned()),
-        Against::Spindle => ("Spindle angle", "deg".to_owned()),
+        ShownOver::Position | ShownOver::Loop | ShownOver::FactorOverPosition => ("Position", s.position.to_owned()),
+        ShownOver::Velocity => ("Velocity", format!("{}/s", s.position)),
+        ShownOver::Time | ShownOver::FactorOverTime => ("Time", "s".to_owned()),
+        ShownOver::Input => ("Command", s.command.to_owned()),
+        ShownOver::Spindle => ("Spindle angle", "deg".to_owned()),
     };
-    let over_time = matches!(way, Against::Time | Against::FactorOverTime);
-    let factor = matches!(way, Against::FactorOverTime | Against::FactorOverPosition);
+    let over_time = matches!(way, ShownOver::Time | ShownOver::FactorOverTime);
+    let factor = matches!(way, ShownOver::FactorOverTime | ShownOver::FactorOverPosition);
     // Every sample over time, which is thinned when drawn; else no more than the eye can use.
     let stride = if over_time { 1 } else { motion.len().div_ceil(POINTS).max(1) };
     let place = |m: &Sample| match way {
-        Against::Position | Against::FactorOverPosition => m.x,
-        Against::Velocity => m.v,
-        Against::Time | Against::FactorOverTime => m.t,
-        Against::Input => m.u,
-        Against::Spindle => m.spindle_rad.rem_euclid(TAU).to_degrees(),
+        ShownOver::Position | ShownOver::Loop | ShownOver::FactorOverPosition => m.x,
+        ShownOver::Velocity => m.v,
+        ShownOver::Time | ShownOver::FactorOverTime => m.t,
+        ShownOver::Input => m.u,
+        ShownOver::Spindle => m.spindle_rad.rem_euclid(TAU).to_degrees(),
     };
     let points: Vec<[f64; 3]> = motion
         .iter()
@@ -142,7 +106,7 @@ fn law_figure(s: &Shown, c: &Chosen, segment: usize, value: &[f64]) -> Result<Fi
         .filter(|(m, _)| !factor || m.i.abs() > ENOUGH * largest)
         .map(|(m, v)| {
             let y = match way {
-                Against::Input => m.u + v,
+                ShownOver::Input => m.u + v,
                 _ if factor => 1.0 + v / m.i,
                 _ => *v,
             };
@@ -150,13 +114,13 @@ fn law_figure(s: &Shown, c: &Chosen, segment: usize, value: &[f64]) -> Result<Fi
         })
         .collect();
     // Loops are drawn as lines, functions of one place as dots: lines would only jump to and fro.
-    let memory = ["pivot_friction", "coulomb_friction", "bearing_bias", "backlash"].contains(&facts.name);
+    let memory = way == ShownOver::Loop;
     let kind = if memory || (over_time && !factor) { Kind::Solid } else { Kind::Points };
     let column = |j: usize| points.iter().map(|p| p[j]).collect::<Vec<f64>>();
     let mut panel =
         Panel::new(Axis::linear(across, &across_unit), Axis::linear(quantity, if unit == "1" { "" } else { unit }));
     panel.height = 1.2;
-    if way == Against::Input {
+    if way == ShownOver::Input {
         let reach = motion.iter().fold(0.0f64, |m, k| m.max(k.u.abs()));
         panel.marks.push(
             Series::new("without the effect", Ink::Muted, Kind::Dashed, &[-reach, reach], &[-reach, reach])?.into(),

@@ -95,7 +95,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
         family.push("repeatable_runout".to_owned());
     }
     // Where the refit leaves next to nothing, a slight curve in the spectrum may be what its own straightness falls short of.
-    let line = own == "line_disturbance";
+    let line = chosen.effect.hums();
     let curve =
         line || chosen.effect.facts().port == crate::physics::Port::Structure && c.concealed > SLIGHT_CONFOUNDED;
     let slight = SLIGHT.max(SLIGHT_SHARE * (selection.given - selection.baseline.cost));
@@ -106,11 +106,11 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
     let (says, port) = text_of(name);
     let signal = effect_signal(bench, selection, at);
     let mut parameters = estimates(bench, selection, at);
-    if name == "repeatable_runout" && own == "line_disturbance" {
+    if name == "repeatable_runout" && line {
         parameters.insert("base_hz".into(), plain(bench.scene.spindle_hz.unwrap_or(0.0), "Hz"));
     }
     let place = place(bench, &bench.stack, &signal);
-    let always = own == "shock" && bench.stack.segments.len() > 1;
+    let always = chosen.effect.once() && bench.stack.segments.len() > 1;
     let when = if always { ", at the same time of every record: it comes with the record" } else { "" };
     let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
     Some(Finding {

@@ -25,8 +25,6 @@ const STEP: f64 = 1e-4;
 /// Relative steps in strengths and inner parameters: laws have kinks, and smaller steps see only them.
 const STRENGTH_STEP: f64 = 2e-3;
 const INNER_STEP: f64 = 5e-3;
-/// Shortest length of a dry drag over the shortest that the search takes.
-const DRIER: f64 = 0.02;
 
 /// What is moved: places in the linear parameters, then strengths and inner parameters by effect and place.
 pub(super) struct Free {
@@ -241,8 +239,7 @@ impl Residuals for Problem<'_> {
         let c = &self.model.chosen[e];
         let [low, high] = c.range[k];
         // Along a noisy motion a dry drag needs a length that the noise does not cover; simulated it may be as dry as it is.
-        let dry = c.effect.facts().name == "coulomb_friction" && k == 0;
-        let (low, step) = if dry { (DRIER * low, 0.8) } else { (low, 0.3) };
+        let (low, step) = c.effect.finer_simulated(k).map_or((low, 0.3), |share| (share * low, 0.8));
         Limit { low: low.ln(), high: high.ln(), step }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! tau = -c v |v|; the mean over an interval by Simpson's rule, velocity taken as straight.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::sample::{Sample, Scene};
 
 /// Strength: the drag coefficient.
@@ -34,6 +34,10 @@ impl Law for Drag {
 impl Effect for AerodynamicDrag {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Velocity
     }
 
     fn grid(&self, _scene: &Scene) -> Vec<Vec<f64>> {

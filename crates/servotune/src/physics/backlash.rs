@@ -3,7 +3,7 @@
 //! The pushed part rests until the arm has crossed the gap: p = clip(p, x - g/2, x + g/2), the play operator (Krasnoselskii,
 //! Pokrovskii 1989); what is recorded is p. Contact is taken as rigid and the part as held by its own friction.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
 /// Inner: the gap.
@@ -48,6 +48,10 @@ impl Law for Play {
 impl Effect for Backlash {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Loop
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -4,7 +4,7 @@
 //! who saw the torque after a seek grow with the seek's length up to a critical one); tau = -b. A way back shorter than a
 //! smallest one is no new move.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
 /// Inner: critical length, relaxation time, shortest way back that begins a new move. Strength: the largest bias B.
@@ -83,6 +83,10 @@ impl Law for Memory {
 impl Effect for BearingBias {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Loop
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -4,7 +4,7 @@
 //! spring in parallel with a second-order body is a new natural frequency: a linear refit absorbs it. What it cannot absorb
 //! is the creep and the curvature. A free inertia has no spring of its own, so there creep time 0 stands for the plain one.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use crate::lti::Body;
 
@@ -56,6 +56,10 @@ impl Law for Cable {
 impl Effect for CableSpring {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Position
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -5,7 +5,7 @@
 //! shears instead of sticking lets the arm creep: the drag then turns round over a speed, not over a length, tanh(v/v_c). The
 //! viscous part belongs to the linear plant; a mean offset belongs to the torque offset.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::pivot_friction::{SLID, dahl};
 use super::sample::{Sample, Scene, logarithmic};
 
@@ -29,6 +29,9 @@ static FACTS: Facts = Facts {
 
 /// Speeds over which a creeping drag turns round, over the highest: a slower one is dry, a faster one all but viscous.
 const CREEP: [f64; 2] = [1e-3, 0.3];
+
+/// Shortest length that a simulation is fitted with, over the shortest of the grid.
+const DRIER: f64 = 0.02;
 
 struct Slider {
     length: f64,
@@ -75,6 +78,14 @@ impl Law for Slider {
 impl Effect for CoulombFriction {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Loop
+    }
+
+    fn finer_simulated(&self, place: usize) -> Option<f64> {
+        (place == 0).then_some(DRIER)
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {

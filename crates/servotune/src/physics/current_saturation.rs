@@ -1,6 +1,6 @@
 //! The amplifier's current is limited: i = sat(u, limit).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::sample::{Sample, Scene};
 
 /// Inner: the limit.
@@ -33,6 +33,10 @@ impl Law for Clip {
 impl Effect for CurrentSaturation {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Input
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -2,7 +2,7 @@
 //!
 //! i = u - clip(u, -D, D), the dead zone of textbooks (Gelb, Vander Velde 1968).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
 /// Inner: half of the band's width.
@@ -35,6 +35,10 @@ impl Law for Zone {
 impl Effect for DeadBand {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Input
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {

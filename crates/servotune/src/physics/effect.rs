@@ -268,6 +268,27 @@ impl<'a> Given<'a> {
 /// Share of a number that its law is taken to hold to, where the effect does not say.
 const FORM: f64 = 0.002;
 
+/// What an effect is drawn over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShownOver {
+    /// Time.
+    Time,
+    /// Position, a function of it.
+    Position,
+    /// Position, a loop: it remembers where the motion turned round.
+    Loop,
+    /// Velocity.
+    Velocity,
+    /// Output over input of the amplifier.
+    Input,
+    /// Torque per command over position.
+    FactorOverPosition,
+    /// Torque per command over time.
+    FactorOverTime,
+    /// Angle of the spindle.
+    Spindle,
+}
+
 /// One effect of the library.
 pub trait Effect: Sync {
     /// What is known beforehand.
@@ -297,6 +318,17 @@ pub trait Effect: Sync {
     /// Whether it goes by a clock of its own, so that records which were not fitted may find it elsewhere.
     fn clocked(&self) -> bool {
         false
+    }
+
+    /// What it is drawn over.
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Time
+    }
+
+    /// Share of the least value of inner number `place` on the grid down to which a simulation still tells it, where it tells more than the
+    /// recorded motion does: noise of the sensor hides how dry a drag is, and a simulation has none.
+    fn finer_simulated(&self, _place: usize) -> Option<f64> {
+        None
     }
 
     /// Whether it falls into a single record at a time of its own: a push.

@@ -3,7 +3,7 @@
 //! m = x + sum over h = 1, 2 of a_h cos(2 pi h x/P + phi_h): offsets of the two photocurrents give the first harmonic, unequal
 //! amplitudes and a phase that is not 90 degrees the second (Heydemann 1981).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::sample::{Sample, Scene};
 use std::f64::consts::TAU;
 
@@ -44,6 +44,10 @@ const CARRIES: f64 = 2.0;
 impl Effect for EncoderCyclicError {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Position
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -3,7 +3,7 @@
 //! m = x + e2 (x - x0)² + e3 (x - x0)³: the first terms of an eccentric scale's e cos(x + phi) over a part of a turn. The
 //! constant and the slope are offset and gain of the plant.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::sample::{Sample, Scene};
 
 /// Inner: centre. Strengths: e2, e3.
@@ -37,6 +37,10 @@ impl Law for Scale {
 impl Effect for EncoderScaleError {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Position
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {

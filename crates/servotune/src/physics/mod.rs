@@ -58,7 +58,7 @@ pub mod unmodelled_resonance;
 
 pub use cycle::{Cycle, Motion};
 pub use describing::describing;
-pub use effect::{COLUMNS, Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+pub use effect::{COLUMNS, Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 pub use free_form::CurvePort;
 pub use library::{curves, data_facts, effect, facts, library};
 pub use machine::{Machine, Reading};

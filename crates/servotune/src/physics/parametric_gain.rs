@@ -2,7 +2,7 @@
 //!
 //! tau = i (1 + e cos(angle + phi)), the angle being a whole order of the spindle or 2 pi f t (a time-periodic gain; Floquet).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 use std::f64::consts::{PI, TAU};
@@ -49,6 +49,10 @@ impl Law for Swing {
 impl Effect for ParametricGain {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::FactorOverTime
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {

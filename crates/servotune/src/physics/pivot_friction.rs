@@ -8,7 +8,7 @@
 //! (survival of a generalised Pareto law of yield lengths, Pickands 1975): 1 the parabola, 2 Dahl's 1 - exp(-d/x_s), towards 0 one
 //! spring that slips at once, above 2 elements that yield ever later.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
 /// Inner: sliding length, shape. Strength: the sliding level.
@@ -130,6 +130,10 @@ fn loaded_to(left: f64, tail: f64) -> f64 {
 impl Effect for PivotFriction {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Loop
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -3,7 +3,7 @@
 //! m = x + sum over h = 1, 2, 3 of a_h cos(h n psi + phi_h), psi the spindle's angle, n the base order. Harmonics of orders,
 //! not of hertz: where the spindle's speed moves, the lines move with it.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 use std::f64::consts::TAU;
@@ -47,6 +47,10 @@ impl Law for Runout {
 impl Effect for RepeatableRunout {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Spindle
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -2,7 +2,7 @@
 //!
 //! tau = a cos(2 pi x/P) + b sin(2 pi x/P), times the current where the torque factor waves; the mean over an interval by Simpson's rule along the straight path.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
 use super::encoder_cyclic_error::EncoderCyclicError;
 use super::sample::{Sample, Scene};
 use std::cell::Cell;
@@ -50,6 +50,10 @@ impl Law for Ripple {
 impl Effect for TorqueRipple {
     fn facts(&self) -> &'static Facts {
         &FACTS
+    }
+
+    fn shown_over(&self) -> ShownOver {
+        ShownOver::Position
     }
 
     fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
