@@ -167,6 +167,26 @@ mod tests {
         }
     }
 
+    /// An error whose square is no number is far off; an empty one would count as nothing left, and a model that runs away as the best.
+    #[test]
+    fn an_error_beyond_any_square_is_infinite_and_as_long_as_the_record() {
+        let plant = paper_machine(MachineClass::Tunable).unwrap();
+        let controller = nominal_controller().unwrap();
+        let scene = scene(&plant, controller.sample_time_s, 5.0, SAMPLES, 3e-3);
+        let run = Run { position: vec![1e200; SAMPLES], rested: false, ..run(0, 1) };
+        let judged = crate::diagnose::judge::Judged {
+            plant: &plant,
+            effects: Vec::new(),
+            own: Vec::new(),
+            lines: &[],
+            fit: None,
+            scene: &scene,
+        };
+        let errors = crate::diagnose::judge::errors(&judged, &[&run], None);
+        assert_eq!(errors[0].len(), SAMPLES);
+        assert!(errors[0].iter().all(|e| *e == f64::INFINITY), "{:?}", &errors[0][..3]);
+    }
+
     fn chosen(name: &str, inner: &[f64], strengths: &[f64]) -> Chosen {
         Chosen {
             effect: effect(name).unwrap(),

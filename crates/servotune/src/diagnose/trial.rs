@@ -41,11 +41,11 @@ pub(super) struct Trial<'a> {
 
 /// Whether a diagnosis says what acts, or that nothing does.
 fn settled(d: &Diagnosis) -> bool {
-    d.verdict != Verdict::LocatedUnexplained
+    !matches!(d.verdict, Verdict::LocatedUnexplained | Verdict::Undecidable)
 }
 
 impl Trial<'_> {
-    /// The search, with a curve where it ends without a name and one is worth it.
+    /// The search, with a curve where it ends without a name, or cannot tell what is left from noise, and one is worth it.
     pub fn best(&self, bench: Bench, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
         let cut = bench.runs.clone();
         let (first, open) = self.made(bench, progress)?;

@@ -212,7 +212,7 @@ pub(super) fn judge(
         d.verdict = if far { Verdict::LocatedUnexplained } else { Verdict::NoMismatch };
         d.findings.extend(far.then(|| unexplained(bench, selection, 0.0)));
     }
-    take_noise(d, noise);
+    take_noise(d, bench, noise);
     beyond_the_fit(d, bench, selection);
 }
 
@@ -243,10 +243,7 @@ fn beyond_the_fit(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
         d.findings.push(f);
     }
     // Without repeats, what the refit leaves beyond the sensor's white noise may be noise of torque or missing physics.
-    if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)
-        && !bench.levels.from_repeats
-        && d.fit.open_loop.is_some_and(|o| o.rms_after > COLOURED * bench.levels.sensor_rms)
-    {
+    if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit) && coloured(d, bench, bench.levels.sensor_rms) {
         d.verdict = Verdict::Undecidable;
         d.remarks.push(
             "no record was repeated: the error that the refit leaves is coloured, and cannot be told from noise of torque".into(),
@@ -265,10 +262,19 @@ fn believed(d: &mut Diagnosis, selection: &Selection) -> bool {
     selection.bootstrap.as_ref().is_none_or(|b| b.p_value <= BOOTSTRAP_CHANCE.max(1.0 / (b.draws + 1) as f64))
 }
 
-/// Findings of the noise beside those of the search. What is left without a name is theirs where the linear refit comes down to their noise.
-fn take_noise(d: &mut Diagnosis, noise: Vec<Finding>) {
+/// Whether, no record being repeated, the simulation leaves far more than a noise of the sensor: noise of torque, or missing physics.
+fn coloured(d: &Diagnosis, bench: &Bench, noise: f64) -> bool {
+    !bench.levels.from_repeats && d.fit.open_loop.is_some_and(|o| o.rms_after > COLOURED * noise)
+}
+
+/// Findings of the noise beside those of the search. What is left without a name is theirs where the linear refit comes down to their noise:
+/// a count of the encoder is no reason for what is a hundred times as large.
+fn take_noise(d: &mut Diagnosis, bench: &Bench, noise: Vec<Finding>) {
+    let rounding = bench.grid.map_or(0.0, |g| g.step / 12f64.sqrt());
+    let beyond = coloured(d, bench, bench.levels.sensor_rms.hypot(rounding));
+    let open = beyond && noise.iter().all(|f| f.port != Port::Torque);
     for f in noise {
-        if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit) {
+        if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit) && !open {
             d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
         }
         if matches!(d.verdict, Verdict::Named | Verdict::Family) {
