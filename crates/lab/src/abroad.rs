@@ -28,6 +28,9 @@ struct Row {
     floor: f64,
     unit: String,
     seconds: f64,
+    /// What the diagnosis says of itself: its findings and remarks.
+    #[serde(default)]
+    says: Vec<String>,
 }
 
 fn row(id: &str, what: &str, expected: &str, unit: &str, d: &Diagnosis, seconds: f64) -> Row {
@@ -43,6 +46,7 @@ fn row(id: &str, what: &str, expected: &str, unit: &str, d: &Diagnosis, seconds:
         floor: h.noise_floor,
         unit: unit.into(),
         seconds,
+        says: d.findings.iter().map(|f| f.says.clone()).chain(d.remarks.iter().cloned()).collect(),
     }
 }
 
@@ -127,7 +131,53 @@ fn page(rows: &[Row], before: &[Row]) -> String {
             figure(r.seconds)
         );
     }
+    text.push_str("\n## Where it falls short\n\n");
+    let short: Vec<String> = rows.iter().flat_map(shortfalls).collect();
+    text.push_str(&if short.is_empty() { "Nowhere in these lines.\n".into() } else { short.concat() });
+    text.push_str("\n## What each diagnosis says\n\n");
+    for r in rows.iter().filter(|r| !r.says.is_empty()) {
+        let _ = writeln!(text, "- {}\n  - {}", r.id, r.says.join("\n  - "));
+    }
     text
+}
+
+/// Times the floor from which held-out rows count as not explained, and by how much a model that is offered may be above the given one.
+const LEFT: f64 = 3.0;
+const ALIKE: f64 = 1.01;
+
+/// What is missing in one line, as items of a list: names that were expected, error that is left, models worse than the given one.
+fn shortfalls(r: &Row) -> Vec<String> {
+    let mut all = Vec::new();
+    let silent = ["no finding", "no worse than given"].contains(&r.expected.as_str());
+    let missing: Vec<&str> = r.expected.split(", ").filter(|e| !silent && !r.findings.contains(e)).collect();
+    if !missing.is_empty() {
+        all.push(format!("- {}: {} is not found, the verdict is {}\n", r.id, missing.join(" and "), r.verdict));
+    }
+    if r.expected == "no finding" && !r.findings.is_empty() {
+        all.push(format!("- {}: a false alarm, {}\n", r.id, r.findings));
+    }
+    let [given, refit, after] = r.holdout;
+    if after > LEFT * r.floor {
+        all.push(format!(
+            "- {}: {} {} are left of the held-out rows, {} times what counts as noise there\n",
+            r.id,
+            figure(after),
+            r.unit,
+            figure(after / r.floor)
+        ));
+    }
+    for (what, error) in [("the linear refit", refit), ("the model with findings", after)] {
+        if error > ALIKE * given {
+            all.push(format!(
+                "- {}: {what} is worse than the given model, {} against {} {}\n",
+                r.id,
+                figure(error),
+                figure(given),
+                r.unit
+            ));
+        }
+    }
+    all
 }
 
 /// Makes the page, of the cases that are asked for or of all; those that are not keep their lines of `known`, the page's last figures.

@@ -2,7 +2,8 @@
 //!
 //! tau = -c v |v|; the mean over an interval by Simpson's rule, velocity taken as straight.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
 /// Strength: the drag coefficient.

@@ -3,7 +3,8 @@
 //! The pushed part rests until the arm has crossed the gap: p = clip(p, x - g/2, x + g/2), the play operator (Krasnoselskii,
 //! Pokrovskii 1989); what is recorded is p. Contact is taken as rigid and the part as held by its own friction.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
 /// Inner: the gap.

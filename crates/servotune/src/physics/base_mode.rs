@@ -2,7 +2,8 @@
 //!
 //! Base: x_b'' + 2 z w x_b' + w² x_b = -R i; m = x - x_b, so m = x + g w²/(s² + 2 z w s + w²) i with g = R/w².
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::parameter::{Parameter, Unit};
 use super::sample::Scene;
 use super::share::Share;
 use super::unmodelled_resonance::{Ringing, scan, term};

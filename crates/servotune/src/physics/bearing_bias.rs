@@ -4,7 +4,8 @@
 //! who saw the torque after a seek grow with the seek's length up to a critical one); tau = -b. A way back shorter than a
 //! smallest one is no new move.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
 /// Inner: critical length, relaxation time, shortest way back that begins a new move. Strength: the largest bias B.

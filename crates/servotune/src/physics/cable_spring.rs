@@ -4,7 +4,8 @@
 //! spring in parallel with a second-order body is a new natural frequency: a linear refit absorbs it. What it cannot absorb
 //! is the creep and the curvature. A free inertia has no spring of its own, so there creep time 0 stands for the plain one.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use crate::lti::Body;
 

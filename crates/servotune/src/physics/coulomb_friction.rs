@@ -5,7 +5,8 @@
 //! shears instead of sticking lets the arm creep: the drag then turns round over a speed, not over a length, tanh(v/v_c). The
 //! viscous part belongs to the linear plant; a mean offset belongs to the torque offset.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::parameter::{Parameter, Unit};
 use super::pivot_friction::{SLID, dahl};
 use super::sample::{Sample, Scene, logarithmic};
 

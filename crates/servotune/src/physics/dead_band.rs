@@ -2,7 +2,8 @@
 //!
 //! i = u - clip(u, -D, D), the dead zone of textbooks (Gelb, Vander Velde 1968).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
 /// Inner: half of the band's width.

@@ -3,7 +3,8 @@
 //! m = x + sum over h = 1, 2 of a_h cos(2 pi h x/P + phi_h): offsets of the two photocurrents give the first harmonic, unequal
 //! amplitudes and a phase that is not 90 degrees the second (Heydemann 1981).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use std::f64::consts::TAU;
 

@@ -3,7 +3,8 @@
 //! m = x + e2 (x - x0)² + e3 (x - x0)³: the first terms of an eccentric scale's e cos(x + phi) over a part of a turn. The
 //! constant and the slope are offset and gain of the plant.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
 /// Inner: centre. Strengths: e2, e3.

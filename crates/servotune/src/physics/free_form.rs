@@ -3,7 +3,8 @@
 //! A natural cubic spline through knots, straight beyond the first and the last with the slope that it has there; at the amplifier a
 //! first-order lag may follow it. One effect for each port, all under the name `free_form`; the search of the library leaves them out (`specs/mismatch.md`, "Curves without a name").
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::parameter::Parameter;
 use super::sample::{Sample, Scene};
 use super::share::Share;
 use crate::lti::{CurveEntry, CurveKnot, PhysicsEntry};

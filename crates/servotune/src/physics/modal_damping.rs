@@ -7,9 +7,10 @@
 //! Or, where the resonance is a stage of a chain and its damper feels the stage's rate: zeta_j (1 + g |q1|), q1 the rate of the
 //! stage's deflection over w_j (`physics::stage`).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
 use super::mode_shift::mode;
 use super::pair::{Pair, Turn};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use super::stage::{Next, Stage};
 use nalgebra::Complex;

@@ -6,8 +6,9 @@
 //!
 //! Or, where the resonance is a stage of a chain, its pole and zero move together (`physics::stage`).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
 use super::pair::{Pair, Turn};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use super::stage::{Next, Stage};
 use nalgebra::Complex;

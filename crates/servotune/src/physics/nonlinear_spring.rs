@@ -3,7 +3,8 @@
 //! tau = -k3 (x - x0)³ (Duffing), or tau = -k max(0, x - x_e) beyond an upper stop, mirrored for a lower one. Means over an
 //! interval are exact for a straight path (Simpson's rule for the cubic).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
 /// Inner: centre, distance of the stop from it (0: cubic spring; negative: lower stop). Strength: k3 or the stop's stiffness.

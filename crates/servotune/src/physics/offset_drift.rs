@@ -2,7 +2,8 @@
 //!
 //! tau = a t + b t², t from the start of the record: the first terms of any slow change. The constant is the torque offset.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 

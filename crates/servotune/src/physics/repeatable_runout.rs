@@ -3,7 +3,8 @@
 //! m = x + sum over h = 1, 2, 3 of a_h cos(h n psi + phi_h), psi the spindle's angle, n the base order. Harmonics of orders,
 //! not of hertz: where the spindle's speed moves, the lines move with it.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 use std::f64::consts::TAU;

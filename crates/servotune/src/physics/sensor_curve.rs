@@ -4,7 +4,8 @@
 //! Bent: m = x + q (x - c)² + k (x - c)³. A fold hides which side the arm is on, so the library's search, which works along the recorded
 //! motion, cannot see it; the estimation of curves does.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 

@@ -3,7 +3,8 @@
 //! di/dt = S sgn(u - i) until i = u: behind a converter that holds u over a sample the current ramps to every new value, however small
 //! the step. A digital limiter works at the samples instead: i_k = i_(k-1) + clip(u_k - i_(k-1), -S T, S T).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
 /// Inner: the largest slope, whether the current ramps between the samples (1) or is limited at them (0).

@@ -3,7 +3,8 @@
 //! The field of a magnet gap, expanded about its middle; the slope stands for a middle that is not the origin. Gaps with a part of even field
 //! have corners that no expansion follows: there the fall ends, or only begins.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
 /// Inner: which shape, and the position of its corner over the travel. Strengths: of -z i, -f(z) i, -z⁴ i, -z⁶ i with z = position over the

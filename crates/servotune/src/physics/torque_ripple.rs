@@ -2,8 +2,9 @@
 //!
 //! tau = a cos(2 pi x/P) + b sin(2 pi x/P), times the current where the torque factor waves; the mean over an interval by Simpson's rule along the straight path.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, ShownOver, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
 use super::encoder_cyclic_error::EncoderCyclicError;
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use std::cell::Cell;
 use std::f64::consts::TAU;

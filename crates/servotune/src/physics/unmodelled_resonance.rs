@@ -3,8 +3,9 @@
 //! m = x + (a w² + b w s)/(s² + 2 z w s + w²) i: one modal term of the partial fractions, with any sign and phase (eq. (2) in
 //! modal form). Exact for a command held between samples.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, Parameter, PhysicsError, Port, Setting, Unit};
+use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
 use super::oscillator::Oscillator;
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 use crate::lti::ModalTerm;
