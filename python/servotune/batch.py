@@ -19,6 +19,7 @@ from servotune import _core
 from servotune.controller import controller_of
 from servotune.gate import Gate, table_text
 from servotune.machine import WORDS
+from servotune.numbers import count
 from servotune.spec import spec_of
 
 SWEEP = ("frequency_hz", "magnitude_db", "phase_deg")
@@ -57,11 +58,11 @@ def tune(
         (position_unit, command_unit),
         hold_included,
         certificate,
-        starts,
+        count(starts, "starts"),
         sample_time_s,
         reading,
         model,
-        threads,
+        count(threads, "threads"),
     )
     number = pa.float64()
     fields = [
@@ -91,7 +92,7 @@ def identify(
     reading, model = split(options)
     slots = words(table, "slot")
     units = (position_unit, command_unit)
-    rows = _core.batch_identify(slots, sweeps(table), units, reading, model, threads)
+    rows = _core.batch_identify(slots, sweeps(table), units, reading, model, count(threads, "threads"))
     fields = [
         ("order", pa.int64()),
         ("rms_relative_error", pa.float64()),
@@ -123,7 +124,7 @@ def margins(
         None if controller is None else controller_of(controller)._core,
         hold_included,
         reading,
-        threads,
+        count(threads, "threads"),
     )
     number = pa.float64()
     names = "phase_margin_deg gain_crossover_hz gain_margin_db phase_crossover_hz max_sensitivity max_sensitivity_hz"
@@ -137,7 +138,7 @@ def verify(table: Any, spec: Any, uncertainty: dict[str, float] | None = None, *
     table = arrow(table)
     slots = words(table, "slot")
     gains, plants = optional(table, "gains"), optional(table, "plant")
-    rows = _core.batch_verify(slots, gains, plants, spec_of(spec)._core, uncertainty, threads)
+    rows = _core.batch_verify(slots, gains, plants, spec_of(spec)._core, uncertainty, count(threads, "threads"))
     fields = [("proved", pa.bool_()), ("findings", pa.int64()), ("document", pa.string())]
     return result(slots, rows, fields)
 
@@ -182,37 +183,54 @@ def diagnose(table: Any, *, threads: int = 0) -> pa.Table:
     table = arrow(table)
     folders = optional(table, "case")
     slots = words(table, "slot") if "slot" in table.column_names else [str(f) for f in folders]
-    rows = _core.batch_diagnose(folders, threads)
+    rows = _core.batch_diagnose(folders, count(threads, "threads"))
     fields = [("verdict", pa.string()), ("effects", pa.list_(pa.string())), ("document", pa.string())]
     return result(slots, rows, fields)
 
 
 def arrow(table: Any) -> pa.Table:
     """A table of any kind as Arrow's; nothing is copied where it already is one."""
-    if isinstance(table, pa.Table):
-        return table
-    if isinstance(table, pa.RecordBatch):
-        return pa.Table.from_batches([table])
-    return pa.table(table)
+    if not isinstance(table, pa.Table):
+        if not any(hasattr(table, key) for key in ("__arrow_c_stream__", "__arrow_c_array__", "keys")):
+            raise TypeError(
+                f"found {type(table).__name__} for a table; expected an Arrow table, a data frame, or columns by name"
+            )
+        try:
+            table = pa.Table.from_batches([table]) if isinstance(table, pa.RecordBatch) else pa.table(table)
+        except (pa.ArrowException, TypeError) as e:
+            raise ValueError(f"table: {e}; expected columns of one length, each of one type") from None
+    twice = {name for name in table.column_names if table.column_names.count(name) > 1}
+    if twice:
+        raise ValueError(f"table: found the column {min(twice)!r} more than once; expected each name once")
+    return table
+
+
+def cast(column: Any, name: str, kind: pa.DataType, expected: str) -> Any:
+    """A column as one of `kind`."""
+    try:
+        return column.cast(kind)
+    except pa.ArrowException:
+        raise TypeError(f"column {name!r}: found {column.type}; expected {expected}") from None
 
 
 def need(table: pa.Table, name: str) -> pa.ChunkedArray:
     """A column that must be there."""
     if name not in table.column_names:
-        raise ValueError(f"no column {name!r}; found {', '.join(table.column_names)}")
+        found = ", ".join(table.column_names) or "no column at all"
+        raise ValueError(f"table: no column {name!r}; found {found}; expected it")
     return table.column(name)
 
 
 def words(table: pa.Table, name: str) -> list[str]:
     """A column of words; a null is an empty one."""
-    return [v or "" for v in need(table, name).cast(pa.string()).to_pylist()]
+    return [v or "" for v in cast(need(table, name), name, pa.string(), "words").to_pylist()]
 
 
 def optional(table: pa.Table, name: str) -> list[str | None]:
     """A column of words that may be absent."""
     if name not in table.column_names:
         return [None] * table.num_rows
-    return table.column(name).cast(pa.string()).to_pylist()
+    return cast(table.column(name), name, pa.string(), "words").to_pylist()
 
 
 def sweeps(table: pa.Table) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -222,7 +240,7 @@ def sweeps(table: pa.Table) -> tuple[list[np.ndarray], list[np.ndarray]]:
         column = need(table, name).combine_chunks()
         if isinstance(column, pa.ChunkedArray):
             column = column.chunk(0) if column.num_chunks else pa.array([], type=column.type)
-        column = column.cast(pa.large_list(pa.float64()))
+        column = cast(column, name, pa.large_list(pa.float64()), "lists of numbers")
         offsets.append(column.offsets.to_numpy())
         values.append(np.ascontiguousarray(column.values.to_numpy(zero_copy_only=False)))
     return offsets, values

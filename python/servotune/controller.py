@@ -9,6 +9,7 @@ import numpy as np
 
 from servotune import _core
 from servotune.document import PathLike, text_of, write
+from servotune.numbers import finite
 from servotune.result import picture
 
 
@@ -45,8 +46,8 @@ class Controller:
 
     def response(self, hz: Any) -> np.ndarray:
         """C(exp(j 2 pi f T)): complex values (command_unit per position_unit) in the shape of `hz` (Hz)."""
-        hz = np.asarray(hz, dtype=np.float64)
-        return self._core.response(np.ascontiguousarray(hz.ravel())).reshape(hz.shape)
+        flat, shape = finite(hz, "hz")
+        return self._core.response(flat).reshape(shape)
 
     def to_control(self) -> Any:
         """The sections as a python-control discrete `TransferFunction`, error in, command out."""

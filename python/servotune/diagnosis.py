@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from servotune import _core
 from servotune.controller import controller_of
 from servotune.document import PathLike, write
 from servotune.gate import columns_of
+from servotune.numbers import vector
 from servotune.plant import Plant, plant_of
 from servotune.result import Result
 
@@ -34,7 +33,7 @@ class Record:
 
     def _parts(self) -> tuple[Any, ...]:
         arrays = {
-            name: np.ascontiguousarray(column, dtype=np.float64)
+            name: vector(column, f"{self.name}: column `{name}`")
             for name, column in columns_of(self.columns).items()
             if name in COLUMNS
         }

@@ -12,6 +12,8 @@ def text_of(source: PathLike, called: str) -> tuple[str, str]:
     """The text and the name that messages use. A `str` with a line break is the text itself, anything else a path."""
     if isinstance(source, str) and "\n" in source:
         return source, called
+    if not (isinstance(source, str) or hasattr(source, "__fspath__")):
+        raise TypeError(f"found {type(source).__name__} for the {called}; expected a path or the text of its file")
     path = Path(source)
     return read(path), str(path)
 
@@ -29,6 +31,7 @@ def read(path: Path) -> str:
 
 
 def write(path: PathLike, text: str) -> None:
-    """Writes a text as it is."""
-    with open(path, "w", encoding="utf-8", newline="") as out:
-        out.write(text)
+    """Writes a text as it is, whole: what was there stays where this fails."""
+    from servotune._core import write_text
+
+    write_text(path, text)

@@ -9,6 +9,7 @@ import numpy as np
 from servotune import _core
 from servotune.document import PathLike, write
 from servotune.machine import WORDS, Machine
+from servotune.numbers import vector
 
 
 class Frf(Machine):
@@ -31,9 +32,9 @@ class Frf(Machine):
         relative_std: Any = None,
         unstable_poles: int = 0,
     ) -> None:
-        hz = np.ascontiguousarray(frequency_hz, dtype=np.float64)
-        value = np.ascontiguousarray(response, dtype=np.complex128)
-        std = None if relative_std is None else np.ascontiguousarray(relative_std, dtype=np.float64)
+        hz = vector(frequency_hz, "frequency_hz")
+        value = vector(response, "response", np.complex128)
+        std = None if relative_std is None else vector(relative_std, "relative_std")
         self._core = _core.Frf(hz, value, std, position_unit, command_unit, unstable_poles)
 
     @classmethod
@@ -150,4 +151,8 @@ def is_sweep(machine: Any) -> bool:
 
 def sweep_of(machine: Any) -> Frf:
     """A machine as a sweep."""
-    return machine if isinstance(machine, Frf) else Frf.from_control(machine)
+    if isinstance(machine, Frf):
+        return machine
+    if not is_sweep(machine):
+        raise TypeError(f"found {type(machine).__name__} for a sweep; expected an Frf or a python-control FRD")
+    return Frf.from_control(machine)

@@ -96,6 +96,9 @@ def table_text(table: Any) -> tuple[str, str]:
         path = Path(table)
         return read(path), str(path)
     columns = columns_of(table)
+    lengths = {name: len(column) for name, column in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise ValueError(f"table: found columns of unequal length: {lengths}; expected one length")
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(columns)
@@ -109,7 +112,11 @@ def columns_of(table: Any) -> dict[str, list[Any]]:
         return table.to_pydict()
     if hasattr(table, "to_dict") and hasattr(table, "columns"):
         return {str(name): column for name, column in table.to_dict("list").items()}
-    return {str(name): list(column) for name, column in dict(table).items()}
+    if not hasattr(table, "keys"):
+        raise TypeError(
+            f"found {type(table).__name__} for a table; expected a path, a data frame, an Arrow table, or columns by name"
+        )
+    return {str(name): list(table[name]) for name in table.keys()}
 
 
 def field(value: Any) -> str:

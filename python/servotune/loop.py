@@ -7,6 +7,7 @@ from typing import Any
 from servotune import _core
 from servotune.controller import controller_of
 from servotune.frf import is_sweep, sweep_of
+from servotune.numbers import pair
 from servotune.plant import plant_of
 from servotune.result import Result
 
@@ -56,4 +57,4 @@ def margins(
     law = controller_of(controller)._core
     if is_sweep(plant_or_frf):
         return Margins(_core.margins_of_sweep(sweep_of(plant_or_frf)._core, law, hold_included))
-    return Margins(_core.margins_of_model(plant_of(plant_or_frf)._core, law, *amplitudes))
+    return Margins(_core.margins_of_model(plant_of(plant_or_frf)._core, law, *pair(amplitudes, "amplitudes")))

@@ -11,6 +11,7 @@ from servotune import _core
 from servotune.document import PathLike, text_of, write
 from servotune.frf import sweep_of
 from servotune.machine import WORDS, Machine
+from servotune.numbers import finite
 from servotune.result import Result
 
 
@@ -98,8 +99,8 @@ class Plant(Machine):
 
     def response(self, hz: Any) -> np.ndarray:
         """P(j 2 pi f), dead time included: complex values (position_unit per command_unit) in the shape of `hz` (Hz)."""
-        hz = np.asarray(hz, dtype=np.float64)
-        return self._core.response(np.ascontiguousarray(hz.ravel())).reshape(hz.shape)
+        flat, shape = finite(hz, "hz")
+        return self._core.response(flat).reshape(shape)
 
     def discretise(self, sample_time_s: float) -> Sampled:
         """The plant behind a zero-order hold of `sample_time_s` seconds, fractional dead time and all, without approximation."""
@@ -161,8 +162,12 @@ def plant_of(machine: Any) -> Plant:
     """A machine as a plant model: one of ours, a path, or a python-control system."""
     if isinstance(machine, Plant):
         return machine
-    if isinstance(machine, (str,)) or hasattr(machine, "__fspath__"):
+    if isinstance(machine, str) or hasattr(machine, "__fspath__"):
         return Plant.from_toml(machine)
+    if not (hasattr(machine, "num") or all(hasattr(machine, key) for key in "ABCD")):
+        raise TypeError(
+            f"found {type(machine).__name__} for a plant; expected a Plant, a path, the text of a plant.toml, or a python-control system"
+        )
     return Plant.from_control(machine)
 
 

@@ -40,4 +40,6 @@ def spec_of(source: Any) -> Spec:
         return source
     if isinstance(source, str) and "\n" in source:
         return Spec.parse(source)
+    if not (isinstance(source, str) or hasattr(source, "__fspath__")):
+        raise TypeError(f"found {type(source).__name__} for the spec; expected a Spec, a path, or the text of a spec.toml")
     return Spec.read(source)

@@ -9,6 +9,7 @@ from servotune import _core
 from servotune.controller import Controller, controller_of
 from servotune.document import PathLike, write
 from servotune.frf import is_sweep, sweep_of
+from servotune.numbers import count
 from servotune.plant import plant_of
 from servotune.result import Result
 from servotune.spec import spec_of
@@ -92,5 +93,5 @@ def tune(
     plant = None if sweep else plant_of(plant_or_frf)._core
     of = spec_of(spec)._core
     return Tuned(
-        _core.tune(plant, sweep, of, start, hold_included, certificate, uncertainty, sample_time_s, starts, settings)
+        _core.tune(plant, sweep, of, start, hold_included, certificate, uncertainty, sample_time_s, count(starts, "starts"), settings)
     )

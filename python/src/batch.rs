@@ -5,6 +5,7 @@
 
 use crate::controller::Controller;
 use crate::refusal::words;
+use crate::rows::{Row, rows};
 use crate::settings::{Reading, model, reading, uncertainty};
 use crate::spec::Spec;
 use crate::tune::{Job, Machine, run};
@@ -12,7 +13,6 @@ use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rayon::prelude::*;
 use servotune::feedback::{Amplitudes, Margins, MeasuredLoop, measured_margins};
 use servotune::frf::{Sweep, read_bytes};
 use servotune::identify::{IdentifySettings, identify};
@@ -21,41 +21,7 @@ use servotune::tune::{Hold, Outcome, TuneSettings};
 use servotune::verify::{Inputs, LEAST_DAMPING, Source, SweepAssumption, VerifySettings, Word, certify};
 use servotune_answer::{self as answer, IdentifiedDocument, Named, Proof, TunedDocument, adjusted, model_margins};
 use std::fmt::Write;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-
-/// A row's result and its error: one of them is there.
-type Row<T> = (Option<T>, Option<String>);
-
-/// Rows of one step between two looks at whether the interpreter was interrupted, for each thread.
-const STEP: usize = 16;
-
-/// Works on rows 0 to n with so many threads (0: all cores); nothing of one row reaches another.
-fn rows<T: Send>(
-    py: Python<'_>,
-    threads: usize,
-    n: usize,
-    one: impl Fn(usize) -> Result<T, String> + Sync + Send,
-) -> PyResult<Vec<Row<T>>> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|e| PyValueError::new_err(format!("threads={threads}: {e}")))?;
-    let alone = |i: usize| -> Row<T> {
-        // Not even a fault of this program in one row may stop the others.
-        let fault = |_| Err("this program failed on the row; please report it with its files".to_owned());
-        match catch_unwind(AssertUnwindSafe(|| one(i))).unwrap_or_else(fault) {
-            Ok(found) => (Some(found), None),
-            Err(words) => (None, Some(words.replace('\n', " "))),
-        }
-    };
-    let mut all = Vec::with_capacity(n);
-    let step = STEP * pool.current_num_threads().max(1);
-    for from in (0..n).step_by(step) {
-        let to = (from + step).min(n);
-        all.extend(py.detach(|| pool.install(|| (from..to).into_par_iter().map(alone).collect::<Vec<_>>())));
-        py.check_signals()?;
-    }
-    Ok(all)
-}
 
 /// Sweeps of a table: list columns as offsets and values. A row of a list that is null is empty.
 #[derive(FromPyObject)]

@@ -7,6 +7,7 @@ mod answer;
 mod batch;
 mod controller;
 mod diagnose;
+mod document;
 mod floor;
 mod frf;
 mod gate;
@@ -15,6 +16,7 @@ mod margins;
 mod picture;
 mod plant;
 mod refusal;
+mod rows;
 mod settings;
 mod simulate;
 mod spec;
@@ -33,6 +35,8 @@ mod _core {
     use super::controller::Controller;
     #[pymodule_export]
     use super::diagnose::{diagnose_case, diagnose_records};
+    #[pymodule_export]
+    use super::document::write_text;
     #[pymodule_export]
     use super::floor::{Floor, FloorHand};
     #[pymodule_export]

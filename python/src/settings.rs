@@ -20,6 +20,23 @@ fn word<T: FromStr<Err = UnknownWord>>(key: &str, value: &Bound<'_, PyAny>) -> P
     text.parse().map_err(|e| PyValueError::new_err(format!("{key}: {e}")))
 }
 
+/// A count, or an error that names it: no number below 0 wraps or overflows.
+pub fn count(key: &str, value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    let refuse = || format!("{key}: found {}; expected a whole number of at least 0", shown(value));
+    let found: i64 = value.extract().map_err(|_| PyTypeError::new_err(refuse()))?;
+    usize::try_from(found).map_err(|_| PyValueError::new_err(refuse()))
+}
+
+/// The same where None stands for a choice of the program.
+fn given(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
+    if value.is_none() { Ok(None) } else { count(key, value).map(Some) }
+}
+
+/// A value as Python writes it.
+fn shown(value: &Bound<'_, PyAny>) -> String {
+    value.repr().map_or_else(|_| "what cannot be shown".to_owned(), |r| r.to_string())
+}
+
 /// Refuses a keyword that nobody takes.
 fn unknown(key: &str, known: &[&str]) -> PyErr {
     PyTypeError::new_err(format!("found the keyword `{key}`; expected one of: {}", known.join(", ")))
@@ -73,7 +90,7 @@ pub fn reading(keywords: &Bound<'_, PyDict>) -> PyResult<Reading> {
             "dataset" => s.dataset = value.extract()?,
             "expect_hz" => s.expected_hz = value.extract()?,
             "measured" => r.measured = word(&key, &value)?,
-            "unstable_poles" => r.unstable_poles = value.extract()?,
+            "unstable_poles" => r.unstable_poles = count(&key, &value)?,
             _ => return Err(unknown(&key, &KNOWN)),
         }
     }
@@ -115,8 +132,8 @@ pub fn model(keywords: &Bound<'_, PyDict>, units: (&str, &str)) -> PyResult<Iden
     for (key, value) in keywords {
         let key: String = key.extract()?;
         match key.as_str() {
-            "order" => order = value.extract()?,
-            "max_order" => most = value.extract()?,
+            "order" => order = given(&key, &value)?,
+            "max_order" => most = given(&key, &value)?,
             "body" => {
                 s.body = match value.extract::<String>()?.as_str() {
                     "auto" => BodyChoice::Auto,

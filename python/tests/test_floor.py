@@ -130,6 +130,37 @@ def test_dask(fleet, alone, tmp_path):
     same(tmp_path, alone)
 
 
+def test_dask_survives_dead_workers(fleet, alone, tmp_path, monkeypatch):
+    """Every batch of slots kills its worker's process at the first try."""
+    pytest.importorskip("distributed")
+    traps = tmp_path / "traps"
+    traps.mkdir()
+
+    class Deadly(Task):
+        def __call__(self, places):
+            trap = traps / str(places[0])
+            if self.library is not None and not trap.exists():
+                trap.touch()
+                os.kill(os.getpid(), signal.SIGKILL)
+            return super().__call__(places)
+
+    monkeypatch.setattr(import_module("servotune.floor.run"), "Task", Deadly)
+    floor.run(fleet, engine="dask", out=tmp_path / "out", name="one", workers=2, batch=2)
+    assert len(list(traps.iterdir())) == 3
+    same(tmp_path / "out", alone)
+
+
+def test_dask_looks_for_no_worker_that_its_nanny_starts_again():
+    """Dask drops a place for good where its worker is just starting again: the settings that keep it hold where its cluster is made."""
+    dask = pytest.importorskip("dask")
+    pytest.importorskip("distributed")
+    from servotune.floor import over_dask
+
+    with over_dask.engine(1):
+        waits = dask.utils.parse_timedelta(dask.config.get("distributed.deploy.lost-worker-timeout"))
+        assert waits > 7 * 86400 and dask.config.get("distributed.scheduler.worker-saturation") == 1.0
+
+
 def test_spark(fleet, alone, tmp_path):
     pytest.importorskip("pyspark")
     if shutil.which("java") is None:

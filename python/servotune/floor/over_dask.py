@@ -9,6 +9,9 @@ from servotune.floor.task import Found, Spread, Task
 
 #: Workers that a batch may lose before it is given up.
 TRIES = 10
+#: A worker's process that dies is started again by its nanny. Dask looks for it so long after each death, and gives its place up for good where it is
+#: just starting again: under many deaths it has no worker left after a while. So long as a floor lasts it does not look.
+LOOKS_AFTER = "30 days"
 
 
 @contextmanager
@@ -21,7 +24,13 @@ def engine(workers: int) -> Iterator[Spread]:
         try:
             client = get_client()
         except ValueError:
-            stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": TRIES}))
+            own = {
+                "scheduler.allowed-failures": TRIES,
+                # A death is charged to every batch that the worker has: it has the one that it works on.
+                "scheduler.worker-saturation": 1.0,
+                "deploy.lost-worker-timeout": LOOKS_AFTER,
+            }
+            stack.enter_context(dask.config.set({f"distributed.{key}": value for key, value in own.items()}))
             cluster = LocalCluster(n_workers=workers or None, threads_per_worker=1, dashboard_address=None)
             client = stack.enter_context(Client(stack.enter_context(cluster)))
 

@@ -32,7 +32,7 @@ impl Trace {
         for &w in &grid[1..] {
             waiting.push((w, l.at(w), 0));
             while let Some(&(right_w, right, depth)) = waiting.last() {
-                if depth < DEPTH && too_far(left.1, right) {
+                if depth < DEPTH && !surely_near(left.1, right) && too_far(left.1, right) {
                     let middle = 0.5 * (left.0 + right_w);
                     if let Some(top) = waiting.last_mut() {
                         top.2 = depth + 1;
@@ -50,6 +50,22 @@ impl Trace {
     }
 }
 
+/// Below the tangent of [`TURN`] and below exp(2 [`STRETCH`]) by more than any rounding.
+const CLEAR_TURN: f64 = 0.54;
+const CLEAR_STRETCH: f64 = 4.0;
+
+/// Whether a look without roots, angles and logarithms already tells that [`too_far`] would say no; it is most points of a trace.
+#[inline]
+fn surely_near(a: Complex<f64>, b: Complex<f64>) -> bool {
+    let one = Complex::new(1.0, 0.0);
+    let turned = |x: Complex<f64>, y: Complex<f64>| {
+        let d = y * x.conj();
+        d.im.abs() < CLEAR_TURN * d.re
+    };
+    let (size_a, size_b) = (a.norm_sqr(), b.norm_sqr());
+    turned(a, b) && turned(one + a, one + b) && size_a < CLEAR_STRETCH * size_b && size_b < CLEAR_STRETCH * size_a
+}
+
 fn too_far(a: Complex<f64>, b: Complex<f64>) -> bool {
     let one = Complex::new(1.0, 0.0);
     let turn = |x: Complex<f64>, y: Complex<f64>| (y * x.conj()).arg().abs();
@@ -59,4 +75,32 @@ fn too_far(a: Complex<f64>, b: Complex<f64>) -> bool {
         return false;
     }
     turn(a, b) > TURN || turn(one + a, one + b) > TURN || (a.norm() / b.norm()).ln().abs() > STRETCH
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::random::Random;
+
+    /// The short look never passes what the limits refuse, however close two points lie to a limit, and it does pass most.
+    #[test]
+    fn what_is_surely_near_is_never_too_far() {
+        let mut r = Random::new(11);
+        let (mut near, mut far, mut short) = (0, 0, 0);
+        for _ in 0..200_000 {
+            let a = Complex::from_polar(10f64.powf(4.0 * r.normal()), 3.0 * r.normal());
+            // Around both limits: turns about TURN, stretches about STRETCH.
+            let b = a * Complex::from_polar((STRETCH * r.normal()).exp(), TURN * r.normal());
+            let sure = surely_near(a, b);
+            if too_far(a, b) {
+                far += 1;
+                assert!(!sure, "{a} {b}");
+            } else {
+                near += 1;
+                short += usize::from(sure);
+            }
+        }
+        assert!(far > 10_000 && near > 10_000 && short > near / 2, "{far} {near} {short}");
+        assert!(!surely_near(Complex::new(f64::NAN, 0.0), Complex::new(1.0, 0.0)));
+    }
 }

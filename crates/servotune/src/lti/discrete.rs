@@ -6,6 +6,7 @@
 
 use super::{FrequencyResponse, LtiError, ModalForm, Plant};
 use crate::document::size_limits::DELAY_SAMPLES;
+use crate::numeric::wide::{Wide, widest};
 use nalgebra::{Complex, DMatrix};
 
 /// The exactly sampled plant. Arrays hold one entry per term; a complex pole stands for itself and its conjugate.
@@ -242,19 +243,7 @@ impl FrequencyResponse for DiscretePlant {
     fn at(&self, w: f64) -> Complex<f64> {
         let t = self.sample_time_s;
         let z = Complex::from_polar(1.0, w * t);
-        let mut now = Complex::new(0.0, 0.0);
-        let mut before = Complex::new(0.0, 0.0);
-        for i in 0..self.pole.len() {
-            let lambda = Complex::new(self.lambda_re[i], self.lambda_im[i]);
-            let gain_now = Complex::new(self.now_re[i], self.now_im[i]);
-            let gain_before = Complex::new(self.before_re[i], self.before_im[i]);
-            // Re(weight x) is the half sum of the term and its conjugate, over the common denominator.
-            let upper = z - lambda;
-            let lower = z - lambda.conj();
-            let scale = 0.5 / (upper * lower);
-            now += (gain_now * lower + gain_now.conj() * upper) * scale;
-            before += (gain_before * lower + gain_before.conj() * upper) * scale;
-        }
+        let [mut now, mut before] = widest(Modes { plant: self, z });
         if self.rigid2 != 0.0 {
             let (h, d) = (t - self.rest_s, self.rest_s);
             let step = z - 1.0;
@@ -264,5 +253,95 @@ impl FrequencyResponse for DiscretePlant {
             before += drift * d + (self.rigid2 * d * (h + 0.5 * d) + self.rigid1 * d) / step;
         }
         (now + before / z) * Complex::from_polar(1.0, -w * t * self.whole as f64)
+    }
+}
+
+/// Terms handled side by side.
+const LANES: usize = 4;
+
+/// What the terms give to P(z), of the newest command and of the one before.
+struct Modes<'a> {
+    plant: &'a DiscretePlant,
+    z: Complex<f64>,
+}
+
+impl Wide for Modes<'_> {
+    type Output = [Complex<f64>; 2];
+
+    #[inline(always)]
+    fn compute(self) -> Self::Output {
+        let (p, z) = (self.plant, self.z);
+        let n = p.pole.len();
+        let mut sum = [Complex::new(0.0, 0.0); 2];
+        for from in (0..n).step_by(LANES) {
+            let count = LANES.min(n - from);
+            let of = |x: &[f64]| -> [f64; LANES] {
+                let mut lanes = [0.0; LANES];
+                lanes[..count].copy_from_slice(&x[from..from + count]);
+                lanes
+            };
+            let (re, im) = (of(&p.lambda_re), of(&p.lambda_im));
+            let (now_re, now_im) = (of(&p.now_re), of(&p.now_im));
+            let (before_re, before_im) = (of(&p.before_re), of(&p.before_im));
+            let mut part = [[0.0; LANES]; 4];
+            for j in 0..LANES {
+                let lambda = Complex::new(re[j], im[j]);
+                // Re(weight x) is the half sum of the term and its conjugate, over the common denominator.
+                let (upper, lower) = (z - lambda, z - lambda.conj());
+                let scale = 0.5 / (upper * lower);
+                let half = |gain: Complex<f64>| (gain * lower + gain.conj() * upper) * scale;
+                let (now, before) =
+                    (half(Complex::new(now_re[j], now_im[j])), half(Complex::new(before_re[j], before_im[j])));
+                (part[0][j], part[1][j], part[2][j], part[3][j]) = (now.re, now.im, before.re, before.im);
+            }
+            // One after the other: a sum keeps its order and so its bits.
+            for j in 0..count {
+                sum[0] += Complex::new(part[0][j], part[1][j]);
+                sum[1] += Complex::new(part[2][j], part[3][j]);
+            }
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::random::Random;
+
+    /// Term by term as the formula is written, to the last bit, for every number of terms up to three rounds of the lanes.
+    #[test]
+    fn terms_side_by_side_have_the_bits_of_terms_in_a_row() {
+        let mut r = Random::new(3);
+        for n in 0..=3 * LANES {
+            let mut draw = || (0..n).map(|_| r.normal()).collect::<Vec<f64>>();
+            let plant = DiscretePlant {
+                sample_time_s: 1.0,
+                whole: 0,
+                rest_s: 0.0,
+                pole: vec![Complex::new(0.0, 0.0); n],
+                weight: vec![Complex::new(0.0, 0.0); n],
+                lambda_re: draw(),
+                lambda_im: draw(),
+                now_re: draw(),
+                now_im: draw(),
+                before_re: draw(),
+                before_im: draw(),
+                rigid2: 0.0,
+                rigid1: 0.0,
+            };
+            let z = Complex::from_polar(1.0, r.normal());
+            let mut plain = [Complex::new(0.0, 0.0); 2];
+            for i in 0..n {
+                let lambda = Complex::new(plant.lambda_re[i], plant.lambda_im[i]);
+                let gains = [(&plant.now_re, &plant.now_im), (&plant.before_re, &plant.before_im)];
+                let (upper, lower) = (z - lambda, z - lambda.conj());
+                for (sum, (re, im)) in plain.iter_mut().zip(gains) {
+                    let gain = Complex::new(re[i], im[i]);
+                    *sum += (gain * lower + gain.conj() * upper) * (0.5 / (upper * lower));
+                }
+            }
+            assert_eq!(widest(Modes { plant: &plant, z }), plain, "{n} terms");
+        }
     }
 }
