@@ -15,20 +15,23 @@ const PLANT: &str = include_str!("../specs/machines/tunable.toml");
 const SPEC: &str = include_str!("../specs/limits/paper.toml");
 const PROFILE: &str = include_str!("../specs/profiles/spiral.toml");
 
-/// A folder with plant, spec, profile and a tuned table.
+/// A folder with plant, the paper's spec, profile and a tuned table.
 fn folder(name: &str) -> PathBuf {
+    folder_of(name, &SPEC.replace("../profiles/spiral.toml", "spiral.toml"), PROFILE)
+}
+
+fn folder_of(name: &str, spec_text: &str, profile: &str) -> PathBuf {
     let dir = std::env::temp_dir().join(format!("servotune_verify_{name}_{}", std::process::id()));
     std::fs::create_dir_all(&dir).unwrap();
-    let spec_text = SPEC.replace("../profiles/spiral.toml", "spiral.toml");
     let read: PlantFile = servotune::document::parse_toml(Path::new("plant"), PLANT).unwrap();
     let plant = Plant::try_from(read).unwrap();
-    let spec = Spec::parse(&spec_text, PROFILE).unwrap();
+    let spec = Spec::parse(spec_text, profile).unwrap();
     let settings = TuneSettings { starts: 4, ..TuneSettings::default() };
     let outcome = tune(&Machine::Model(&plant), &spec, Some(&nominal_controller().unwrap()), &settings).unwrap();
     let inputs = vec![InputDigest { role: "plant".into(), sha256: sha256_hex(PLANT.as_bytes()) }];
     let table = GainTable::of(&outcome, 1, sha256_hex(spec_text.as_bytes()), inputs).unwrap();
     table.write(&dir.join("gains.toml")).unwrap();
-    for (file, text) in [("plant.toml", PLANT), ("spec.toml", spec_text.as_str()), ("spiral.toml", PROFILE)] {
+    for (file, text) in [("plant.toml", PLANT), ("spec.toml", spec_text), ("spiral.toml", profile)] {
         std::fs::write(dir.join(file), text).unwrap();
     }
     dir
@@ -77,6 +80,19 @@ fn a_table_is_proved_and_every_change_is_seen() {
     let (code, text) = verify(&dir, &[]);
     assert!(code == 2 && text.contains("slew_limit"), "{text}");
     std::fs::remove_dir_all(dir).unwrap();
+}
+
+#[test]
+fn a_band_above_half_the_rate_of_the_record_has_no_figure_and_hinders_no_proof() {
+    let spec = "sample_time_s = 3.96e-5\nprofile = \"spiral.toml\"\n[objective]\nminimise = \"pes_rms\"\n[margins]\nmax_sensitivity = 2.4\n";
+    // Half of 1 kHz lies below both bands.
+    let slow = PROFILE.replace("27480", "1000").replace("[200, 400]", "[20, 50]");
+    assert_ne!(slow, PROFILE);
+    let dir = folder_of("no_bin", spec, &slow);
+    assert!(!std::fs::read_to_string(dir.join("gains.toml")).unwrap().contains("dft_low"));
+    let (code, text) = verify(&dir, &[]);
+    assert_eq!(code, 0, "{text}");
+    std::fs::remove_dir_all(&dir).unwrap();
 }
 
 fn run(dir: &Path, words: &[&str]) -> (i32, String, String) {

@@ -26,6 +26,9 @@ pub(super) struct Chain {
 /// A pole this close to z = 1 is an integrator, closer to the circle elsewhere undecidable: the rounding of 1 + a1 + a2.
 const ON_CIRCLE: f64 = 1e-12;
 
+/// A value this many times its rounding has a logarithm.
+const DROWNED: f64 = 1e3;
+
 /// Roots of a z² + b z + c, fewer where leading coefficients vanish.
 fn roots(a: f64, b: f64, c: f64) -> Vec<Complex<f64>> {
     if a == 0.0 {
@@ -114,7 +117,9 @@ impl Chain {
             let s = &r.section;
             let over = factor([1.0, s.a1, s.a2], &r.poles, z, half);
             let beside = r.zeros.iter().any(|root| (z - root).norm_sqr().sqrt() < 3.0 * half + 1e-9);
-            let zeros = if beside {
+            // Near a double zero the value drowns in its rounding, and a logarithm would have no slope.
+            let (value, _, rounding) = quadratic([s.b0, s.b1, s.b2], back);
+            let zeros = if beside || value.norm_sqr().sqrt() < DROWNED * rounding {
                 zero([s.b0, s.b1, s.b2], back, half)
             } else {
                 factor([s.b0, s.b1, s.b2], &r.zeros, z, half)
@@ -160,6 +165,23 @@ mod tests {
         // Roots 1 and 0.25; 0.7 and 0.8; 2 and 0.5.
         assert_eq!((c.integrators, c.outside), (1, 1));
         assert!(matches!(Chain::of(&[s(0.0, 1.0)]), Err(VerifyError::OnCircle { section: 0, .. })));
+    }
+
+    /// A low-pass by the bilinear rule has two zeros at half the sample rate: its response there is held by any cell, and is next to nothing.
+    #[test]
+    fn cells_beside_a_double_zero_are_bounded() {
+        let lowpass = Section { b0: 0.9, b1: 1.8, b2: 0.9, a1: 1.78, a2: 0.8 };
+        let c = Chain::of(&[lowpass]).unwrap();
+        for i in 1..200 {
+            let distance = 10f64.powf(-12.0 + 0.05 * f64::from(i));
+            for share in [1.0, 0.3, 0.01] {
+                let half = 0.5 * share * distance;
+                let p = c.patch(std::f64::consts::PI - distance - half, std::f64::consts::PI - distance + half);
+                // |1 + 1/z|² 0.9 over the least of the denominator, which is 0.02 there.
+                let most = 1.0001 * 0.9 * (1.0 + share).powi(2) * distance * distance / 0.0199 + 1e-11;
+                assert!(p.radius.is_finite() && p.size().high < 4.0 * most, "{distance:e} {share} {:e}", p.size().high);
+            }
+        }
     }
 
     #[test]
