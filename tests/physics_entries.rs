@@ -40,7 +40,7 @@ fn parameters_and_restore_are_inverse_at_every_point_of_every_grid() {
         }
         for e in library() {
             let facts = e.facts();
-            let grid = e.grid(&scene);
+            let grid = e.scan_points(&scene);
             assert!(!grid.is_empty(), "{}", facts.name);
             for inner in grid {
                 let strengths: Vec<f64> =
@@ -56,7 +56,7 @@ fn parameters_and_restore_are_inverse_at_every_point_of_every_grid() {
                 gone.into_iter().for_each(|c| setting.strengths[c] = 0.0);
                 let named: BTreeMap<String, f64> =
                     e.parameters(&setting, &scene).iter().map(|p| (p.name.to_string(), p.value)).collect();
-                let back = e.restore(&Given::new(facts.name, &named), &scene).unwrap();
+                let back = e.from_parameters(&Given::new(facts.name, &named), &scene).unwrap();
                 for (a, b) in [(&setting.inner, &back.inner), (&setting.strengths, &back.strengths)] {
                     assert_eq!(a.len(), b.len(), "{}", facts.name);
                     for (x, y) in a.iter().zip(b) {
@@ -88,7 +88,7 @@ fn columns_are_finite_pure_and_zero_at_rest() {
     });
     for e in library() {
         let facts = e.facts();
-        for inner in e.grid(&scene) {
+        for inner in e.scan_points(&scene) {
             let mut moved = e.law(&inner, &scene);
             for pair in moving.windows(2) {
                 let (mut first, mut second) = ([0.0; COLUMNS], [0.0; COLUMNS]);

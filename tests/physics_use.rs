@@ -293,7 +293,7 @@ fn what_an_effect_reports_it_takes_back() {
     let scene = restored(&plant, &[]).scene;
     let scene = servotune::physics::Scene { spindle_hz: Some(120.0), duration_s: 0.5, ..scene };
     for effect in servotune::physics::library() {
-        let Some(inner) = effect.grid(&scene).into_iter().next() else { continue };
+        let Some(inner) = effect.scan_points(&scene).into_iter().next() else { continue };
         let strengths =
             if effect.facts().fixed { vec![1.0; effect.facts().columns] } else { vec![0.1; effect.facts().columns] };
         let setting = servotune::physics::Setting { inner, strengths };

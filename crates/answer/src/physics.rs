@@ -30,6 +30,6 @@ pub fn for_a_loop(plant: Named<'_, Plant>, context: &Context, say: Say<'_>) -> R
 /// Effects without a part in the loop's response: disturbances.
 pub fn outside(physics: &Restored) -> Vec<&'static str> {
     let acts_from_outside =
-        |(e, s): &&(&'static dyn Effect, Setting)| e.share(s, &physics.scene, 1.0) == Share::Outside;
+        |(e, s): &&(&'static dyn Effect, Setting)| e.response_share(s, &physics.scene, 1.0) == Share::Outside;
     physics.parts.iter().filter(acts_from_outside).map(|(e, _)| e.facts().name).collect()
 }

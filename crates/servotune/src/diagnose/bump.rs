@@ -230,9 +230,9 @@ fn bent(bench: &Bench, bump: &Bump) -> bool {
     let Ok(sampled) = Sampled::of(&bench.form.given, bench.scene.sample_time_s) else { return false };
     let explains = |e: &dyn Effect| {
         let gain = |inner: &Vec<f64>| Difference::of(bench, &sampled, e, inner).gain();
-        e.grid(&bench.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
+        e.scan_points(&bench.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
     };
-    library().iter().filter(|e| e.bends()).any(|e| explains(*e) > PUSH_BY_AMPLIFIER * bump.gain)
+    library().iter().filter(|e| e.is_hard_nonlinearity()).any(|e| explains(*e) > PUSH_BY_AMPLIFIER * bump.gain)
 }
 
 /// The pushes that the final model does not do without: at a limit or at the end of a slip repeats differ too, and look like pushes.

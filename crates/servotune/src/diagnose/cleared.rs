@@ -187,10 +187,10 @@ impl<'a> Balance<'a> {
                 false => numbers[4..4 + own].iter().map(|s| s / gain).collect(),
             };
             let setting = Setting { inner: inner.to_vec(), strengths };
-            let (continuous, range) = super::scan::freedom(&effect.grid(scene), inner);
+            let (continuous, range) = super::scan::freedom(&effect.scan_points(scene), inner);
             Chosen { effect, setting, continuous, range, step: 0 }
         });
-        if law.as_ref().is_some_and(|l| !l.effect.possible(&l.setting, &[])) {
+        if law.as_ref().is_some_and(|l| !l.effect.is_possible(&l.setting, &[])) {
             return None;
         }
         Some(Balanced { plant, law, left })
@@ -221,11 +221,11 @@ impl<'a> Balance<'a> {
     fn laws(&self) -> Vec<(f64, Balanced)> {
         let Some(linear) = self.solved(None) else { return Vec::new() };
         let bends = |e: &&&'static dyn Effect| {
-            (e.bends() || e.drag()) && !e.facts().per_record && e.facts().entry != Entry::Position
+            (e.is_hard_nonlinearity() || e.is_drag()) && !e.facts().per_record && e.facts().entry != Entry::Position
         };
         let effects: Vec<&'static dyn Effect> = library().iter().filter(bends).copied().collect();
         let best = |e: &&'static dyn Effect| -> Option<(f64, Balanced)> {
-            let grid = e.grid(&self.scene);
+            let grid = e.scan_points(&self.scene);
             let all = grid.iter().filter_map(|inner| self.solved(Some((*e, inner))));
             let best = all.min_by(|a, b| a.left.total_cmp(&b.left))?;
             let share = best.left / linear.left;

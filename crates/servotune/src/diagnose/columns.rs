@@ -82,7 +82,7 @@ pub(super) fn entering(
 /// peaks stay below a limit that every one of them meets, the mean turns round once where each turns at a time of its own.
 pub fn raw_columns(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectory: &Trajectory) -> Vec<Vec<f64>> {
     let samples = &trajectory.samples;
-    if !effect.bends() || trajectory.repeats.is_empty() {
+    if !effect.is_hard_nonlinearity() || trajectory.repeats.is_empty() {
         return columns_along(effect, inner, scene, samples);
     }
     let share = 1.0 / trajectory.repeats.len() as f64;

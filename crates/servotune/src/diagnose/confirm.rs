@@ -57,7 +57,7 @@ pub(super) fn confirm(
         Ok(all)
     };
     let mut out = Vec::new();
-    let strays = |c: &Chosen| c.effect.facts().per_record || c.effect.clocked();
+    let strays = |c: &Chosen| c.effect.facts().per_record || c.effect.has_own_clock();
     if asked.is_empty() || model.chosen.iter().any(strays) {
         return Ok(out);
     }

@@ -20,7 +20,9 @@ pub(super) fn deep(step: &Step) -> bool {
 /// Fits the best laws of a step by simulation, drags first, and keeps what is better: much is left, and along a noisy or a stuck motion a law that
 /// bends falls far short of itself.
 pub(super) fn by_simulation_first(bench: &Bench, step: &mut Step) {
-    let last = |m: &Model| m.chosen.last().map(|c| (c.effect.facts().name, c.effect.drag() || c.effect.bends()));
+    let last = |m: &Model| {
+        m.chosen.last().map(|c| (c.effect.facts().name, c.effect.is_drag() || c.effect.is_hard_nonlinearity()))
+    };
     let mut order: Vec<usize> = (0..step.tried.len()).collect();
     let rank = |i: &usize| {
         let model = &step.tried[*i].1;
@@ -75,7 +77,7 @@ pub(super) fn foretold(bench: &Bench, model: &Model, step: &mut Step) -> bool {
         setting: found.chosen[0].setting.clone(),
         gain: model.evidence - found.evidence,
         concealed: 0.0,
-        points: law.effect.grid(&bench.scene).len(),
+        points: law.effect.scan_points(&bench.scene).len(),
         strengths: if law.effect.facts().fixed { 1 } else { law.setting.strengths.len() },
         continuous: law.continuous,
         range: law.range,

@@ -26,7 +26,7 @@ impl Difference {
     /// The differences of a law among the repeats; zero where it answers in proportion to the command.
     pub fn of(bench: &Bench, sampled: &Sampled, effect: &dyn Effect, inner: &[f64]) -> Difference {
         let mut sum = Difference::default();
-        if !effect.bends() || effect.facts().entry != Entry::Command {
+        if !effect.is_hard_nonlinearity() || effect.facts().entry != Entry::Command {
             return sum;
         }
         let t = bench.scene.sample_time_s;
@@ -61,7 +61,7 @@ impl Difference {
 
 /// What all effects of a model take of what repeats differ by.
 pub fn differing(bench: &Bench, chosen: &[Chosen], p: &[f64]) -> f64 {
-    if !chosen.iter().any(|c| c.effect.bends()) {
+    if !chosen.iter().any(|c| c.effect.is_hard_nonlinearity()) {
         return 0.0;
     }
     let Ok(sampled) = Sampled::of(&bench.form.carrier(p).plant, bench.scene.sample_time_s) else { return 0.0 };

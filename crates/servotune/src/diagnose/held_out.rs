@@ -87,7 +87,7 @@ fn loudest(bench: &Bench) -> f64 {
 ///
 /// None where a law goes by a clock of its own, which each record starts anew.
 pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) -> Option<&'a HeldOut> {
-    if model.chosen.iter().any(|c| c.effect.facts().per_record || c.effect.clocked()) {
+    if model.chosen.iter().any(|c| c.effect.facts().per_record || c.effect.has_own_clock()) {
         return None;
     }
     let loudest = loudest(bench);

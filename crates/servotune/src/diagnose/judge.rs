@@ -67,8 +67,8 @@ impl Judged<'_> {
         let direct = Sampled::of(self.plant, t)?.direct;
         let mut all = free_motions(&self.plant.body, t, run.len()).to_vec();
         all.extend(self.lines.iter().flat_map(|l| l.columns(run, t)));
-        all.extend(self.effects.iter().flat_map(|(e, s)| e.free(&s.inner, self.scene, run.len())));
-        for tau in self.effects.iter().filter_map(|(e, s)| e.fades(&s.inner)) {
+        all.extend(self.effects.iter().flat_map(|(e, s)| e.free_motions(&s.inner, self.scene, run.len())));
+        for tau in self.effects.iter().filter_map(|(e, s)| e.memory_time_s(&s.inner)) {
             let left: Vec<f64> = (0..run.len()).map(|k| (-(k as f64 * t) / tau).exp()).collect();
             let mut y = vec![0.0; run.len()];
             direct.add_response(&left, &mut y);

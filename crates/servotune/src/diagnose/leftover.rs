@@ -40,7 +40,7 @@ pub(super) fn leftover(
     }
     let chance = |c: &Candidate| c.log_p_value(library.len()).max(hums(bench, c, c.gain, library.len()));
     let strongest = |candidates: &[Candidate]| {
-        let possible = candidates.iter().filter(|c| c.effect.possible(&c.setting, &[]));
+        let possible = candidates.iter().filter(|c| c.effect.is_possible(&c.setting, &[]));
         possible.min_by(|a, b| chance(a).total_cmp(&chance(b))).filter(|c| chance(c) < limit).cloned()
     };
     let along = match steps.last().filter(|s| s.taken.is_none()) {

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 pub(super) fn follows_motion(bench: &Bench, model: &Model, at: usize) -> bool {
     let chosen = &model.chosen[at];
     let facts = chosen.effect.facts();
-    if !facts.per_record || !chosen.effect.strays() {
+    if !facts.per_record || !chosen.effect.independent_of_motion() {
         return false;
     }
     let carrier = bench.form.carrier(&model.refitted.p).plant;

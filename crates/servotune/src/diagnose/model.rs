@@ -37,7 +37,7 @@ impl Model {
             let count = if c.effect.facts().fixed { 0 } else { c.setting.strengths.len() };
             let errors: Vec<f64> = (from..from + count).map(|i| self.refitted.spread(i)).collect();
             from += count;
-            c.effect.possible(&c.setting, &errors)
+            c.effect.is_possible(&c.setting, &errors)
         })
     }
 

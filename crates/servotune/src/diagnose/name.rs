@@ -30,7 +30,7 @@ const NUDGE: f64 = 1.01;
 
 /// Whether two names are both drags.
 pub(super) fn same_drag(a: &str, b: &str) -> bool {
-    [a, b].into_iter().all(|name| effect(name).is_some_and(|e| e.drag()))
+    [a, b].into_iter().all(|name| effect(name).is_some_and(|e| e.is_drag()))
 }
 
 pub(super) fn text_of(name: &str) -> (&'static str, crate::physics::Port) {
@@ -95,7 +95,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
         family.push("repeatable_runout".to_owned());
     }
     // Where the refit leaves next to nothing, a slight curve in the spectrum may be what its own straightness falls short of.
-    let line = chosen.effect.hums();
+    let line = chosen.effect.is_tone();
     let curve =
         line || chosen.effect.facts().port == crate::physics::Port::Structure && c.concealed > SLIGHT_CONFOUNDED;
     let slight = SLIGHT.max(SLIGHT_SHARE * (selection.given - selection.baseline.cost));
@@ -110,7 +110,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
         parameters.insert("base_hz".into(), plain(bench.scene.spindle_hz.unwrap_or(0.0), "Hz"));
     }
     let place = place(bench, &bench.stack, &signal);
-    let always = chosen.effect.once() && bench.stack.segments.len() > 1;
+    let always = chosen.effect.is_single_event() && bench.stack.segments.len() > 1;
     let when = if always { ", at the same time of every record: it comes with the record" } else { "" };
     let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
     Some(Finding {
@@ -127,7 +127,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
 /// Effects that do the same to the recorded position from another place of a linear machine: where a lag sits, before the plant or behind
 /// it, no record of the two ends tells.
 fn twins<'a>(bench: &'a Bench, chosen: &'a Chosen) -> impl Iterator<Item = &'static str> + 'a {
-    let ratio = |e: &dyn Effect, w: f64| match e.share(&chosen.setting, &bench.scene, w) {
+    let ratio = |e: &dyn Effect, w: f64| match e.response_share(&chosen.setting, &bench.scene, w) {
         Share::Ratio(r) => Some(r),
         _ => None,
     };
@@ -209,7 +209,7 @@ fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String
         .map(|(k, p)| {
             let off = moved.iter().map(|m| m.get(k).map_or(0.0, |q| (q.value - p.value).powi(2))).sum::<f64>();
             let exact = nudged.get(k).is_none_or(|q| q.value == p.value);
-            let form = if exact { 0.0 } else { effect.form(&chosen.setting, p.name) * p.value };
+            let form = if exact { 0.0 } else { effect.form_uncertainty(&chosen.setting, p.name) * p.value };
             let off = off.sqrt().hypot(form);
             // Inner numbers are above 0: lengths, times, frequencies, damping.
             let inner = by_strength.get(k).is_some_and(|q| q.value == p.value);

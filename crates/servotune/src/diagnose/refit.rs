@@ -277,7 +277,7 @@ impl Fit<'_> {
     /// Whitened motions of their own that effects may begin a record in, with the first sample of each.
     fn free(&self, effects: &[(&dyn Effect, &[f64])]) -> Vec<(usize, Vec<f64>)> {
         let of = |s: &Segment| {
-            let all = effects.iter().flat_map(|(e, inner)| e.free(inner, self.scene, s.len));
+            let all = effects.iter().flat_map(|(e, inner)| e.free_motions(inner, self.scene, s.len));
             all.map(|mut c| {
                 self.whitener.apply(&mut c);
                 (s.start, c)

@@ -34,7 +34,7 @@ pub(super) fn more(bench: &Bench, law: &Chosen, than: &Chosen) -> f64 {
     let price = (bench.stack.total as f64).ln();
     let of = |c: &Chosen| {
         let numbers = numbers(c) + begun(bench, &c.setting.inner, c.effect);
-        price * numbers as f64 - if c.effect.usual() { USUAL_LAW } else { 0.0 }
+        price * numbers as f64 - if c.effect.is_on_every_machine() { USUAL_LAW } else { 0.0 }
     };
     of(law) - of(than)
 }

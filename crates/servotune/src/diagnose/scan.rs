@@ -185,7 +185,9 @@ impl<'a, 'f> Ground<'a, 'f> {
 
     /// What an effect shows in what repeats differ by.
     fn difference(&self, effect: &dyn Effect, inner: &[f64]) -> Option<Difference> {
-        self.repeats.filter(|_| effect.bends()).map(|bench| Difference::of(bench, &self.sampled, effect, inner))
+        self.repeats
+            .filter(|_| effect.is_hard_nonlinearity())
+            .map(|bench| Difference::of(bench, &self.sampled, effect, inner))
     }
 
     /// The normal equations of an effect at one point.
@@ -257,7 +259,8 @@ impl<'a, 'f> Ground<'a, 'f> {
         classes.par_iter_mut().take(REFINED).for_each(|peaks| {
             peaks.par_iter_mut().for_each(|c| {
                 self.refine(c);
-                if let Some(inner) = c.effect.instead(&c.setting).filter(|_| !c.effect.possible(&c.setting, &[])) {
+                if let Some(inner) = c.effect.equivalent(&c.setting).filter(|_| !c.effect.is_possible(&c.setting, &[]))
+                {
                     self.put(c, inner);
                     self.refine(c);
                 }
@@ -272,7 +275,7 @@ impl<'a, 'f> Ground<'a, 'f> {
         let mut all: Vec<Vec<Candidate>> = effects
             .par_iter()
             .flat_map(|e| {
-                let grid = e.grid(self.fit.scene);
+                let grid = e.scan_points(self.fit.scene);
                 classes(&grid).into_par_iter().map(move |class| self.peaks(*e, &grid, &class))
             })
             .collect();

@@ -173,7 +173,7 @@ impl Search<'_> {
             gain = gain.min(taken_by_last(bench, next, settings.iterations));
         }
         let explained = (self.baseline.evidence - model.evidence).max(0.0);
-        let dragged = model.chosen.iter().any(|c| c.effect.drag());
+        let dragged = model.chosen.iter().any(|c| c.effect.is_drag());
         let share = if dragged && gain < BESIDE_DRAG * explained { REST_BESIDE_DRAG } else { settings.share };
         let asked = share * (model.excess() - 2.0 * model.sigma).max(0.0);
         let minor = ADDS.get(model.chosen.len()).copied().unwrap_or(0.0) * explained;

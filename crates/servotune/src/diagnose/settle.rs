@@ -44,7 +44,7 @@ pub(super) fn spare(
     before: f64,
     iterations: usize,
 ) {
-    let drag = |c: &Chosen| c.effect.drag();
+    let drag = |c: &Chosen| c.effect.is_drag();
     let most = model.chosen.iter().map(|c| gain_of(steps, c)).fold(0.0, f64::max);
     let small = |c: &Chosen| gain_of(steps, c) < SMALL_BESIDE_DRAG * most;
     let price = (bench.stack.total as f64).ln();
@@ -103,7 +103,7 @@ fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, itera
         let without = fitted(bench, chosen, &model.refitted.p, iterations);
         let seen = scan_at(bench, &alike, &without, &without.refitted.p);
         let close = seen.iter().filter(|c| c.gain >= near * (without.cost - model.cost));
-        let possible = close.filter(|c| c.effect.possible(&c.setting, &[]));
+        let possible = close.filter(|c| c.effect.is_possible(&c.setting, &[]));
         let mut afresh: Vec<(f64, Chosen)> = possible.map(|c| (c.gain, c.chosen(own.step))).collect();
         afresh.sort_by(|a, b| b.0.total_cmp(&a.0));
         for (_, c) in afresh {

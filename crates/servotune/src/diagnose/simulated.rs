@@ -96,7 +96,7 @@ fn descended(bench: &Bench, model: &Model) -> Option<Model> {
     }
     let x = best;
     let (p, chosen) = problem.unpack(&x);
-    if !chosen.iter().all(|c| c.effect.possible(&c.setting, &[])) {
+    if !chosen.iter().all(|c| c.effect.is_possible(&c.setting, &[])) {
         return None;
     }
     // The errors of what was not moved stay those of the search.
@@ -119,7 +119,7 @@ fn with_late_numbers(model: &Model) -> Model {
     let strengths = model.chosen.iter().filter(|c| !c.effect.facts().fixed).map(|c| c.setting.strengths.len());
     let mut at = model.refitted.p.len() + strengths.sum::<usize>();
     for c in &mut open.chosen {
-        let late = c.effect.late(&c.setting.inner);
+        let late = c.effect.measured_in_last_fit(&c.setting.inner);
         for i in 0..c.setting.inner.len() {
             if let Some((_, range)) = late.iter().find(|(place, _)| *place == i && !c.continuous[i]) {
                 (c.continuous[i], c.range[i]) = (true, *range);

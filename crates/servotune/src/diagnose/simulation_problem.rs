@@ -348,7 +348,7 @@ pub(super) fn descended(bench: &Bench, model: &Model, law: Option<&Law>, runs: &
     minimise(&mut problem, &mut x, &settings, &mut Workspace::default());
     let after = size(&problem.settle(&x));
     let (p, chosen) = problem.unpack(&x);
-    let possible = after < before && chosen.iter().all(|c| c.effect.possible(&c.setting, &[]));
+    let possible = after < before && chosen.iter().all(|c| c.effect.is_possible(&c.setting, &[]));
     let mut moved = model.clone();
     if possible {
         (moved.refitted.plant, moved.refitted.p, moved.chosen) = (bench.form.plant(&p), p, chosen);

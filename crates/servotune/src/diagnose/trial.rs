@@ -84,7 +84,7 @@ impl Trial<'_> {
         progress("simulating all records");
         let last = selection.last();
         // Where commands bend, repeats differ by more than a linear arm answers: no sign of a push.
-        let unrest = unrest.filter(|_| !last.chosen.iter().any(|c| c.effect.bends()));
+        let unrest = unrest.filter(|_| !last.chosen.iter().any(|c| c.effect.is_hard_nonlinearity()));
         remarks.extend(unrest.as_ref().map(|u| u.says(&self.given.command_unit)));
         // What the search found, whether or not it is offered.
         let fixed = corrected(&bench.form, &last.refitted.p, &last.chosen, &bench.scene);

@@ -43,7 +43,7 @@ impl Worth<'_> {
     /// Whether a machine may have it beside the model, these records tell it, and chance does not make it.
     fn sound(&self, c: &Candidate) -> bool {
         let concealed = if self.model.excess_sigma() < NEAR_NOISE { CONFOUNDED_NEAR_NOISE } else { CONFOUNDED };
-        self.is_new(c) && c.effect.possible(&c.setting, &[]) && self.beyond_chance(c) && c.concealed < concealed
+        self.is_new(c) && c.effect.is_possible(&c.setting, &[]) && self.beyond_chance(c) && c.concealed < concealed
     }
 
     /// Whether it is another thing than the effects of the model.
@@ -54,7 +54,10 @@ impl Worth<'_> {
             !same_drag(name, known) && (known != name || again(c, &m.setting))
         });
         // A push falls into one record; what every repeat shows at the same time is none.
-        other && (!c.effect.once() || self.bench.stack.segments.iter().any(|s| s.runs.len() == 1) || together(c))
+        other
+            && (!c.effect.is_single_event()
+                || self.bench.stack.segments.iter().any(|s| s.runs.len() == 1)
+                || together(c))
     }
 
     fn beyond_chance(&self, c: &Candidate) -> bool {
@@ -76,7 +79,7 @@ impl Worth<'_> {
             _ => false,
         };
         turn && (worth.len() < self.settings.refits
-            || c.effect.drag() && seen == 0 && self.model.excess_sigma() > FAR_FROM_NOISE)
+            || c.effect.is_drag() && seen == 0 && self.model.excess_sigma() > FAR_FROM_NOISE)
     }
 
     /// Of two forms of one law, the one that is worth its numbers most: each number is paid for (Schwarz 1978).
@@ -90,7 +93,7 @@ impl Worth<'_> {
 
 /// Numbers of each record's own that an effect brings with it: motions that a record may begin in.
 pub(super) fn begun(bench: &Bench, inner: &[f64], effect: &dyn Effect) -> usize {
-    effect.free(inner, &bench.scene, 1).len() * bench.stack.segments.len()
+    effect.free_motions(inner, &bench.scene, 1).len() * bench.stack.segments.len()
 }
 
 /// Free numbers of a candidate.
@@ -102,7 +105,7 @@ pub(super) fn numbers(c: &Candidate) -> f64 {
 /// Logarithm of the chance of a hum's gain where the noise itself is stronger near its frequency, a narrow band of it being no hum;
 /// -infinity for all other effects.
 pub(super) fn hums(bench: &Bench, c: &Candidate, gain: f64, effects: usize) -> f64 {
-    if !c.effect.hums() {
+    if !c.effect.is_tone() {
         return f64::NEG_INFINITY;
     }
     let fair = Candidate { gain: gain / bench.noise_near(c.setting.inner[0]), ..c.clone() };
@@ -111,12 +114,12 @@ pub(super) fn hums(bench: &Bench, c: &Candidate, gain: f64, effects: usize) -> f
 
 /// Whether a second one of the same effect can be another thing: another line, another mode.
 fn again(c: &Candidate, first: &Setting) -> bool {
-    c.effect.several() && (first.inner[0] - c.setting.inner[0]).abs() > 0.02 * first.inner[0].abs()
+    c.effect.may_occur_several_times() && (first.inner[0] - c.setting.inner[0]).abs() > 0.02 * first.inner[0].abs()
 }
 
 /// Logarithm of the closed-form bound of the strongest candidate beside a model.
 pub(super) fn strongest(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> f64 {
     let step = scan(bench, library, model);
-    let possible = step.candidates.iter().filter(|c| c.effect.possible(&c.setting, &[]) && c.concealed < CONFOUNDED);
+    let possible = step.candidates.iter().filter(|c| c.effect.is_possible(&c.setting, &[]) && c.concealed < CONFOUNDED);
     possible.map(|c| c.log_p_value(library.len())).fold(0.0, f64::min)
 }

@@ -44,7 +44,7 @@ impl<'a> DescribedPlant<'a> {
         let mut plant = scene.plant.clone();
         let (mut parts, mut terms) = (Vec::new(), Vec::new());
         for (effect, setting) in &physics.parts {
-            let linear = match effect.share(setting, scene, 1.0) {
+            let linear = match effect.response_share(setting, scene, 1.0) {
                 Share::Outside => continue,
                 Share::Delay(late) => {
                     plant.delay_s += late;
@@ -157,7 +157,7 @@ impl<'a> Described<'a> {
     fn sum(&self, entry: Entry, w: f64, motion: &Motion, input: Complex<f64>) -> Complex<f64> {
         let p = self.plant;
         let each = |(part, steady): (&Part<'_>, &Option<Complex<f64>>)| {
-            steady.unwrap_or_else(|| match part.effect.share(part.setting, p.scene, w) {
+            steady.unwrap_or_else(|| match part.effect.response_share(part.setting, p.scene, w) {
                 Share::Ratio(r) => r * input,
                 _ => p.cycle.added(part.effect, part.setting, p.scene, motion),
             })

@@ -41,7 +41,7 @@ impl Effect for AerodynamicDrag {
         ShownOver::Velocity
     }
 
-    fn grid(&self, _scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, _scene: &Scene) -> Vec<Vec<f64>> {
         vec![vec![]]
     }
 
@@ -53,11 +53,11 @@ impl Effect for AerodynamicDrag {
         vec![Parameter::new("coefficient", setting.strengths[0], Unit::CommandSecondSquaredPerPositionSquared)]
     }
 
-    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
+    fn is_possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         setting.strengths.first().is_some_and(|s| *s > 0.0)
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting { inner: vec![], strengths: vec![given.need("coefficient")?] })
     }
 }

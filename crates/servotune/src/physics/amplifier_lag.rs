@@ -56,7 +56,7 @@ impl Effect for AmplifierLag {
         &FACTS
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let t = scene.sample_time_s;
         logarithmic(0.1 * t, 20.0 * t, 14).into_iter().map(|tau| vec![tau]).collect()
     }
@@ -73,7 +73,7 @@ impl Effect for AmplifierLag {
         ]
     }
 
-    fn share(&self, setting: &Setting, scene: &Scene, w_rad_s: f64) -> Share {
+    fn response_share(&self, setting: &Setting, scene: &Scene, w_rad_s: f64) -> Share {
         let ratio = scene.sample_time_s / setting.inner[0];
         let keep = (-ratio).exp();
         // Current over command at the samples, then the mean over the interval.
@@ -81,7 +81,7 @@ impl Effect for AmplifierLag {
         Share::Ratio((arrived - 1.0) * -(-ratio).exp_m1() / ratio)
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let tau = if given.has("time_constant_s") {
             given.positive("time_constant_s")?
         } else {

@@ -55,7 +55,7 @@ impl Effect for Backlash {
         ShownOver::Loop
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         // A gap below the sensor's noise still shows: thousands of reversals tell of it.
         let low = (0.1 * scene.noise).max(1e-5 * scene.travel);
         logarithmic(low, scene.travel, 24).into_iter().map(|g| vec![g]).collect()
@@ -70,11 +70,11 @@ impl Effect for Backlash {
     }
 
     /// A machine holds to this law to about a hundredth.
-    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting { inner: vec![given.positive("gap")?], strengths: vec![1.0] })
     }
 }

@@ -34,12 +34,12 @@ impl Effect for BaseMode {
         &FACTS
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let high = 80f64.min(0.2 / scene.sample_time_s);
         [0.01, 0.05, 0.15].iter().flat_map(|&z| scan(3.0, high, z, scene)).collect()
     }
 
-    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
+    fn is_possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         setting.inner[1] < HEAVIEST
     }
 
@@ -47,7 +47,7 @@ impl Effect for BaseMode {
         Box::new(Ringing::at_rest(inner[0], inner[1], scene.sample_time_s, 1))
     }
 
-    fn free(&self, inner: &[f64], scene: &Scene, n: usize) -> Vec<Vec<f64>> {
+    fn free_motions(&self, inner: &[f64], scene: &Scene, n: usize) -> Vec<Vec<f64>> {
         let (w, z) = (TAU * inner[0], inner[1].clamp(0.0, 1.0));
         let turning = w * ((1.0 - z) * (1.0 + z)).sqrt();
         let over = |of: fn(f64) -> f64| {
@@ -65,11 +65,11 @@ impl Effect for BaseMode {
         ]
     }
 
-    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Terms(vec![term(setting.inner[0], setting.inner[1], setting.strengths[0], 0.0)])
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let damping = given.between("damping_ratio", 0.0, 1.0, "above 0 and below 1")?;
         let strengths = vec![given.need("static_gain")?];
         Ok(Setting { inner: vec![given.positive("frequency_hz")?, damping], strengths })

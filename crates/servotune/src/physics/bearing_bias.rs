@@ -90,7 +90,7 @@ impl Effect for BearingBias {
         ShownOver::Loop
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let times = logarithmic(0.01 * scene.duration_s, 3.0 * scene.duration_s, 6);
         let shortest = (6.0 * scene.noise).max(1e-4 * scene.travel);
         let ways = [shortest, 5.0 * shortest, 25.0 * shortest].map(|w| w.min(0.1 * scene.travel));
@@ -115,11 +115,11 @@ impl Effect for BearingBias {
     }
 
     /// Bearings and cables hold to their laws to about a hundredth.
-    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let shortest = given.or("shortest_move", (6.0 * scene.noise).max(1e-4 * scene.travel));
         let inner = vec![given.positive("critical_length")?, given.positive("relaxation_time_s")?, shortest];
         Ok(Setting { inner, strengths: vec![given.need("bias_command")?] })

@@ -63,7 +63,7 @@ impl Effect for CableSpring {
         ShownOver::Position
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let times = logarithmic(20.0 * scene.sample_time_s, 2.0 * scene.duration_s, 10);
         let mut all: Vec<Vec<f64>> = times.into_iter().map(|tau| vec![tau, scene.centre]).collect();
         if matches!(scene.plant.body, Body::FreeInertia { .. }) {
@@ -89,11 +89,11 @@ impl Effect for CableSpring {
     }
 
     /// Bearings and cables hold to their laws to about a hundredth.
-    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let inner = vec![given.or("creep_time_s", 0.0), given.or("centre", scene.centre)];
         Ok(Setting { inner, strengths: vec![given.need("stiffness")?, given.or("quadratic", 0.0)] })
     }

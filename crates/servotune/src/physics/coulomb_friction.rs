@@ -89,7 +89,7 @@ impl Effect for CoulombFriction {
         (place == 0).then_some(DRIER)
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         // At most some twelve times the sensor's noise: shorter than what pre-sliding friction could be seen at.
         let floor = 1e-5 * scene.travel;
         let (short, long) = ((1.5 * scene.noise).max(0.3 * floor), (12.0 * scene.noise).max(2.0 * floor));
@@ -107,11 +107,11 @@ impl Effect for CoulombFriction {
         Box::new(Slider { length: inner[0], speed: inner[1], rise: inner[2], z: 0.0 })
     }
 
-    fn drag(&self) -> bool {
+    fn is_drag(&self) -> bool {
         true
     }
 
-    fn bends(&self) -> bool {
+    fn is_hard_nonlinearity(&self) -> bool {
         true
     }
 
@@ -138,16 +138,16 @@ impl Effect for CoulombFriction {
         all
     }
 
-    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
+    fn is_possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         setting.strengths.first().is_some_and(|s| *s > 0.0)
     }
 
     /// Bearings and cables hold to their laws to about a hundredth.
-    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let length = if given.has("creep_speed") {
             -given.positive("creep_speed")?
         } else if given.has("sliding_length") {

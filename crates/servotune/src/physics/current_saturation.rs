@@ -40,7 +40,7 @@ impl Effect for CurrentSaturation {
         ShownOver::Input
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         // Dense towards the largest command: there few samples are touched, and each point touches others.
         let near = (0..8).map(|i| 1.0 - 0.12 * 0.7f64.powi(i));
         let far = (3..23).map(|i| f64::from(i) / 26.0);
@@ -51,7 +51,7 @@ impl Effect for CurrentSaturation {
         Box::new(Clip { limit: inner[0] })
     }
 
-    fn bends(&self) -> bool {
+    fn is_hard_nonlinearity(&self) -> bool {
         true
     }
 
@@ -59,7 +59,7 @@ impl Effect for CurrentSaturation {
         vec![Parameter::new("limit", setting.inner[0], Unit::Command)]
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting { inner: vec![given.positive("limit")?], strengths: vec![1.0] })
     }
 }

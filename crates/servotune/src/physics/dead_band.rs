@@ -42,7 +42,7 @@ impl Effect for DeadBand {
         ShownOver::Input
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         logarithmic(2e-5 * scene.command, 0.5 * scene.command, 20).into_iter().map(|d| vec![d]).collect()
     }
 
@@ -50,7 +50,7 @@ impl Effect for DeadBand {
         Box::new(Zone { half: inner[0].abs() })
     }
 
-    fn bends(&self) -> bool {
+    fn is_hard_nonlinearity(&self) -> bool {
         true
     }
 
@@ -62,11 +62,11 @@ impl Effect for DeadBand {
     }
 
     /// A machine holds to this law to about a hundredth.
-    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let half =
             if given.has("half_width") { given.positive("half_width")? } else { 0.5 * given.positive("width")? };
         Ok(Setting { inner: vec![half], strengths: vec![1.0] })

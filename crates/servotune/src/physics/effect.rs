@@ -203,7 +203,7 @@ pub trait Effect: Sync {
 
     /// Points of the inner parameters to scan; one empty point where there are none, no point where these records leave
     /// the effect without meaning (no spindle, for instance).
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>>;
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>>;
 
     /// The law for these inner parameters, at rest.
     fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law>;
@@ -213,17 +213,17 @@ pub trait Effect: Sync {
 
     /// Whether a machine can be so: a drag takes energy, it gives none. `errors` are the standard errors of the strengths, empty
     /// where they are not known yet.
-    fn possible(&self, _setting: &Setting, _errors: &[f64]) -> bool {
+    fn is_possible(&self, _setting: &Setting, _errors: &[f64]) -> bool {
         true
     }
 
     /// Whether it is a drag. Any two of them are ends of one law, told apart by a length alone.
-    fn drag(&self) -> bool {
+    fn is_drag(&self) -> bool {
         false
     }
 
     /// Whether it goes by a clock of its own, so that records which were not fitted may find it elsewhere.
-    fn clocked(&self) -> bool {
+    fn has_own_clock(&self) -> bool {
         false
     }
 
@@ -239,33 +239,33 @@ pub trait Effect: Sync {
     }
 
     /// Whether it falls into a single record at a time of its own: a push.
-    fn once(&self) -> bool {
+    fn is_single_event(&self) -> bool {
         false
     }
 
     /// Whether it is a tone of one frequency, which a narrow band of noise looks like.
-    fn hums(&self) -> bool {
+    fn is_tone(&self) -> bool {
         false
     }
 
     /// Whether strengths of each record's own must not follow the motion: what comes anew with every repeat of one move is made by the move.
-    fn strays(&self) -> bool {
+    fn independent_of_motion(&self) -> bool {
         false
     }
 
     /// Whether every machine of this kind has it to some degree: a coil in a magnet gap, an arm on a bearing.
-    fn usual(&self) -> bool {
+    fn is_on_every_machine(&self) -> bool {
         false
     }
 
     /// Whether a machine may have several that differ in their first inner number: lines, modes, pushes.
-    fn several(&self) -> bool {
+    fn may_occur_several_times(&self) -> bool {
         false
     }
 
     /// Whether it answers small differences of a command or a motion out of proportion, by a limit or a turn: repeats then differ by more than
     /// the linear answer to their commands, and their mean is not what it does to their mean.
-    fn bends(&self) -> bool {
+    fn is_hard_nonlinearity(&self) -> bool {
         false
     }
 
@@ -276,38 +276,38 @@ pub trait Effect: Sync {
     }
 
     /// Share by which a number may be off because no machine follows a law to the letter; long records make intervals narrower than that.
-    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
         FORM
     }
 
     /// Inner numbers that the search takes in steps and the last fit as measures: place and range. They are above 0.
-    fn late(&self, _inner: &[f64]) -> Vec<(usize, [f64; 2])> {
+    fn measured_in_last_fit(&self, _inner: &[f64]) -> Vec<(usize, [f64; 2])> {
         Vec::new()
     }
 
     /// Inner numbers under which the same thing is possible, where `setting` is not: a wave of twice its period carried by its second
     /// harmonic.
-    fn instead(&self, _setting: &Setting) -> Option<Vec<f64>> {
+    fn equivalent(&self, _setting: &Setting) -> Option<Vec<f64>> {
         None
     }
 
     /// Motions of its own over `n` samples that a record may begin in, in the recorded position: what still rings from the move before.
-    fn free(&self, _inner: &[f64], _scene: &Scene, _n: usize) -> Vec<Vec<f64>> {
+    fn free_motions(&self, _inner: &[f64], _scene: &Scene, _n: usize) -> Vec<Vec<f64>> {
         Vec::new()
     }
 
     /// Time constant (s) of what a command before the record has left in it, where that is no motion of the body.
-    fn fades(&self, _inner: &[f64]) -> Option<f64> {
+    fn memory_time_s(&self, _inner: &[f64]) -> Option<f64> {
         None
     }
 
     /// Its part in the loop's response at `w_rad_s`, sampled as the law samples it.
-    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Cycle
     }
 
     /// The setting from named parameters; the inverse of [`Effect::parameters`].
-    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError>;
+    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError>;
 }
 
 /// A law in motion. Columns are per unit of strength.

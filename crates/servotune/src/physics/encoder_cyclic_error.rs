@@ -51,7 +51,7 @@ impl Effect for EncoderCyclicError {
         ShownOver::Position
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         // Evenly in 1/P, seven tenths of a wave over twice the travel apart: the nearest point still sees more than half of any
         // wave, and refinement finds the rest.
         let finest = (8.0 * scene.noise).max(scene.travel / 100.0);
@@ -67,13 +67,13 @@ impl Effect for EncoderCyclicError {
         Box::new(Wave { period: inner[0], second: inner[1] > 1.5 })
     }
 
-    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
+    fn is_possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         // A wave whose second harmonic carries it is one of half the period.
         let size = |i: usize| setting.strengths[i].hypot(setting.strengths[i + 1]);
         setting.inner[1] < 1.5 || size(2) < CARRIES * size(0)
     }
 
-    fn instead(&self, setting: &Setting) -> Option<Vec<f64>> {
+    fn equivalent(&self, setting: &Setting) -> Option<Vec<f64>> {
         Some(vec![0.5 * setting.inner[0], setting.inner[1]])
     }
 
@@ -93,7 +93,7 @@ impl Effect for EncoderCyclicError {
         all
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let pair = |amplitude: f64, phase: f64| [amplitude * phase.cos(), -amplitude * phase.sin()];
         let first = pair(given.need("amplitude")?, given.or("phase_deg", 0.0).to_radians());
         let second = pair(given.or("amplitude_2", 0.0), given.or("phase_2_deg", 0.0).to_radians());

@@ -44,7 +44,7 @@ impl Effect for EncoderScaleError {
         ShownOver::Position
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         vec![vec![scene.centre]]
     }
 
@@ -63,7 +63,7 @@ impl Effect for EncoderScaleError {
         ]
     }
 
-    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let inner = vec![given.or("centre", scene.centre)];
         Ok(Setting { inner, strengths: vec![given.need("quadratic")?, given.or("cubic", 0.0)] })
     }

@@ -79,7 +79,7 @@ impl Effect for ExtraDelay {
         &FACTS
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         [0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0].iter().map(|n| vec![n * scene.sample_time_s]).collect()
     }
 
@@ -93,11 +93,11 @@ impl Effect for ExtraDelay {
         vec![Parameter::new("delay_s", setting.inner[0], Unit::Second)]
     }
 
-    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Delay(setting.inner[0])
     }
 
-    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let longest = (LONGEST as f64 + 1e-9) * scene.sample_time_s;
         let delay = given.between("delay_s", 0.0, longest, "above 0 and at most 16 samples")?;
         Ok(Setting { inner: vec![delay], strengths: vec![1.0] })

@@ -260,7 +260,7 @@ impl Effect for FreeForm {
     }
 
     /// None: the search of the library does not look for it.
-    fn grid(&self, _scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, _scene: &Scene) -> Vec<Vec<f64>> {
         Vec::new()
     }
 
@@ -272,7 +272,7 @@ impl Effect for FreeForm {
         Box::new(Curve { port: self.port, spline: of(inner), lag: lag(inner).map(made) })
     }
 
-    fn fades(&self, inner: &[f64]) -> Option<f64> {
+    fn memory_time_s(&self, inner: &[f64]) -> Option<f64> {
         lag(inner)
     }
 
@@ -281,12 +281,12 @@ impl Effect for FreeForm {
         Vec::new()
     }
 
-    fn bends(&self) -> bool {
+    fn is_hard_nonlinearity(&self) -> bool {
         true
     }
 
     /// A reading that turns round does not tell where the arm is.
-    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         let spline = of(&setting.inner);
         let rises = |k: &[f64]| spline.slope(k[0]) > 0.0 && spline.slope(0.5 * (k[0] + k[1])) > 0.0;
         let monotone = self.port != CurvePort::SensorOverPosition || spline.at().windows(2).all(rises);
@@ -294,7 +294,7 @@ impl Effect for FreeForm {
     }
 
     /// Curves are restored from their knots (`restored`), not from named numbers.
-    fn restore(&self, _given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, _given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Err(PhysicsError::Missing { effect: "free_form", parameter: "knots" })
     }
 }

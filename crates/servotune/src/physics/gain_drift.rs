@@ -58,7 +58,7 @@ impl Effect for GainDrift {
         ShownOver::FactorOverTime
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let mut all: Vec<Vec<f64>> = if scene.warm { vec![vec![0.0, 0.0]] } else { Vec::new() };
         // A time constant much above record or session is a straight line in time already.
         let record = logarithmic(0.03 * scene.duration_s, 3.0 * scene.duration_s, 7);
@@ -75,7 +75,7 @@ impl Effect for GainDrift {
         Box::new(Warming { tau: inner[0], session: inner[1] != 0.0, mean: -(-ratio).exp_m1() / ratio })
     }
 
-    fn clocked(&self) -> bool {
+    fn has_own_clock(&self) -> bool {
         true
     }
 
@@ -91,12 +91,12 @@ impl Effect for GainDrift {
         }
     }
 
-    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         // Fully warm: the machine after a long session. With a recorded temperature the cold machine.
         Share::Ratio(Complex::new(if setting.inner[0] > 0.0 { setting.strengths[0] } else { 0.0 }, 0.0))
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         if given.has("gain_per_degree") {
             return Ok(Setting { inner: vec![0.0, 0.0], strengths: vec![given.need("gain_per_degree")?] });
         }

@@ -48,7 +48,7 @@ impl Effect for LineDisturbance {
         &FACTS
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let high = 1000f64.min(0.45 / scene.sample_time_s);
         // Mains of 50 and 60 Hz with harmonics, and rectified, first; then everything that the longest record resolves.
         let mut all: Vec<Vec<f64>> = Vec::new();
@@ -69,11 +69,11 @@ impl Effect for LineDisturbance {
         Box::new(Line { w: TAU * inner[0], mean: if y == 0.0 { 1.0 } else { y.sin() / y } })
     }
 
-    fn several(&self) -> bool {
+    fn may_occur_several_times(&self) -> bool {
         true
     }
 
-    fn hums(&self) -> bool {
+    fn is_tone(&self) -> bool {
         true
     }
 
@@ -88,7 +88,7 @@ impl Effect for LineDisturbance {
 
     /// A hum does not heed what the machine does: it is as strong in every record. What excites itself from record to record is
     /// another thing.
-    fn possible(&self, setting: &Setting, errors: &[f64]) -> bool {
+    fn is_possible(&self, setting: &Setting, errors: &[f64]) -> bool {
         let amplitudes: Vec<f64> = setting.strengths.chunks_exact(2).map(|s| s[0].hypot(s[1])).collect();
         if amplitudes.len() < 2 || errors.len() != setting.strengths.len() {
             return true;
@@ -102,11 +102,11 @@ impl Effect for LineDisturbance {
         chi < free + 3.0 * (2.0 * free).sqrt()
     }
 
-    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let (amplitude, phase) = (given.need("amplitude_command")?, given.or("phase_deg", 0.0).to_radians());
         let strengths = vec![amplitude * phase.cos(), -amplitude * phase.sin()];
         Ok(Setting { inner: vec![given.positive("frequency_hz")?], strengths })

@@ -152,7 +152,7 @@ impl Machine {
     }
 
     /// The free motion at a sample.
-    fn free(&self, k: usize) -> f64 {
+    fn free_motions(&self, k: usize) -> f64 {
         self.free.get(k).copied().unwrap_or(0.0)
     }
 
@@ -209,7 +209,7 @@ impl Machine {
     /// The position as the sensor gives it at this sample, without noise (position_unit).
     pub fn measure(&mut self, spindle_rad: f64, temperature: f64) -> f64 {
         let t = self.delayed.sample_time_s();
-        let x = self.origin + self.pushed.position() + self.torqued.position() + self.free(self.k);
+        let x = self.origin + self.pushed.position() + self.torqued.position() + self.free_motions(self.k);
         self.x = [x, self.x[0], self.x[1]];
         // Second-order backward difference.
         let v = (3.0 * self.x[0] - 4.0 * self.x[1] + self.x[2]) / (2.0 * t);
@@ -285,7 +285,7 @@ impl Machine {
         for j in 0..steps {
             let share = (j + 1) as f64 / steps as f64;
             let answer = self.steps_between.get(j).map_or(self.pushed.position(), |at| self.held.between(at));
-            let (before, after) = (self.free(self.k), self.free(self.k + 1));
+            let (before, after) = (self.free_motions(self.k), self.free_motions(self.k + 1));
             let carried = self.origin + answer + before + share * (after - before);
             self.w = self.solve(&from, carried);
             self.torqued.command(self.w - self.standing[1]);

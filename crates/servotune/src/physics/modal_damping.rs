@@ -118,7 +118,7 @@ impl Effect for ModalDamping {
         &FACTS
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let mut all = Vec::new();
         for (j, pair) in Pair::all(scene) {
             // The amplitude that the largest command as a tone at the mode would reach; real excitation stays below it.
@@ -159,7 +159,7 @@ impl Effect for ModalDamping {
         all
     }
 
-    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let stage = f64::from(given.or("stage", 0.0) != 0.0);
         Ok(Setting { inner: vec![mode(FACTS.name, given, scene)?, given.need("growth")?, stage], strengths: vec![1.0] })
     }

@@ -112,7 +112,7 @@ impl Effect for ModeShift {
         &FACTS
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         if scene.travel <= 0.0 {
             return Vec::new();
         }
@@ -149,7 +149,7 @@ impl Effect for ModeShift {
         all
     }
 
-    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let mode = mode(FACTS.name, given, scene)?;
         let stage = f64::from(given.or("stage", 0.0) != 0.0);
         let inner = vec![mode, given.need("shift_per_position")?, given.or("centre", scene.centre), stage];

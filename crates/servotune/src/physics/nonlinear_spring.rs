@@ -60,7 +60,7 @@ impl Effect for NonlinearSpring {
         ShownOver::Position
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let mut all = vec![vec![scene.centre, 0.0]];
         for share in [0.3, 0.5, 0.65, 0.8, 0.9] {
             all.extend([share, -share].map(|s| vec![scene.centre, s * scene.travel]));
@@ -87,11 +87,11 @@ impl Effect for NonlinearSpring {
     }
 
     /// A machine holds to this law to about a hundredth.
-    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let centre = given.or("centre", scene.centre);
         if given.has("stop_stiffness") {
             let edge = given.need("stop_position")? - centre;

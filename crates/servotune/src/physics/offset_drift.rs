@@ -38,7 +38,7 @@ impl Effect for OffsetDrift {
         &FACTS
     }
 
-    fn grid(&self, _scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, _scene: &Scene) -> Vec<Vec<f64>> {
         vec![vec![]]
     }
 
@@ -46,7 +46,7 @@ impl Effect for OffsetDrift {
         Box::new(Drift)
     }
 
-    fn strays(&self) -> bool {
+    fn independent_of_motion(&self) -> bool {
         true
     }
 
@@ -57,11 +57,11 @@ impl Effect for OffsetDrift {
         ]
     }
 
-    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting { inner: vec![], strengths: vec![given.need("slope")?, given.or("curvature", 0.0)] })
     }
 }

@@ -56,7 +56,7 @@ impl Effect for ParametricGain {
         ShownOver::FactorOverTime
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let mut all: Vec<Vec<f64>> = Vec::new();
         if let Some(spindle) = scene.spindle_hz {
             all.extend((1..=6).map(|n| vec![f64::from(n) * spindle, f64::from(n)]));
@@ -77,7 +77,7 @@ impl Effect for ParametricGain {
         Box::new(Swing { w: TAU * hz, order, mean: if y == 0.0 { 1.0 } else { y.sin() / y } })
     }
 
-    fn clocked(&self) -> bool {
+    fn has_own_clock(&self) -> bool {
         true
     }
 
@@ -91,11 +91,11 @@ impl Effect for ParametricGain {
         ]
     }
 
-    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let (depth, phase) = (given.need("depth")?, given.or("phase_deg", 0.0).to_radians());
         let inner = vec![given.positive("frequency_hz")?, given.or("spindle_order", 0.0)];
         Ok(Setting { inner, strengths: vec![depth * phase.cos(), -depth * phase.sin()] })

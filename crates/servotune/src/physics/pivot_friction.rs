@@ -137,7 +137,7 @@ impl Effect for PivotFriction {
         ShownOver::Loop
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         // Below some twelve times the sensor's noise the hysteresis cannot be told from dry friction.
         let low = (12.0 * scene.noise).max(2e-3 * scene.travel);
         let lengths = logarithmic(low, 4.0 * scene.travel, 14);
@@ -152,11 +152,11 @@ impl Effect for PivotFriction {
         }
     }
 
-    fn drag(&self) -> bool {
+    fn is_drag(&self) -> bool {
         true
     }
 
-    fn bends(&self) -> bool {
+    fn is_hard_nonlinearity(&self) -> bool {
         true
     }
 
@@ -168,20 +168,20 @@ impl Effect for PivotFriction {
         ]
     }
 
-    fn late(&self, inner: &[f64]) -> Vec<(usize, [f64; 2])> {
+    fn measured_in_last_fit(&self, inner: &[f64]) -> Vec<(usize, [f64; 2])> {
         if inner[1] < 0.5 * SHAPES[0] { Vec::new() } else { vec![(1, SHAPES)] }
     }
 
-    fn usual(&self) -> bool {
+    fn is_on_every_machine(&self) -> bool {
         true
     }
 
-    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
+    fn is_possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         setting.strengths.first().is_some_and(|s| *s > 0.0)
     }
 
     /// The first stiffness lies below the smallest strokes: curves that agree above them differ by a tenth there. Dahl's law has one curve.
-    fn form(&self, setting: &Setting, parameter: &str) -> f64 {
+    fn form_uncertainty(&self, setting: &Setting, parameter: &str) -> f64 {
         match parameter {
             "sliding_length" if setting.inner[1] >= 0.5 * SHAPES[0] => 0.1,
             "sliding_length" => 0.02,
@@ -189,7 +189,7 @@ impl Effect for PivotFriction {
         }
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let inner = vec![given.positive("sliding_length")?, given.or("shape", 0.0)];
         Ok(Setting { inner, strengths: vec![given.need("level_command")?] })
     }

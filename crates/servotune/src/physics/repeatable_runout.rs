@@ -54,7 +54,7 @@ impl Effect for RepeatableRunout {
         ShownOver::Spindle
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let Some(spindle) = scene.spindle_hz else { return Vec::new() };
         (1..=8).map(|n| f64::from(n) * spindle).filter(|f| 3.0 * f < scene.nyquist_hz()).map(|f| vec![f]).collect()
     }
@@ -66,7 +66,7 @@ impl Effect for RepeatableRunout {
         Box::new(Runout { order, hz: inner[0] })
     }
 
-    fn several(&self) -> bool {
+    fn may_occur_several_times(&self) -> bool {
         true
     }
 
@@ -79,11 +79,11 @@ impl Effect for RepeatableRunout {
         all
     }
 
-    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         given.need(AMPLITUDES[0])?;
         let mut strengths = Vec::with_capacity(6);
         for h in 0..3 {

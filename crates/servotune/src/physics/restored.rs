@@ -104,7 +104,7 @@ impl Restored {
 
     /// Refuses a plant whose sensor does not tell where the arm is: margins and tuning close a loop on it.
     pub fn seen(&self) -> Result<(), PhysicsError> {
-        let blind = self.parts.iter().find(|(e, s)| e.share(s, &self.scene, 1.0) == Share::Blind);
+        let blind = self.parts.iter().find(|(e, s)| e.response_share(s, &self.scene, 1.0) == Share::Blind);
         blind.map_or(Ok(()), |(e, _)| Err(PhysicsError::Blind { effect: e.facts().name }))
     }
 
@@ -127,7 +127,7 @@ fn setting(e: &'static dyn Effect, entry: &PhysicsEntry, scene: &Scene) -> Resul
     if let Some((parameter, found)) = entry.parameters.iter().find(|(_, v)| !v.is_finite()) {
         return Err(PhysicsError::Finite { effect: name, parameter: parameter.clone(), found: *found });
     }
-    let setting = e.restore(&Given::new(name, &entry.parameters), scene)?;
+    let setting = e.from_parameters(&Given::new(name, &entry.parameters), scene)?;
     // What an effect reports of a setting is what it understands.
     let known: Vec<&str> = e.parameters(&setting, scene).iter().map(|p| p.name).collect();
     match entry.parameters.keys().find(|k| !known.contains(&k.as_str())) {

@@ -69,7 +69,7 @@ impl Effect for SensorCurve {
     }
 
     /// None: along a folded or limited record nothing is seen of the motion behind it.
-    fn grid(&self, _scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, _scene: &Scene) -> Vec<Vec<f64>> {
         Vec::new()
     }
 
@@ -77,7 +77,7 @@ impl Effect for SensorCurve {
         Box::new(Reading { inner: inner.to_vec() })
     }
 
-    fn bends(&self) -> bool {
+    fn is_hard_nonlinearity(&self) -> bool {
         true
     }
 
@@ -97,11 +97,11 @@ impl Effect for SensorCurve {
     }
 
     /// A fold does not tell on which side the arm is.
-    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         if setting.inner[0] == FOLDED { Share::Blind } else { Share::Cycle }
     }
 
-    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         if given.has("fold_position") {
             let at = given.need("fold_position")?;
             return Ok(SensorCurve::folded(given.or("lowest_reading", at), at));

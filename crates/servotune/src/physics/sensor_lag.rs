@@ -58,7 +58,7 @@ impl Effect for SensorLag {
         &FACTS
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let t = scene.sample_time_s;
         logarithmic(0.1 * t, 20.0 * t, 14).into_iter().map(|tau| vec![tau]).collect()
     }
@@ -75,14 +75,14 @@ impl Effect for SensorLag {
         ]
     }
 
-    fn share(&self, setting: &Setting, scene: &Scene, w_rad_s: f64) -> Share {
+    fn response_share(&self, setting: &Setting, scene: &Scene, w_rad_s: f64) -> Share {
         let (step, tau) = (scene.sample_time_s, setting.inner[0]);
         let keep = (-step / tau).exp();
         let z = Complex::from_polar(1.0, w_rad_s * step);
         Share::Ratio((z - 1.0) / (z - keep) * (keep - 1.0) * tau / step)
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let tau = if given.has("time_constant_s") {
             given.positive("time_constant_s")?
         } else {

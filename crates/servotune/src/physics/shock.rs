@@ -50,7 +50,7 @@ impl Effect for Shock {
         &FACTS
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let shortest = (8.0 * scene.sample_time_s).max(scene.duration_s / 200.0);
         let mut all = Vec::new();
         for width in logarithmic(shortest, scene.duration_s / 8.0, 4) {
@@ -66,11 +66,11 @@ impl Effect for Shock {
         Box::new(Pulse { start: inner[0], width: inner[1].abs() })
     }
 
-    fn several(&self) -> bool {
+    fn may_occur_several_times(&self) -> bool {
         true
     }
 
-    fn once(&self) -> bool {
+    fn is_single_event(&self) -> bool {
         true
     }
 
@@ -82,11 +82,11 @@ impl Effect for Shock {
         ]
     }
 
-    fn share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let inner = vec![given.need("time_s")?, given.positive("width_s")?];
         Ok(Setting { inner, strengths: vec![given.need("peak_command")?] })
     }

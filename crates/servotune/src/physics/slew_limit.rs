@@ -62,7 +62,7 @@ impl Effect for SlewLimit {
         &FACTS
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         // A limit above the largest step that occurs does nothing.
         let largest = scene.command_step / scene.sample_time_s;
         // Dense towards it: there few samples are touched, and each point touches others.
@@ -76,7 +76,7 @@ impl Effect for SlewLimit {
         Box::new(Limiter { step: inner[0] * scene.sample_time_s, ramps: inner[1] != 0.0, current: None })
     }
 
-    fn bends(&self) -> bool {
+    fn is_hard_nonlinearity(&self) -> bool {
         true
     }
 
@@ -87,7 +87,7 @@ impl Effect for SlewLimit {
         ]
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting {
             inner: vec![given.positive("max_slope")?, given.or("between_samples", 0.0)],
             strengths: vec![1.0],

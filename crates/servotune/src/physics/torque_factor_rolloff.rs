@@ -89,7 +89,7 @@ impl Effect for TorqueFactorRolloff {
         ShownOver::FactorOverPosition
     }
 
-    fn grid(&self, _scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, _scene: &Scene) -> Vec<Vec<f64>> {
         let cornered = [BEGINS, ENDS].into_iter().flat_map(|shape| CORNERS.map(|corner| vec![shape, corner]));
         [vec![PARABOLA, 1.0], vec![POLYNOMIAL, 1.0]].into_iter().chain(cornered).collect()
     }
@@ -99,17 +99,17 @@ impl Effect for TorqueFactorRolloff {
         Box::new(Rolloff { shape: inner[0], corner: inner[1], travel: scene.travel * scene.arm_over_record() })
     }
 
-    fn usual(&self) -> bool {
+    fn is_on_every_machine(&self) -> bool {
         true
     }
 
     /// Between fields that fall as their curvature says (a parabola, a bell, the edge of a gap) the fall at one place differs by so much.
-    fn form(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
         0.07
     }
 
     /// A magnet's field falls towards its ends and does not rise again on the way.
-    fn possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
+    fn is_possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
         let whole = fall(setting, 1.0);
         let rises = |i: u8| fall(setting, f64::from(i) / 8.0) - fall(setting, f64::from(i - 1) / 8.0) > -RISE * whole;
         whole > 0.0 && (1..=8).all(rises)
@@ -138,7 +138,7 @@ impl Effect for TorqueFactorRolloff {
         all
     }
 
-    fn restore(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let l = scene.travel;
         let inner = if given.has("begins_at") {
             vec![BEGINS, given.positive("begins_at")? / l]

@@ -57,9 +57,9 @@ impl Effect for TorqueRipple {
         ShownOver::Position
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         // The same question as for the encoder's wave: no period over the travel may fall between two points.
-        let periods = EncoderCyclicError.grid(scene).into_iter().map(|p| p[0]).step_by(2);
+        let periods = EncoderCyclicError.scan_points(scene).into_iter().map(|p| p[0]).step_by(2);
         periods.flat_map(|p| [vec![p, 0.0], vec![p, 1.0]]).collect()
     }
 
@@ -80,7 +80,7 @@ impl Effect for TorqueRipple {
         ]
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let factor = given.has("amplitude_relative");
         let amplitude = given.need(if factor { "amplitude_relative" } else { "amplitude_command" })?;
         let phase = given.or("phase_deg", 0.0).to_radians();

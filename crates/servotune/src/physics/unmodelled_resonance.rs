@@ -76,7 +76,7 @@ impl Effect for UnmodelledResonance {
         &FACTS
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let high = 0.45 / scene.sample_time_s;
         [0.005, 0.02, 0.06].iter().flat_map(|&z| scan(30f64.min(0.01 * high), high, z, scene)).collect()
     }
@@ -85,7 +85,7 @@ impl Effect for UnmodelledResonance {
         Box::new(Ringing::at_rest(inner[0], inner[1], scene.sample_time_s, 2))
     }
 
-    fn several(&self) -> bool {
+    fn may_occur_several_times(&self) -> bool {
         true
     }
 
@@ -100,11 +100,11 @@ impl Effect for UnmodelledResonance {
         ]
     }
 
-    fn share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Terms(vec![term(setting.inner[0], setting.inner[1], setting.strengths[0], setting.strengths[1])])
     }
 
-    fn restore(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let damping = given.between("damping_ratio", 0.0, 1.0, "above 0 and below 1")?;
         let strengths = vec![given.need("static_gain")?, given.or("rate_gain", 0.0)];
         Ok(Setting { inner: vec![given.positive("frequency_hz")?, damping], strengths })
