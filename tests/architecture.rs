@@ -1,6 +1,7 @@
 //! The house keeps its plan: arrows point downwards, outside crates have one home, files stay short.
 #![allow(clippy::unwrap_used)]
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Rooms of the library by rank; a room uses lower ranks only (`specs/decisions/rooms.md`). Between crates the manifests hold the direction.
@@ -161,5 +162,63 @@ fn files_stay_short_and_say_what_they_are() {
             wrong.push(format!("{name}: no header"));
         }
     });
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// First names of the paths in the `use super::` lines of a file, its unit tests left out.
+fn named_beside(text: &str) -> Vec<String> {
+    let text = text.split("#[cfg(test)]\nmod ").next().unwrap();
+    let mut all = Vec::new();
+    for line in text.split("\nuse super::").skip(1) {
+        let path = line.split(';').next().unwrap();
+        let inner = path.strip_prefix('{').map_or(path, |p| p.strip_suffix('}').unwrap_or(p));
+        let (mut depth, mut word) = (0, String::new());
+        for c in inner.chars().chain([',']) {
+            match c {
+                '{' => depth += 1,
+                '}' => depth -= 1,
+                ',' if depth == 0 => {
+                    all.push(word.trim().split("::").next().unwrap().trim().to_owned());
+                    word.clear();
+                    continue;
+                }
+                _ => {}
+            }
+            word.push(c);
+        }
+    }
+    all
+}
+
+#[test]
+fn no_files_of_a_room_import_each_other_in_a_circle() {
+    let mut rooms: BTreeMap<String, BTreeMap<String, Vec<String>>> = BTreeMap::new();
+    each_source(|name, text| {
+        let (room, file) = name.rsplit_once('/').unwrap();
+        let file = file.trim_end_matches(".rs").to_owned();
+        if !["mod", "lib", "main"].contains(&file.as_str()) {
+            rooms.entry(room.to_owned()).or_default().insert(file, named_beside(text));
+        }
+    });
+    let arrows: usize = rooms.values().flat_map(|r| r.values().flatten().filter(|n| r.contains_key(*n))).count();
+    assert!(arrows > 1000, "{arrows} imports seen");
+    let mut wrong = Vec::new();
+    for (room, mut files) in rooms {
+        // Files that import none of those that are left go; what stays imports in a circle, or a circle.
+        loop {
+            let free: Vec<String> = files
+                .iter()
+                .filter(|(file, uses)| !uses.iter().any(|u| u != *file && files.contains_key(u)))
+                .map(|(file, _)| file.clone())
+                .collect();
+            if free.is_empty() {
+                break;
+            }
+            free.iter().for_each(|f| drop(files.remove(f)));
+        }
+        if !files.is_empty() {
+            wrong.push(format!("{room}: {}", files.keys().cloned().collect::<Vec<_>>().join(", ")));
+        }
+    }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

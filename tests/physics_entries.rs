@@ -56,7 +56,7 @@ fn parameters_and_restore_are_inverse_at_every_point_of_every_grid() {
                 gone.into_iter().for_each(|c| setting.strengths[c] = 0.0);
                 let named: BTreeMap<String, f64> =
                     e.parameters(&setting, &scene).iter().map(|p| (p.name.to_string(), p.value)).collect();
-                let back = e.from_parameters(&Given::new(facts.name, &named), &scene).unwrap();
+                let back = e.setting_of(&Given::new(facts.name, &named), &scene).unwrap();
                 for (a, b) in [(&setting.inner, &back.inner), (&setting.strengths, &back.strengths)] {
                     assert_eq!(a.len(), b.len(), "{}", facts.name);
                     for (x, y) in a.iter().zip(b) {

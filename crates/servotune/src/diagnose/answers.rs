@@ -3,9 +3,9 @@
 
 use super::hygiene::SampleFault;
 use super::linear::{Sampled, free_motions};
-use super::logs::shifted;
 use super::rules::{EARLY_LEFT, OTHER_UNIT_EXPLAINED, OTHER_UNIT_GAIN};
 use super::run::Run;
+use super::shifted::shifted;
 use super::slip::slips_of_answer;
 use super::stack::Basis;
 use crate::lti::{LtiError, Plant};

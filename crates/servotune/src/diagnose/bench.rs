@@ -1,11 +1,13 @@
 //! Everything that a diagnosis works on, made in order: given plant, noise, filter, refit, motion.
 
+use super::chosen::Chosen;
 use super::columns::{Drive, drive, raw_columns};
+use super::fit::Fit;
 use super::hygiene::{Grid, quantum};
 use super::linear::{Carrier, LinearForm, Sampled, body_numbers, free_motions, free_scales};
 use super::lines::{Line, take_lines};
 use super::model::Model;
-use super::refit::{Chosen, Fit, simulation_error};
+use super::refit::simulation_error;
 use super::rules::ROUNDING_ALIKE;
 use super::run::{Run, mean_run};
 use super::stack::{Basis, Stack};

@@ -6,6 +6,7 @@
 //! Hinkley 1997, ch. 4). Spec: `specs/mismatch.md`.
 
 use super::bench::Bench;
+use super::bootstrap_chance::Bootstrap;
 use super::fitted::refit_from;
 use super::judge::{Judged, error};
 use super::model::Model;
@@ -14,22 +15,6 @@ use super::worth::strongest;
 use crate::numeric::random::Random;
 use crate::physics::Effect;
 use rayon::prelude::*;
-use serde::Serialize;
-
-/// What draws without any physics beyond the linear gave.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Bootstrap {
-    /// Draws.
-    pub draws: usize,
-    /// Logarithm of the closed-form bound of the strongest candidate on the records themselves.
-    pub observed_log_p: f64,
-    /// The same of each draw, smallest first.
-    pub null_log_p: Vec<f64>,
-    /// Chance of a candidate as strong as the observed one under noise alone: (1 + draws as strong) / (1 + draws).
-    pub p_value: f64,
-    /// Draws in which the search would have gone on to a finding, by the closed-form bound.
-    pub alarms: usize,
-}
 
 /// Seed of the draws; draw `i` is stream `i`.
 const SEED: u64 = 0x5ca1_ab1e;

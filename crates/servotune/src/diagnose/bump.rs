@@ -4,8 +4,9 @@
 //! it into every fit and their spread would count it as noise, so such a record is kept out of both.
 
 use super::bench::{Bench, without_start};
+use super::chance::log_tail;
 use super::columns::raw_columns;
-use super::differing::Difference;
+use super::difference::Difference;
 use super::finding::{Estimate, Finding, Where};
 use super::fitted::refit;
 use super::judge::{Judged, error};
@@ -13,7 +14,6 @@ use super::linear::{Sampled, free_motions};
 use super::name::text_of;
 use super::rules::{PUSH_BY_AMPLIFIER, PUSH_CHANCE, PUSH_STAYS, PUSH_SUSPECTED, PUSH_WHOLE, PUSHED_RECORDS};
 use super::run::Run;
-use super::scan::log_tail;
 use super::stack::Segment;
 use super::trajectory::Trajectory;
 use crate::lti::{LtiError, Plant};

@@ -6,11 +6,11 @@
 //! simulates far better than the best linear plant. It names nothing: the search begins anew from the plant alone.
 
 use super::bench::Bench;
+use super::chosen::Chosen;
 use super::columns::columns_along;
 use super::fitted::refit;
 use super::judge::size;
 use super::model::Model;
-use super::refit::Chosen;
 use super::rules::{CLEARED_BETTER, CLEARED_FAR, CLEARED_TELLS};
 use super::run::{Run, mean_run};
 use super::simulation_problem::{Problem, descended};

@@ -3,12 +3,12 @@
 //! A refit takes the scale into all its parameters and says nothing; one number in their place that does as well says what it is.
 
 use super::bench::Bench;
+use super::chance::log_tail;
 use super::finding::{Estimate, Finding};
 use super::linear::{Knob, body_numbers, rate_of};
 use super::name::{everywhere, text_of};
 use super::rules::ONE_NUMBER;
 use super::run::Run;
-use super::scan::log_tail;
 use crate::numeric::golden::golden_section;
 use std::collections::BTreeMap;
 

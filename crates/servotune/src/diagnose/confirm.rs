@@ -6,13 +6,14 @@
 //! deviation of twice its root: the ratio of two likelihoods (Neyman, Pearson 1933).
 
 use super::bench::Bench;
+use super::chosen::Chosen;
 use super::corrected::Corrected;
 use super::fitted::fitted;
 use super::held_out::HeldOut;
 use super::judge::Judged;
-use super::model::{Model, Selection};
-use super::refit::Chosen;
+use super::model::Model;
 use super::rules::{LAW_FAR, LAW_SAYS, LAW_SHORT};
+use super::selection::Selection;
 use crate::lti::LtiError;
 use serde::Serialize;
 

@@ -4,11 +4,11 @@
 //! then is a free inertia and the rest stands as a plain cable spring, of either sign.
 
 use super::bench::Bench;
+use super::chosen::Chosen;
 use super::judge::Judged;
 use super::linear::{LinearForm, body_numbers};
-use super::model::Selection;
-use super::refit::Chosen;
 use super::rules::FREE_BODY;
+use super::selection::Selection;
 use crate::lti::{Body, PhysicsEntry, Plant};
 use crate::physics::{Effect, Scene, Setting, effect};
 

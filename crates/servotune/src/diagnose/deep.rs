@@ -1,13 +1,14 @@
 //! A step of the search in which no law comes near the noise along the recorded motion, and pushes that come with the clock of the record.
 
 use super::bench::Bench;
+use super::candidate::Candidate;
+use super::chosen::Chosen;
 use super::leftover::in_simulation;
-use super::model::{Model, Step};
-use super::refit::Chosen;
-use super::rules::{FAR_FROM_NOISE, PUSH_MOVES, PUSH_TOGETHER, REFIT_HIDES};
-use super::scan::{Candidate, Ground};
+use super::model::Model;
+use super::rules::FAR_FROM_NOISE;
+use super::selection::Step;
 use super::simulated::simulated;
-use crate::physics::{Effect, Port};
+use crate::physics::Effect;
 
 /// Laws of a step that are fitted by simulation then: each takes as long as the last fit of all.
 const SIMULATED: usize = 1;
@@ -37,9 +38,6 @@ pub(super) fn by_simulation_first(bench: &Bench, step: &mut Step) {
         }
     }
 }
-
-/// Laws that are tried beside a model that stands by simulation: each takes as long as the last fit of all.
-pub(super) const FELT: usize = 2;
 
 /// The scan of what a model leaves in simulation.
 pub(super) fn felt_scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
@@ -85,39 +83,4 @@ pub(super) fn foretold(bench: &Bench, model: &Model, step: &mut Step) -> bool {
     step.candidates.push(candidate);
     step.tried.push((step.candidates.len() - 1, found));
     true
-}
-
-/// Whether a push has one strength in the records of several moves: it comes with the clock of the record, and not with a move.
-pub(super) fn together(c: &Candidate) -> bool {
-    let s = &c.setting.strengths;
-    let most = s.iter().fold(0.0f64, |m, v| if v.abs() > m.abs() { *v } else { m });
-    s.len() >= PUSH_MOVES && s.iter().all(|v| v * most.signum() > PUSH_TOGETHER * most.abs())
-}
-
-/// The scan around linear parameters `p`; gains count from where the model stands.
-pub(super) fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Model, p: &[f64]) -> Vec<Candidate> {
-    let fit = bench.fit(model.chosen.clone());
-    let (error, basis) = fit.screen_basis(p);
-    let plant = bench.form.carrier(p).plant;
-    let ahead = model.cost - error.iter().map(|e| e * e).sum::<f64>();
-    let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
-    let mut candidates = ground.beside(bench).best(library);
-    candidates.iter_mut().for_each(|c| c.gain += ahead.min(0.0));
-    candidates
-}
-
-/// The scan around where the model stands, and around the given plant where the refit may have bent what is looked for.
-pub(super) fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
-    let mut candidates = scan_at(bench, library, model, &model.refitted.p);
-    // A law without a strength of its own (a lag, a limit), or a vibration that a known mode has moved to stand in for, is not straight
-    // in the linear parameters: it is looked for around the given plant too.
-    if model.chosen.is_empty() && model.excess_sigma() > REFIT_HIDES {
-        // Where the refit is far from the noise, any law may have bent it.
-        let far = model.excess_sigma() > FAR_FROM_NOISE;
-        let crooked = |e: &&'static dyn Effect| far || e.facts().fixed || e.facts().port == Port::Structure;
-        let apart: Vec<&'static dyn Effect> = library.iter().copied().filter(crooked).collect();
-        candidates.extend(scan_at(bench, &apart, model, &vec![0.0; model.refitted.p.len()]));
-    }
-    candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    Step { before: model.evidence, candidates, tried: Vec::new(), taken: None }
 }

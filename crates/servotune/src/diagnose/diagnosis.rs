@@ -3,48 +3,21 @@
 use super::bench::Bench;
 use super::bump::set_aside;
 use super::cleared::cleared;
-use super::corrected::Corrected;
 use super::diagnose_error::DiagnoseError;
+use super::diagnosed::Diagnosed;
 use super::excerpt::excerpts;
-use super::finding::Diagnosis;
 use super::fitted::refit;
 use super::ground;
 use super::judge::rms;
 use super::logs::check;
-use super::model::Selection;
 use super::pace::Pace;
 use super::rules::MEASURED_COMMAND;
 use super::run::{Run, runs};
-use super::select::SelectSettings;
+use super::settings::DiagnoseSettings;
 use super::trial::Trial;
 use crate::controller::{Controller, Law};
 use crate::lti::{Body, Plant};
-use crate::recording::{Case, NominalNoise, Role};
-
-/// How a diagnosis is made.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct DiagnoseSettings {
-    /// The search.
-    pub select: SelectSettings,
-    /// Levels of the noise that a sound machine shows, where they are known.
-    pub noise: NominalNoise,
-}
-
-/// A diagnosis with what pictures and model files are made from.
-pub struct Diagnosed {
-    /// What stands in diagnosis.json.
-    pub diagnosis: Diagnosis,
-    /// The ground it was made on.
-    pub bench: Bench,
-    /// The search.
-    pub selection: Selection,
-    /// The corrected model.
-    pub corrected: Corrected,
-    /// The refitted linear plant.
-    pub refitted: Plant,
-    /// Recorded less simulated position of every run: given, refit, corrected.
-    pub errors: [Vec<Vec<f64>>; 3],
-}
+use crate::recording::{Case, Role};
 
 /// Diagnoses a case.
 pub fn diagnose(

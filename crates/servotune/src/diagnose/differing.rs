@@ -4,18 +4,12 @@
 //! The mean over repeats and what they differ by are independent under white noise, so that gains of both add up.
 
 use super::bench::{Bench, noise_series, without_start};
+use super::chosen::Chosen;
 use super::columns::columns_along;
+use super::difference::Difference;
 use super::linear::{Sampled, free_motions};
-use super::refit::Chosen;
 use crate::numeric::least_squares::dot;
 use crate::physics::{Effect, Entry, Sample};
-
-/// Inner product of a law's differences with those of the records, and their own square; both in units of the noise's variance.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Difference {
-    pub along: f64,
-    pub square: f64,
-}
 
 impl Difference {
     /// What the law takes of the sum of squares, its strength being 1.

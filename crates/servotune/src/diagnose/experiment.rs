@@ -1,10 +1,11 @@
 //! What to record next, and how well it would tell the survivors apart.
 
 use super::bench::Bench;
-use super::finding::{Diagnosis, NextExperiment, Verdict};
+use super::diagnosis_json::Diagnosis;
+use super::finding::{NextExperiment, Verdict};
 use super::judge::{Judged, error};
-use super::model::Selection;
 use super::run::Run;
+use super::selection::Selection;
 use super::whiten::Whitener;
 use crate::physics::{Effect, Scene, facts};
 

@@ -3,10 +3,10 @@
 //! In: a bench, effects, where to begin. Out: the model with its cost, likelihood and freedom.
 
 use super::bench::Bench;
+use super::chosen::Chosen;
 use super::differing::differing;
 use super::linear::Knob;
 use super::model::Model;
-use super::refit::Chosen;
 use super::worth::begun;
 use rayon::prelude::*;
 use std::f64::consts::LN_2;

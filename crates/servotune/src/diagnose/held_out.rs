@@ -1,18 +1,19 @@
 //! The judgement on records that were not used: whitened error along the recorded motion, which does not hide behind a controller.
 
 use super::bench::Bench;
+use super::chance::log_tail;
 use super::corrected::Corrected;
 use super::finding::Finding;
 use super::judge::Judged;
 use super::linear::free_motions;
-use super::model::{Model, Selection};
+use super::model::Model;
 use super::place::{Part, place_of};
 use super::rules::{
     ASTRAY_SHARE, ASTRAY_SIGMA, BEYOND_FAR, BEYOND_LEFT, HELD_OUT_CLEAR, HELD_OUT_FAR, HELD_OUT_LEFT,
     HELD_OUT_TOGETHER, HELD_OUT_UNMOVED, RANGE_MARGIN,
 };
 use super::run::Run;
-use super::scan::log_tail;
+use super::selection::Selection;
 use super::stack::Segment;
 use crate::lti::LtiError;
 use crate::numeric::least_squares::dot;

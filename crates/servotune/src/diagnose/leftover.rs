@@ -2,26 +2,15 @@
 //! could take.
 
 use super::bench::Bench;
-use super::deep::scan;
-use super::model::{Model, Step};
-use super::scan::{Candidate, Ground};
+use super::candidate::Candidate;
+use super::leftover_law::Leftover;
+use super::model::Model;
+use super::scan::Ground;
+use super::selection::Step;
 use super::simulated::simulation_error;
+use super::step_scan::scan;
 use super::worth::hums;
 use crate::physics::Effect;
-use serde::Serialize;
-
-/// The strongest thing that is still seen.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Leftover {
-    /// The law that takes most of it: its nearest likeness, no finding.
-    pub effect: String,
-    /// What that law takes: fall of the sum of squares of the whitened error.
-    pub gain: f64,
-    /// That over what the final model took from the linear refit.
-    pub share: f64,
-    /// Bound of the chance that noise alone shows as much anywhere in the library.
-    pub p_value: f64,
-}
 
 /// What is left beyond chance; none where nothing is, or where no repeat tells what noise is.
 ///

@@ -4,10 +4,11 @@ use super::bench::Bench;
 use super::finding::{Estimate, Finding, Where};
 use super::linear::{Sampled, free_motions};
 use super::lines::Line;
-use super::model::Selection;
+use super::lines::mains;
 use super::name::{everywhere, text_of};
-use super::rules::{HUM_COHERENCE, HUM_FADES, HUM_SPREAD, MAINS_MULTIPLES, MAINS_OFF_HZ};
+use super::rules::{HUM_COHERENCE, HUM_FADES, HUM_SPREAD};
 use super::run::Run;
+use super::selection::Selection;
 use crate::lti::FrequencyResponse;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -90,14 +91,6 @@ fn resolved(bench: &Bench, hz: f64) -> [f64; 2] {
 fn frequency(bench: &Bench, line: &Line) -> Estimate {
     let off = 1.96 * (12.0 / (-2.0 * line.log_p).max(1.0)).sqrt() / (TAU * bench.scene.duration_s);
     Estimate { value: line.hz, low: line.hz - off, high: line.hz + off, unit: "Hz".into() }
-}
-
-/// Whether the mains may hum at a frequency: a single higher order of the spindle there may be either.
-pub(super) fn mains(hz: f64) -> bool {
-    [50.0, 60.0].iter().any(|base| {
-        let k = (hz / base).round();
-        (1.0..=MAINS_MULTIPLES).contains(&k) && (hz - k * base).abs() < MAINS_OFF_HZ
-    })
 }
 
 /// One finding for all orders of the spindle, one for each other line; and the frequencies (Hz) of those that are none, but narrow

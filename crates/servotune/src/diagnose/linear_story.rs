@@ -1,14 +1,17 @@
 //! What happened to the linear parameters beside the findings: nothing, the delay alone, the log's clock, or a refit.
 
 use super::bench::Bench;
+use super::chance::log_tail;
+use super::chosen::Chosen;
 use super::clock::Clock;
-use super::finding::{Diagnosis, Estimate, Finding, Verdict};
+use super::diagnosis_json::Diagnosis;
+use super::finding::{Estimate, Finding, Verdict};
+use super::fit::Fit;
 use super::linear::{Knob, LinearForm, body_numbers};
-use super::model::{Model, Selection};
+use super::model::Model;
 use super::name::{everywhere, text_of};
-use super::refit::{Chosen, Fit};
 use super::rules::{FAMILY, LAGS_ALIKE, ONE_NUMBER};
-use super::scan::log_tail;
+use super::selection::Selection;
 use super::simulated::simulated_with;
 use crate::lti::Plant;
 use crate::physics::{Parameter, Setting, effect};

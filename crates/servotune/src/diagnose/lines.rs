@@ -4,9 +4,10 @@
 //! would smear such a line and their spread would count it as noise, so lines are found in what repeats differ by and taken
 //! out of every run before anything else is estimated. The directions are closed to all later fits.
 
+use super::chance::log_tail;
 use super::rules::{LINE_CHANCE, LINE_SNAP};
+use super::rules::{MAINS_MULTIPLES, MAINS_OFF_HZ};
 use super::run::Run;
-use super::scan::log_tail;
 use super::stack::Basis;
 use crate::numeric::golden::golden_section;
 use crate::numeric::least_squares::dot;
@@ -171,4 +172,12 @@ pub fn take_lines(
         lines.push(line);
     }
     lines
+}
+
+/// Whether the mains may hum at a frequency: a single higher order of the spindle there may be either.
+pub(super) fn mains(hz: f64) -> bool {
+    [50.0, 60.0].iter().any(|base| {
+        let k = (hz / base).round();
+        (1.0..=MAINS_MULTIPLES).contains(&k) && (hz - k * base).abs() < MAINS_OFF_HZ
+    })
 }

@@ -7,6 +7,7 @@ use super::hygiene::{Replay, SampleFault, replay_records, sample_faults};
 use super::judge::{Judged, error};
 use super::rules::UNIT_FACTOR;
 use super::run::Run;
+use super::shifted::shifted;
 use super::slip::breaks_of_replay;
 use crate::controller::Law;
 use crate::lti::{LtiError, Plant};
@@ -99,15 +100,4 @@ fn smooth(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Vec<Vec<f64
 /// Moves the position log against the others by a real number of samples.
 fn shift(run: &mut Run, samples: f64) {
     run.position = shifted(&run.position, samples);
-}
-
-/// A series as it reads a real number of samples later.
-pub(super) fn shifted(y: &[f64], samples: f64) -> Vec<f64> {
-    let last = y.len() - 1;
-    let at = |k: usize| {
-        let at = (k as f64 + samples).clamp(0.0, last as f64);
-        let (i, f) = (at.floor() as usize, at.fract());
-        if f == 0.0 { y[i] } else { y[i] + f * (y[(i + 1).min(last)] - y[i]) }
-    };
-    (0..y.len()).map(at).collect()
 }

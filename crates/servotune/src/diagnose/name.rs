@@ -1,20 +1,20 @@
 //! From numbers to findings: names, families, sentences, intervals.
 
 use super::bench::Bench;
+use super::chance::log_tail;
+use super::chosen::Chosen;
 use super::columns::position_columns;
 use super::finding::{Estimate, Finding, Where};
-use super::line_finding::mains;
 use super::linear::Sampled;
-use super::model::Selection;
+use super::lines::mains;
 use super::place::place;
-use super::refit::Chosen;
-use super::rival::Rival;
+use super::rival_model::Rival;
 use super::rules::{
     DRY_LENGTH, FAMILY, FAMILY_SHARE, MAINS_ORDER, ORDER_BESIDE, SLIGHT, SLIGHT_CONFOUNDED, SLIGHT_NEAR_NOISE,
     SLIGHT_SHARE,
 };
 use super::run::Run;
-use super::scan::log_tail;
+use super::selection::Selection;
 use crate::physics::{Effect, Entry, Facts, Parameter, Setting, Share, effect, facts, library};
 use std::collections::BTreeMap;
 

@@ -4,11 +4,11 @@
 //! In: the bench's levels, what repeats differ by, the levels that a sound machine shows where they are given. Out: findings.
 
 use super::bench::Bench;
+use super::chance::log_tail;
 use super::finding::{Estimate, Finding, FitFigures};
 use super::name::{everywhere, text_of};
 use super::rules::{NOISE_DEPARTED, NOISE_LARGER, NOISE_SLOPE, NOISE_WITH_SPEED};
 use super::run::Run;
-use super::scan::log_tail;
 use super::unrest::Unrest;
 use crate::recording::NominalNoise;
 

@@ -2,68 +2,17 @@
 //! were chosen so far; by the whitened simulation error.
 
 use super::columns::{Drive, Entering, drive, entering};
-use super::linear::{Carrier, LinearForm, Sampled, free_motions};
-use super::lines::Line;
+use super::fit::Fit;
+use super::linear::{Carrier, Sampled, free_motions};
 use super::run::Run;
 use super::slopes::Slopes;
-use super::stack::{Basis, Segment, Stack};
+use super::stack::{Basis, Segment};
 use super::trajectory::Trajectory;
-use super::whiten::Whitener;
 use crate::lti::Plant;
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
-use crate::physics::{Effect, Scene, Setting};
+use crate::physics::{Effect, Setting};
 use rayon::prelude::*;
 use std::borrow::Cow;
-
-/// An effect that is part of the model, with its numbers.
-#[derive(Clone)]
-pub struct Chosen {
-    /// The effect.
-    pub effect: &'static dyn Effect,
-    /// Its numbers.
-    pub setting: Setting,
-    /// Which inner parameters may be refined.
-    pub continuous: Vec<bool>,
-    /// Range of each inner parameter's magnitude.
-    pub range: Vec<[f64; 2]>,
-    /// The step of the search that found it.
-    pub step: usize,
-}
-
-impl std::fmt::Debug for Chosen {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} {:?}", self.effect.facts().name, self.setting)
-    }
-}
-
-impl Chosen {
-    /// The strengths in one segment of the stack.
-    pub fn own(&self, segment: usize) -> &[f64] {
-        let facts = self.effect.facts();
-        let from = if facts.per_record { segment * facts.columns } else { 0 };
-        self.setting.strengths.get(from..).unwrap_or(&[])
-    }
-}
-
-/// What a refit works on.
-pub struct Fit<'a> {
-    /// The form of the linear plant.
-    pub form: &'a LinearForm,
-    /// The mean run of every segment of the stack.
-    pub means: &'a [Run],
-    /// The motion behind each.
-    pub trajectories: &'a [Trajectory],
-    /// The filter.
-    pub whitener: &'a Whitener,
-    /// How they are stacked.
-    pub stack: &'a Stack,
-    /// Lines of a phase of their own in every record.
-    pub lines: &'a [Line],
-    /// Machine and size of its motion.
-    pub scene: &'a Scene,
-    /// Effects in the model.
-    pub chosen: Vec<Chosen>,
-}
 
 /// Where a refit ended.
 #[derive(Clone, Debug)]

@@ -7,9 +7,10 @@
 use super::bench::Bench;
 use super::corrected::{Corrected, corrected};
 use super::judge::{Judged, errors, floor, rms, size};
-use super::model::{Model, Selection};
+use super::model::Model;
 use super::rules::{REFIT_BETTER, REFIT_FAR, SIMULATION_ALIKE, SIMULATION_SAMPLING};
 use super::run::Run;
+use super::selection::Selection;
 use super::simulation_problem::descended;
 use crate::controller::Law;
 use crate::lti::Plant;

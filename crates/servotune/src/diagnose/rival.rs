@@ -4,29 +4,15 @@
 //! amplifier, a spring and a torque factor. Simulated from the recorded commands each feels the motion that it makes.
 
 use super::bench::Bench;
-use super::model::{Model, Step, gain_of};
+use super::chosen::Chosen;
+use super::chosen_numbers::numbers;
+use super::model::Model;
 use super::name::family_width;
-use super::refit::Chosen;
+use super::rival_model::Rival;
 use super::rules::{OWN_OF_RECORD, RIVAL_BETTER, RIVAL_DOUBT, SIMULATION_NO_JUDGE, USUAL_LAW};
+use super::selection::{Step, gain_of};
 use super::simulated::simulated;
 use super::worth::begun;
-
-/// Another law in the place of one effect of the model, everything else refitted.
-#[derive(Clone)]
-pub struct Rival {
-    /// Its name.
-    pub name: &'static str,
-    /// Sum of squares of the whitened error that it leaves, on the scale of the model's.
-    pub cost: f64,
-    /// The model with it.
-    pub model: Model,
-}
-
-/// Free numbers of a law.
-pub(super) fn numbers(c: &Chosen) -> usize {
-    let strengths = if c.effect.facts().fixed { 0 } else { c.setting.strengths.iter().filter(|s| **s != 0.0).count() };
-    strengths + c.continuous.iter().filter(|c| **c).count()
-}
 
 /// What one law must take more than another because it has more numbers (Schwarz 1978) or because machines seldom follow it; less where
 /// it has fewer, or most machines do.

@@ -5,61 +5,16 @@
 //! energy from these, and what then looks best is worked out in full too.
 
 use super::bench::Bench;
+use super::candidate::Candidate;
 use super::columns::{raw_columns, white_columns};
-use super::differing::Difference;
+use super::difference::Difference;
+use super::fit::Fit;
 use super::linear::Sampled;
-use super::refit::{Chosen, Fit};
 use super::stack::{Basis, Explained, Normal};
 use crate::lti::Plant;
 use crate::numeric::least_squares::dot;
 use crate::physics::{Effect, Entry, Setting};
 use rayon::prelude::*;
-
-/// The best that one effect can do.
-#[derive(Clone)]
-pub struct Candidate {
-    /// The effect.
-    pub effect: &'static dyn Effect,
-    /// Its best numbers.
-    pub setting: Setting,
-    /// Fall of the sum of squares of the whitened error.
-    pub gain: f64,
-    /// Share of its columns that the linear parameters can imitate, at its best point.
-    pub concealed: f64,
-    /// Points of the grid.
-    pub points: usize,
-    /// Free strengths.
-    pub strengths: usize,
-    /// Which inner parameters are continuous.
-    pub continuous: Vec<bool>,
-    /// Range of each inner parameter's magnitude on the grid.
-    pub range: Vec<[f64; 2]>,
-}
-
-impl Candidate {
-    /// As an effect of a model, taken in a step.
-    pub fn chosen(&self, step: usize) -> Chosen {
-        Chosen {
-            effect: self.effect,
-            setting: self.setting.clone(),
-            continuous: self.continuous.clone(),
-            range: self.range.clone(),
-            step,
-        }
-    }
-
-    /// Logarithm of an upper bound of the chance that noise alone gives this gain somewhere on the grid, for `effects`
-    /// effects tried at once: the tail of chi-square by Chernoff's bound, times all points and effects (Bonferroni).
-    pub fn log_p_value(&self, effects: usize) -> f64 {
-        log_tail(self.gain, self.strengths.max(1)) + (self.points.max(1) as f64).ln() + (effects.max(1) as f64).ln()
-    }
-}
-
-/// Chernoff's bound of log P(chi2_m > g), 0 below the mean.
-pub fn log_tail(g: f64, m: usize) -> f64 {
-    let m = m as f64;
-    if g <= m { 0.0 } else { 0.5 * (m - g) + 0.5 * m * (g / m).ln() }
-}
 
 /// Magnitudes of each inner parameter on a grid, ascending, each once; none where all are whole, which are kinds and no measures.
 fn magnitudes(grid: &[Vec<f64>]) -> Vec<Vec<f64>> {

@@ -4,55 +4,27 @@
 //! Spec: `specs/mismatch.md`, steps 7 and 8.
 
 use super::bench::Bench;
-use super::bootstrap::{Bootstrap, bootstrap};
-use super::deep::{by_simulation_first, deep, felt_scan, felt_trial, foretold, scan};
+use super::bootstrap::bootstrap;
+use super::bootstrap_chance::Bootstrap;
+use super::candidate::Candidate;
+use super::chance::log_tail;
+use super::deep::{by_simulation_first, deep, felt_scan, felt_trial, foretold};
 use super::fitted::{fitted, fitted_from_both, refit, settled, taken_by_last};
 use super::leftover::leftover;
 use super::locked::follows_motion;
-use super::model::{Model, Selection, Step};
+use super::model::Model;
 use super::rival::by_simulation;
 use super::rules::{
-    BESIDE_DRAG, DOWN_TO_NOISE, EXPLAINS, FALSE_ALARM, FORM_OF_SIMULATED, FOURTH_ADDS, LINEAR_FURTHER, LINEAR_OF_GAIN,
-    OWN_OF_RECORD, REST_BESIDE_DRAG, SECOND_ADDS, THIRD_ADDS,
+    BESIDE_DRAG, DOWN_TO_NOISE, FORM_OF_SIMULATED, FOURTH_ADDS, LINEAR_FURTHER, LINEAR_OF_GAIN, OWN_OF_RECORD,
+    REST_BESIDE_DRAG, SECOND_ADDS, THIRD_ADDS,
 };
-use super::scan::{Candidate, log_tail};
+use super::select_settings::SelectSettings;
+use super::selection::{Selection, Step};
 use super::settle::{exchange, prune, spare};
 use super::simulated::simulated;
+use super::step_scan::scan;
 use super::worth::{Worth, begun, hums, numbers};
 use crate::physics::Effect;
-
-/// How the search decides.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SelectSettings {
-    /// Most effects at once.
-    pub most: usize,
-    /// Candidates that are refitted in full after each scan.
-    pub refits: usize,
-    /// Chance of a false name over the whole search.
-    pub false_alarm: f64,
-    /// Share of the error in excess of noise that each further effect must explain.
-    pub share: f64,
-    /// Iterations of each refit.
-    pub iterations: usize,
-    /// Draws of the parametric bootstrap; 0 for none.
-    pub bootstrap: usize,
-    /// Whether laws are fitted by simulation before one is taken, where none comes near the noise.
-    pub by_simulation: bool,
-}
-
-impl Default for SelectSettings {
-    fn default() -> SelectSettings {
-        SelectSettings {
-            most: 4,
-            refits: 5,
-            false_alarm: FALSE_ALARM,
-            share: EXPLAINS,
-            iterations: 8,
-            bootstrap: 0,
-            by_simulation: true,
-        }
-    }
-}
 
 /// Share of what is explained already that a first, second, third and fourth effect must add.
 const ADDS: [f64; 4] = [0.0, SECOND_ADDS, THIRD_ADDS, FOURTH_ADDS];

@@ -1,15 +1,18 @@
 //! The final model of a search, looked at again: effects that others made needless go, and rivals are tried in the place of each.
 
 use super::bench::Bench;
-use super::deep::scan_at;
+use super::chosen::Chosen;
+use super::chosen_numbers::numbers;
 use super::fitted::{fitted, fitted_from_both};
-use super::model::{Model, Step, gain_of};
-use super::refit::Chosen;
-use super::rival::{Rival, more, numbers};
+use super::model::Model;
+use super::rival::more;
+use super::rival_model::Rival;
 use super::rules::{
     OWN_OF_RECORD, RIVAL_BETTER, RIVAL_TRIED, RIVAL_TRIED_WITHOUT_REPEATS, SECOND_ADDS, SMALL_BESIDE_DRAG,
 };
+use super::selection::{Step, gain_of};
 use super::simulated::simulated;
+use super::step_scan::scan_at;
 use super::worth::begun;
 use crate::physics::{Effect, library};
 

@@ -4,13 +4,13 @@
 //! reported, in closed loop where the loop is known; and its slopes.
 
 use super::bench::Bench;
+use super::chosen::Chosen;
 use super::corrected::corrected;
 use super::judge::size;
 use super::judge::{Begun, Judged, Started};
 use super::linear::Knob;
 use super::lines::Line;
 use super::model::Model;
-use super::refit::Chosen;
 use super::run::Run;
 use super::stack::{Basis, Segment};
 use crate::controller::Law;

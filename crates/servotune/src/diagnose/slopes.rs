@@ -5,8 +5,8 @@
 //! linearly: their slope is one answer.
 
 use super::columns::{Drive, Entering, entering};
+use super::fit::Fit;
 use super::linear::{Carrier, Knob, Sampled};
-use super::refit::Fit;
 use crate::lti::TermAnswers;
 use crate::physics::Entry;
 
@@ -125,8 +125,8 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::diagnose::bench::Bench;
+    use crate::diagnose::chosen::Chosen;
     use crate::diagnose::columns::drive;
-    use crate::diagnose::refit::Chosen;
     use crate::diagnose::run::Run;
     use crate::numeric::random::Random;
     use crate::physics::{Setting, effect};

@@ -3,7 +3,7 @@
 //! Repeats enter once, as their mean times the root of their number: under white noise nothing is lost, and the work falls
 //! by that number.
 
-use super::differing::Difference;
+use super::difference::Difference;
 use super::run::Run;
 use crate::numeric::least_squares::dot;
 use crate::numeric::wide::wide;

@@ -6,50 +6,24 @@
 
 use super::bench::Bench;
 use super::corrected::Corrected;
-use super::finding::{Diagnosis, Estimate, Finding, Verdict};
+use super::diagnosis_json::Diagnosis;
+use super::finding::{Estimate, Finding, Verdict};
 use super::free_form::{Estimated, Foretelling, estimated, grounds};
 use super::free_form_gauge::Plain;
-use super::free_form_likeness::{Likeness, likeness};
+use super::free_form_likeness::likeness;
+use super::free_form_said::FreeForm;
 use super::free_form_shape::{Shape, lag};
 use super::free_form_stretches::Stretches;
 use super::judge::{Judged, errors, rms};
-use super::model::Selection;
 use super::name::{everywhere, text_of};
 use super::rules::{CURVE_CLEARLY, CURVE_NEAR, CURVE_NO_WORSE};
 use super::run::Run;
+use super::selection::Selection;
 use crate::controller::Law;
 use crate::lti::{CurveKnot, PhysicsEntry, Plant};
 use crate::physics::sensor_curve::SensorCurve;
 use crate::physics::{CurvePort, Effect, Setting};
 use crate::recording::Role;
-use serde::Serialize;
-use std::collections::BTreeMap;
-
-/// The curve as diagnosis.json carries it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FreeForm {
-    /// The part of the machine.
-    pub port: &'static str,
-    /// What it goes over.
-    pub argument: &'static str,
-    /// Unit of the argument.
-    pub argument_unit: String,
-    /// Unit of the values.
-    pub unit: String,
-    /// The curve with its band at 95 %.
-    pub knots: Vec<CurveKnot>,
-    /// Share of what the better linear model leaves beyond the noise that the curve explains, on the records that were not used, or on
-    /// the fitted ones where there are no others.
-    pub explained_share: f64,
-    /// One plain sentence.
-    pub says: String,
-    /// The named law that it is most like.
-    pub like: Likeness,
-    /// Error of the parts of the fitted records that were left out in turn (rms): best linear plant, with the curve.
-    pub left_out: [f64; 2],
-    /// The same for the best curve of every port that was tried.
-    pub ports: BTreeMap<String, f64>,
-}
 
 /// A model with a curve.
 pub(super) struct StandIn {

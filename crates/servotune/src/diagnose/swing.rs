@@ -4,15 +4,15 @@
 //! frequency of the swing (the matched filter for all frequencies at once); there the swing is fitted to every run by itself.
 
 use super::bench::Bench;
+use super::chance::log_tail;
 use super::finding::{Estimate, Finding};
 use super::line_finding::left;
 use super::linear::{Sampled, free_motions};
 use super::lines::peak;
-use super::model::Selection;
 use super::name::{everywhere, text_of};
 use super::rules::{SWING_ALIKE, SWING_CHANCE, SWING_PERIODS};
 use super::run::Run;
-use super::scan::log_tail;
+use super::selection::Selection;
 use super::stack::{Basis, Normal};
 use super::trajectory::acting;
 use crate::numeric::golden::golden_section;

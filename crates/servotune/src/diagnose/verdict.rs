@@ -1,12 +1,13 @@
 //! From findings to a verdict: what the search found, what hold-out records say of it, and what the logs, the lines, pushes and the noise tell beside it.
 
 use super::bench::Bench;
-use super::finding::{Diagnosis, Finding, FitFigures, Verdict};
+use super::diagnosis_json::Diagnosis;
+use super::finding::{Finding, FitFigures, Verdict};
 use super::held_out::{HeldOut, astray, contradicts, unseen};
 use super::judge::Simulation;
 use super::line_finding::{line_findings, same_line};
 use super::linear_story::linear_story;
-use super::model::{Model, Selection};
+use super::model::Model;
 use super::name::{finding, same_drag, unexplained};
 use super::reported::Reported;
 use super::rules::{
@@ -14,6 +15,7 @@ use super::rules::{
     HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER, LOOP_EXPLAINS, LOOP_LEFT, NAMED_SHARE,
     NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE,
 };
+use super::selection::Selection;
 use super::swing::swing;
 use crate::lti::Plant;
 use crate::physics::{Port, library};

@@ -4,13 +4,15 @@
 //! Spec: `specs/mismatch.md`, step 8.
 
 use super::bench::Bench;
-use super::deep::{FELT, scan, together};
-use super::model::{Model, Step};
+use super::candidate::Candidate;
+use super::candidate::together;
+use super::chosen_numbers::numbers as free_numbers;
+use super::model::Model;
 use super::name::same_drag;
-use super::rival::numbers as free_numbers;
 use super::rules::{CONFOUNDED, CONFOUNDED_NEAR_NOISE, FAR_FROM_NOISE, GAIN_WITHOUT_REPEATS, NEAR_NOISE};
-use super::scan::Candidate;
-use super::select::SelectSettings;
+use super::select_settings::SelectSettings;
+use super::selection::Step;
+use super::step_scan::scan;
 use crate::physics::{Effect, Setting};
 
 /// What the candidates of one step are judged by.
@@ -123,3 +125,6 @@ pub(super) fn strongest(bench: &Bench, library: &[&'static dyn Effect], model: &
     let possible = step.candidates.iter().filter(|c| c.effect.is_possible(&c.setting, &[]) && c.concealed < CONFOUNDED);
     possible.map(|c| c.log_p_value(library.len())).fold(0.0, f64::min)
 }
+
+/// Laws that are tried beside a model that stands by simulation: each takes as long as the last fit of all.
+pub(super) const FELT: usize = 2;

@@ -295,9 +295,10 @@ impl Wide for Modes<'_> {
                 (part[0][j], part[1][j], part[2][j], part[3][j]) = (now.re, now.im, before.re, before.im);
             }
             // One after the other: a sum keeps its order and so its bits.
-            for j in 0..count {
-                sum[0] += Complex::new(part[0][j], part[1][j]);
-                sum[1] += Complex::new(part[2][j], part[3][j]);
+            let [a, b, c, d] = &part;
+            for (((now_re, now_im), before_re), before_im) in a.iter().zip(b).zip(c).zip(d).take(count) {
+                sum[0] += Complex::new(*now_re, *now_im);
+                sum[1] += Complex::new(*before_re, *before_im);
             }
         }
         sum

@@ -57,7 +57,7 @@ impl Effect for AerodynamicDrag {
         setting.strengths.first().is_some_and(|s| *s > 0.0)
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting { inner: vec![], strengths: vec![given.need("coefficient")?] })
     }
 }

@@ -81,7 +81,7 @@ impl Effect for AmplifierLag {
         Share::Ratio((arrived - 1.0) * -(-ratio).exp_m1() / ratio)
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let tau = if given.has("time_constant_s") {
             given.positive("time_constant_s")?
         } else {

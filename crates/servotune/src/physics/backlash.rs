@@ -74,7 +74,7 @@ impl Effect for Backlash {
         0.01
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting { inner: vec![given.positive("gap")?], strengths: vec![1.0] })
     }
 }

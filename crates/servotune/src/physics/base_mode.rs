@@ -69,7 +69,7 @@ impl Effect for BaseMode {
         Share::Terms(vec![term(setting.inner[0], setting.inner[1], setting.strengths[0], 0.0)])
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let damping = given.between("damping_ratio", 0.0, 1.0, "above 0 and below 1")?;
         let strengths = vec![given.need("static_gain")?];
         Ok(Setting { inner: vec![given.positive("frequency_hz")?, damping], strengths })

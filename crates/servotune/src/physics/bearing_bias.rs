@@ -119,7 +119,7 @@ impl Effect for BearingBias {
         0.01
     }
 
-    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let shortest = given.or("shortest_move", (6.0 * scene.noise).max(1e-4 * scene.travel));
         let inner = vec![given.positive("critical_length")?, given.positive("relaxation_time_s")?, shortest];
         Ok(Setting { inner, strengths: vec![given.need("bias_command")?] })

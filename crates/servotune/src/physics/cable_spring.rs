@@ -93,7 +93,7 @@ impl Effect for CableSpring {
         0.01
     }
 
-    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let inner = vec![given.or("creep_time_s", 0.0), given.or("centre", scene.centre)];
         Ok(Setting { inner, strengths: vec![given.need("stiffness")?, given.or("quadratic", 0.0)] })
     }

@@ -147,7 +147,7 @@ impl Effect for CoulombFriction {
         0.01
     }
 
-    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let length = if given.has("creep_speed") {
             -given.positive("creep_speed")?
         } else if given.has("sliding_length") {

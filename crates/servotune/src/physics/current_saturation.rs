@@ -59,7 +59,7 @@ impl Effect for CurrentSaturation {
         vec![Parameter::new("limit", setting.inner[0], Unit::Command)]
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting { inner: vec![given.positive("limit")?], strengths: vec![1.0] })
     }
 }

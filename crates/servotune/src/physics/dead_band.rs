@@ -66,7 +66,7 @@ impl Effect for DeadBand {
         0.01
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let half =
             if given.has("half_width") { given.positive("half_width")? } else { 0.5 * given.positive("width")? };
         Ok(Setting { inner: vec![half], strengths: vec![1.0] })

@@ -307,7 +307,7 @@ pub trait Effect: Sync {
     }
 
     /// The setting from named parameters; the inverse of [`Effect::parameters`].
-    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError>;
+    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError>;
 }
 
 /// A law in motion. Columns are per unit of strength.

@@ -93,7 +93,7 @@ impl Effect for EncoderCyclicError {
         all
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let pair = |amplitude: f64, phase: f64| [amplitude * phase.cos(), -amplitude * phase.sin()];
         let first = pair(given.need("amplitude")?, given.or("phase_deg", 0.0).to_radians());
         let second = pair(given.or("amplitude_2", 0.0), given.or("phase_2_deg", 0.0).to_radians());

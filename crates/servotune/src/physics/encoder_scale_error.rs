@@ -63,7 +63,7 @@ impl Effect for EncoderScaleError {
         ]
     }
 
-    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let inner = vec![given.or("centre", scene.centre)];
         Ok(Setting { inner, strengths: vec![given.need("quadratic")?, given.or("cubic", 0.0)] })
     }

@@ -97,7 +97,7 @@ impl Effect for ExtraDelay {
         Share::Delay(setting.inner[0])
     }
 
-    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let longest = (LONGEST as f64 + 1e-9) * scene.sample_time_s;
         let delay = given.between("delay_s", 0.0, longest, "above 0 and at most 16 samples")?;
         Ok(Setting { inner: vec![delay], strengths: vec![1.0] })

@@ -294,7 +294,7 @@ impl Effect for FreeForm {
     }
 
     /// Curves are restored from their knots (`restored`), not from named numbers.
-    fn from_parameters(&self, _given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, _given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Err(PhysicsError::Missing { effect: "free_form", parameter: "knots" })
     }
 }

@@ -96,7 +96,7 @@ impl Effect for GainDrift {
         Share::Ratio(Complex::new(if setting.inner[0] > 0.0 { setting.strengths[0] } else { 0.0 }, 0.0))
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         if given.has("gain_per_degree") {
             return Ok(Setting { inner: vec![0.0, 0.0], strengths: vec![given.need("gain_per_degree")?] });
         }

@@ -106,7 +106,7 @@ impl Effect for LineDisturbance {
         Share::Outside
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let (amplitude, phase) = (given.need("amplitude_command")?, given.or("phase_deg", 0.0).to_radians());
         let strengths = vec![amplitude * phase.cos(), -amplitude * phase.sin()];
         Ok(Setting { inner: vec![given.positive("frequency_hz")?], strengths })

@@ -159,7 +159,7 @@ impl Effect for ModalDamping {
         all
     }
 
-    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let stage = f64::from(given.or("stage", 0.0) != 0.0);
         Ok(Setting { inner: vec![mode(FACTS.name, given, scene)?, given.need("growth")?, stage], strengths: vec![1.0] })
     }

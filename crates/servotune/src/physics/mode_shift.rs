@@ -149,7 +149,7 @@ impl Effect for ModeShift {
         all
     }
 
-    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let mode = mode(FACTS.name, given, scene)?;
         let stage = f64::from(given.or("stage", 0.0) != 0.0);
         let inner = vec![mode, given.need("shift_per_position")?, given.or("centre", scene.centre), stage];

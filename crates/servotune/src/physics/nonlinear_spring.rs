@@ -91,7 +91,7 @@ impl Effect for NonlinearSpring {
         0.01
     }
 
-    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let centre = given.or("centre", scene.centre);
         if given.has("stop_stiffness") {
             let edge = given.need("stop_position")? - centre;

@@ -61,7 +61,7 @@ impl Effect for OffsetDrift {
         Share::Outside
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting { inner: vec![], strengths: vec![given.need("slope")?, given.or("curvature", 0.0)] })
     }
 }

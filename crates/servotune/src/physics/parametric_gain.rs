@@ -95,7 +95,7 @@ impl Effect for ParametricGain {
         Share::Outside
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let (depth, phase) = (given.need("depth")?, given.or("phase_deg", 0.0).to_radians());
         let inner = vec![given.positive("frequency_hz")?, given.or("spindle_order", 0.0)];
         Ok(Setting { inner, strengths: vec![depth * phase.cos(), -depth * phase.sin()] })

@@ -189,7 +189,7 @@ impl Effect for PivotFriction {
         }
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let inner = vec![given.positive("sliding_length")?, given.or("shape", 0.0)];
         Ok(Setting { inner, strengths: vec![given.need("level_command")?] })
     }

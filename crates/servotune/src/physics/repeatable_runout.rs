@@ -83,7 +83,7 @@ impl Effect for RepeatableRunout {
         Share::Outside
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         given.need(AMPLITUDES[0])?;
         let mut strengths = Vec::with_capacity(6);
         for h in 0..3 {

@@ -127,7 +127,7 @@ fn setting(e: &'static dyn Effect, entry: &PhysicsEntry, scene: &Scene) -> Resul
     if let Some((parameter, found)) = entry.parameters.iter().find(|(_, v)| !v.is_finite()) {
         return Err(PhysicsError::Finite { effect: name, parameter: parameter.clone(), found: *found });
     }
-    let setting = e.from_parameters(&Given::new(name, &entry.parameters), scene)?;
+    let setting = e.setting_of(&Given::new(name, &entry.parameters), scene)?;
     // What an effect reports of a setting is what it understands.
     let known: Vec<&str> = e.parameters(&setting, scene).iter().map(|p| p.name).collect();
     match entry.parameters.keys().find(|k| !known.contains(&k.as_str())) {

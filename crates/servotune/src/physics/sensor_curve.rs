@@ -101,7 +101,7 @@ impl Effect for SensorCurve {
         if setting.inner[0] == FOLDED { Share::Blind } else { Share::Cycle }
     }
 
-    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         if given.has("fold_position") {
             let at = given.need("fold_position")?;
             return Ok(SensorCurve::folded(given.or("lowest_reading", at), at));

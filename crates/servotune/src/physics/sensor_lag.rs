@@ -82,7 +82,7 @@ impl Effect for SensorLag {
         Share::Ratio((z - 1.0) / (z - keep) * (keep - 1.0) * tau / step)
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let tau = if given.has("time_constant_s") {
             given.positive("time_constant_s")?
         } else {

@@ -86,7 +86,7 @@ impl Effect for Shock {
         Share::Outside
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let inner = vec![given.need("time_s")?, given.positive("width_s")?];
         Ok(Setting { inner, strengths: vec![given.need("peak_command")?] })
     }

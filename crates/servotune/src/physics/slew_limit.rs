@@ -87,7 +87,7 @@ impl Effect for SlewLimit {
         ]
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         Ok(Setting {
             inner: vec![given.positive("max_slope")?, given.or("between_samples", 0.0)],
             strengths: vec![1.0],

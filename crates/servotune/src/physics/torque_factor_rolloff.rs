@@ -138,7 +138,7 @@ impl Effect for TorqueFactorRolloff {
         all
     }
 
-    fn from_parameters(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
         let l = scene.travel;
         let inner = if given.has("begins_at") {
             vec![BEGINS, given.positive("begins_at")? / l]

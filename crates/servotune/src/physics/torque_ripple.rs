@@ -80,7 +80,7 @@ impl Effect for TorqueRipple {
         ]
     }
 
-    fn from_parameters(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
         let factor = given.has("amplitude_relative");
         let amplitude = given.need(if factor { "amplitude_relative" } else { "amplitude_command" })?;
         let phase = given.or("phase_deg", 0.0).to_radians();
