@@ -50,8 +50,12 @@ fn every_link_and_every_include_leads_to_a_file() {
     for file in documents() {
         let text = std::fs::read_to_string(&file).unwrap();
         let beside = file.parent().unwrap();
-        let includes = text.split("{{#include ").skip(1).filter_map(|s| s.split_once("}}").map(|(p, _)| p.to_owned()));
-        for target in links(&text).into_iter().chain(includes) {
+        let includes: Vec<String> =
+            text.split("{{#include ").skip(1).filter_map(|s| s.split_once("}}").map(|(p, _)| p.to_owned())).collect();
+        // What a page includes stands in that page: its links are read from there, not from where it came.
+        let taken = includes.iter().flat_map(|p| links(&std::fs::read_to_string(beside.join(p)).unwrap_or_default()));
+        let targets: Vec<String> = links(&text).into_iter().chain(taken).chain(includes.iter().cloned()).collect();
+        for target in targets {
             let path = target.split('#').next().unwrap();
             if path.is_empty() || path.contains("://") || path.starts_with("mailto:") {
                 continue;
