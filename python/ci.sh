@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The Python package from nothing: a venv, the package by pip, its tests, the floor on Ray with two workers.
-# Ends with 3, and says so, where no package can be installed.
+# Ends with 75, and says so, where no package registry is in reach.
 # `python/ci.sh dask` and `python/ci.sh spark` run the floor on those engines instead.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -20,10 +20,11 @@ venv="$PWD/target/python-venv"
 [ -x "$venv/bin/pip" ] || python3 -m venv "$venv"
 # pip finds the builder of the venv.
 export PATH="$venv/bin:$PATH"
-# shellcheck disable=SC2086
-pip install -q --disable-pip-version-check "maturin>=1.9,<2" "numpy>=1.23" $packages || {
-    echo "no package registry: the Python package is not tested" >&2 && exit 3
+pip install -q --disable-pip-version-check "maturin>=1.9,<2" "numpy>=1.23" || {
+    echo "no package registry in reach: the Python package is not tested" >&2 && exit 75
 }
+# shellcheck disable=SC2086
+pip install -q --disable-pip-version-check $packages
 # The folder and the profile of the root's own tests: what they have compiled is not compiled again.
 export CARGO_TARGET_DIR="$PWD/target"
 # The program that the package is held against.

@@ -79,10 +79,7 @@ def test_ray(fleet, alone, tmp_path, monkeypatch):
     same(tmp_path, alone)
 
 
-def test_ray_survives_dead_workers(fleet, alone, tmp_path, monkeypatch):
-    """Every batch of slots kills its worker's process at the first try."""
-    pytest.importorskip("ray")
-    monkeypatch.setenv("RAY_worker_niceness", "0")
+def survives_dead_workers(engine, fleet, alone, tmp_path, monkeypatch):
     traps = tmp_path / "traps"
     traps.mkdir()
 
@@ -95,9 +92,16 @@ def test_ray_survives_dead_workers(fleet, alone, tmp_path, monkeypatch):
             return super().__call__(places)
 
     monkeypatch.setattr(import_module("servotune.floor.run"), "Task", Deadly)
-    floor.run(fleet, engine="ray", out=tmp_path / "out", name="one", workers=2, batch=2)
+    floor.run(fleet, engine=engine, out=tmp_path / "out", name="one", workers=2, batch=2)
     assert len(list(traps.iterdir())) == 3
     same(tmp_path / "out", alone)
+
+
+def test_ray_survives_dead_workers(fleet, alone, tmp_path, monkeypatch):
+    """Every batch of slots kills its worker's process at the first try."""
+    pytest.importorskip("ray")
+    monkeypatch.setenv("RAY_worker_niceness", "0")
+    survives_dead_workers("ray", fleet, alone, tmp_path, monkeypatch)
 
 
 def test_a_slot_that_ends_every_worker(fleet, alone, tmp_path, monkeypatch):
@@ -133,21 +137,7 @@ def test_dask(fleet, alone, tmp_path):
 def test_dask_survives_dead_workers(fleet, alone, tmp_path, monkeypatch):
     """Every batch of slots kills its worker's process at the first try."""
     pytest.importorskip("distributed")
-    traps = tmp_path / "traps"
-    traps.mkdir()
-
-    class Deadly(Task):
-        def __call__(self, places):
-            trap = traps / str(places[0])
-            if self.library is not None and not trap.exists():
-                trap.touch()
-                os.kill(os.getpid(), signal.SIGKILL)
-            return super().__call__(places)
-
-    monkeypatch.setattr(import_module("servotune.floor.run"), "Task", Deadly)
-    floor.run(fleet, engine="dask", out=tmp_path / "out", name="one", workers=2, batch=2)
-    assert len(list(traps.iterdir())) == 3
-    same(tmp_path / "out", alone)
+    survives_dead_workers("dask", fleet, alone, tmp_path, monkeypatch)
 
 
 def test_dask_looks_for_no_worker_that_its_nanny_starts_again():

@@ -9,7 +9,9 @@ use servotune::identify::Identified;
 use servotune::lti::{DiscretePlant, FrequencyResponse, Plant};
 use servotune::pes::{figures, simulate, simulate_physical};
 use servotune::physics::Restored;
-use servotune::tune::{GainTable, Hold, Judged, Machine, Outcome, PhysicalTuning, Spec, judge, margin_intervals};
+use servotune::tune::{
+    DERIVATIVE_FILTER, GainTable, Hold, Judged, Machine, Outcome, PhysicalTuning, Spec, judge, margin_intervals,
+};
 use servotune_report::identified::{
     identified_figure, identified_sentences, ladder_table, order_table, parameter_table,
 };
@@ -170,9 +172,11 @@ pub fn verdict(outcome: &Outcome) -> (Verdict, String) {
                 _ => "Every limit is met, but not with the room that `guard` asks for",
             };
             let filter = if t.work.filter_searched {
-                " The derivative's filter was searched: no table with 0.3 sample times was found."
+                format!(
+                    " The derivative filter was searched: no table with {DERIVATIVE_FILTER} sample times was found."
+                )
             } else {
-                ""
+                String::new()
             };
             if t.at_bounds.is_empty() {
                 let verdict = if held.len() > 20 { Verdict::Warn } else { Verdict::Ok };

@@ -43,11 +43,10 @@ impl Candidate {
     pub fn log_p_value(&self, effects: usize) -> f64 {
         log_tail(self.gain, self.strengths.max(1)) + (self.points.max(1) as f64).ln() + (effects.max(1) as f64).ln()
     }
-}
-
-/// Whether a push has one strength in the records of several moves: it comes with the clock of the record, and not with a move.
-pub(super) fn together(c: &Candidate) -> bool {
-    let s = &c.setting.strengths;
-    let most = s.iter().fold(0.0f64, |m, v| if v.abs() > m.abs() { *v } else { m });
-    s.len() >= PUSH_MOVES && s.iter().all(|v| v * most.signum() > PUSH_TOGETHER * most.abs())
+    /// Whether a push has one strength in the records of several moves: it comes with the clock of the record, and not with a move.
+    pub(super) fn together(&self) -> bool {
+        let s = &self.setting.strengths;
+        let most = s.iter().fold(0.0f64, |m, v| if v.abs() > m.abs() { *v } else { m });
+        s.len() >= PUSH_MOVES && s.iter().all(|v| v * most.signum() > PUSH_TOGETHER * most.abs())
+    }
 }

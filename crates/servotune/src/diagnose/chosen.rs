@@ -30,4 +30,11 @@ impl Chosen {
         let from = if facts.per_record { segment * facts.columns } else { 0 };
         self.setting.strengths.get(from..).unwrap_or(&[])
     }
+
+    /// Free numbers of the law.
+    pub(super) fn numbers(&self) -> usize {
+        let set = self.setting.strengths.iter().filter(|s| **s != 0.0).count();
+        let strengths = if self.effect.facts().fixed { 0 } else { set };
+        strengths + self.continuous.iter().filter(|c| **c).count()
+    }
 }

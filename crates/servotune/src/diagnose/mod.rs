@@ -12,7 +12,6 @@ mod bump;
 mod candidate;
 mod chance;
 mod chosen;
-mod chosen_numbers;
 mod cleared;
 mod clock;
 mod columns;

@@ -5,7 +5,6 @@
 
 use super::bench::Bench;
 use super::chosen::Chosen;
-use super::chosen_numbers::numbers;
 use super::model::Model;
 use super::name::family_width;
 use super::rival_model::Rival;
@@ -19,7 +18,7 @@ use super::worth::begun;
 pub(super) fn more(bench: &Bench, law: &Chosen, than: &Chosen) -> f64 {
     let price = (bench.stack.total as f64).ln();
     let of = |c: &Chosen| {
-        let numbers = numbers(c) + begun(bench, &c.setting.inner, c.effect);
+        let numbers = c.numbers() + begun(bench, &c.setting.inner, c.effect);
         price * numbers as f64 - if c.effect.is_on_every_machine() { USUAL_LAW } else { 0.0 }
     };
     of(law) - of(than)

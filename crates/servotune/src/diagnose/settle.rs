@@ -2,7 +2,6 @@
 
 use super::bench::Bench;
 use super::chosen::Chosen;
-use super::chosen_numbers::numbers;
 use super::fitted::{fitted, fitted_from_both};
 use super::model::Model;
 use super::rival::more;
@@ -78,7 +77,7 @@ const FORMS: usize = 2;
 /// What tells two forms of one law apart: how many numbers they have, and the kind that the first inner one names.
 fn form(c: &Chosen) -> (&'static str, usize, u64) {
     let kind = c.setting.inner.first().filter(|v| v.fract() == 0.0).map_or(0, |v| v.to_bits());
-    (c.effect.facts().name, numbers(c), kind)
+    (c.effect.facts().name, c.numbers(), kind)
 }
 
 /// Laws that may stand in the place of effect `at`, simpler forms of its own first: those that came near it in its own step, and where

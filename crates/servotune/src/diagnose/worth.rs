@@ -5,8 +5,6 @@
 
 use super::bench::Bench;
 use super::candidate::Candidate;
-use super::candidate::together;
-use super::chosen_numbers::numbers as free_numbers;
 use super::model::Model;
 use super::name::same_drag;
 use super::rules::{CONFOUNDED, CONFOUNDED_NEAR_NOISE, FAR_FROM_NOISE, GAIN_WITHOUT_REPEATS, NEAR_NOISE};
@@ -59,7 +57,7 @@ impl Worth<'_> {
         other
             && (!c.effect.is_single_event()
                 || self.bench.stack.segments.iter().any(|s| s.runs.len() == 1)
-                || together(c))
+                || c.together())
     }
 
     fn beyond_chance(&self, c: &Candidate) -> bool {
@@ -87,7 +85,7 @@ impl Worth<'_> {
     /// Of two forms of one law, the one that is worth its numbers most: each number is paid for (Schwarz 1978).
     fn best_form(&self, step: &Step, c: &Candidate) -> bool {
         let price = (self.bench.stack.total as f64).ln();
-        let net = |c: &Candidate| c.gain - price * free_numbers(&c.chosen(0)) as f64;
+        let net = |c: &Candidate| c.gain - price * c.chosen(0).numbers() as f64;
         let forms = step.candidates.iter().filter(|o| o.effect.facts().name == c.effect.facts().name);
         forms.map(net).fold(f64::NEG_INFINITY, f64::max) <= net(c)
     }

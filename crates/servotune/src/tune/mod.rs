@@ -55,7 +55,7 @@ pub use linear::{CandidateSlopes, LimitSlope};
 pub use machine::{Hold, Machine, Route};
 pub use objective::{Disturbance, Minimise, Objective};
 pub use outcome::{AtBound, Infeasible, Outcome, Reached, RelaxedLimit, Tuned, Work};
-pub use parameters::{Parameter, Parameters};
+pub use parameters::{DERIVATIVE_FILTER, Parameter, Parameters};
 pub use pareto::{ParetoPoint, ParetoSettings, pareto};
 pub use physical::{
     PhysicalProof, PhysicalTuning, TUNED_AMPLITUDES, equivalent_responses, judge_physical, tune_physical,

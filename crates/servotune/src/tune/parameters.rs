@@ -67,9 +67,9 @@ pub const NOTCH_POLE_DAMPING: [f64; 2] = [0.05, 1.0];
 /// Range of a peak filter's height (gain at its centre) and of its pole damping.
 const PEAK_HEIGHT: [f64; 2] = [1.0, 30.0];
 const PEAK_POLE_DAMPING: [f64; 2] = [0.002, 0.1];
-/// Derivative filter where neither start controller nor spec names one, in sample times; the range of a PID's where that one meets no
-/// limit set, and of a lead's.
-const DERIVATIVE_FILTER: f64 = 0.3;
+/// Derivative filter where neither start controller nor spec names one, in sample times.
+pub const DERIVATIVE_FILTER: f64 = 0.3;
+/// Its range (sample times) for a PID where no table with that one meets the limits, and for a lead.
 pub(super) const PID_FILTER: [f64; 2] = [0.1, 10.0];
 const LEAD_FILTER: [f64; 2] = [0.1, 100.0];
 /// Damping of a low-pass where no start controller names one.

@@ -100,8 +100,9 @@ pub fn tune_watched(
     settings: &TuneSettings,
     watch: &SearchWatch<'_>,
 ) -> Result<Outcome, TuneError> {
+    let job = Job { machines, near, settings, watch };
     if !spec.structure.feedforward {
-        return tune_feedback(machines, spec, start, near, settings, watch);
+        return tune_feedback(job, spec, start);
     }
     let model = match machines.first() {
         Some(Machine::Model(plant)) => *plant,
@@ -110,12 +111,12 @@ pub fn tune_watched(
         None => return Err(TuneError::NoMachine),
     };
     spec.write("feed-forward")?;
-    let mut outcome = tune_feedback(machines, spec, start, near, settings, watch)?;
+    let mut outcome = tune_feedback(job, spec, start)?;
     for _ in 0..FORWARD_ROUNDS {
         let mut around = outcome.controller().clone();
         let Some(forward) = best_feedforward(model, &around, spec)? else { break };
         around.feedforward = Some(forward);
-        outcome = tune_feedback(machines, spec, Some(&around), near, settings, watch)?;
+        outcome = tune_feedback(job, spec, Some(&around))?;
     }
     // What was before is the caller's start, not the round before.
     let before = start.map(|c| judged(machines, c, spec)).transpose()?;
@@ -126,42 +127,40 @@ pub fn tune_watched(
 /// Rounds of feed-forward and feedback in turn.
 const FORWARD_ROUNDS: usize = 2;
 
+/// What the rounds of a tuning have in common.
+#[derive(Clone, Copy)]
+struct Job<'a> {
+    machines: &'a [Machine<'a>],
+    near: &'a [Controller],
+    settings: &'a TuneSettings,
+    watch: &'a SearchWatch<'a>,
+}
+
 /// Tunes the feedback. Where nobody says the filter of a PID's derivative, "infeasible" is said only after that was searched as well.
-fn tune_feedback(
-    machines: &[Machine<'_>],
-    spec: &Spec,
-    start: Option<&Controller>,
-    near: &[Controller],
-    settings: &TuneSettings,
-    watch: &SearchWatch<'_>,
-) -> Result<Outcome, TuneError> {
-    let outcome = tune_as_said(machines, spec, start, near, settings, watch)?;
-    let said = start.is_some() || spec.structure.controller != Kind::Pid;
+fn tune_feedback(job: Job<'_>, spec: &Spec, start: Option<&Controller>) -> Result<Outcome, TuneError> {
+    let outcome = tune_as_said(job, spec, start)?;
     let Outcome::Infeasible(missed) = &outcome else { return Ok(outcome) };
-    if said || spec.structure.derivative_filter_s.is_some() {
+    let structure = &spec.structure;
+    if start.is_some() || structure.controller != Kind::Pid || structure.derivative_filter_s.is_some() {
         return Ok(outcome);
     }
     let mut free = spec.clone();
     let t = missed.controller.sample_time_s;
-    free.structure.derivative_filter_s = Some(Setting::Range(PID_FILTER.map(|share| share * t)));
-    let near: Vec<Controller> = near.iter().chain([&missed.controller]).cloned().collect();
-    let mut searched = tune_as_said(machines, &free, start, &near, settings, watch)?;
-    match &mut searched {
+    free.structure.derivative_filter_s = Some(Setting::Range(PID_FILTER.map(|samples| samples * t)));
+    let near: Vec<Controller> = job.near.iter().chain([&missed.controller]).cloned().collect();
+    let mut searched = tune_as_said(Job { near: &near, ..job }, &free, start)?;
+    let work = match &mut searched {
         Outcome::Infeasible(other) if other.share >= missed.share => return Ok(outcome),
-        Outcome::Infeasible(other) => other.work.filter_searched = true,
-        Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => t.work.filter_searched = true,
-    }
+        Outcome::Infeasible(other) => &mut other.work,
+        Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => &mut t.work,
+    };
+    work.filter_searched = true;
+    work.evaluations += missed.work.evaluations;
     Ok(searched)
 }
 
-fn tune_as_said(
-    machines: &[Machine<'_>],
-    spec: &Spec,
-    start: Option<&Controller>,
-    near: &[Controller],
-    settings: &TuneSettings,
-    watch: &SearchWatch<'_>,
-) -> Result<Outcome, TuneError> {
+fn tune_as_said(job: Job<'_>, spec: &Spec, start: Option<&Controller>) -> Result<Outcome, TuneError> {
+    let Job { machines, near, settings, watch } = job;
     let parameters = prepare(machines, spec, start, settings)?;
     let mut problem = TuningProblem::new(machines, spec, parameters.clone())?;
     problem.nominal_first = settings.nominal_first;

@@ -88,7 +88,7 @@ impl Chain {
         let one = |r: &Rooted| {
             let s = &r.section;
             let m = r.poles.iter().filter(|z| (*z - 1.0).norm() < ON_CIRCLE).count() as i32;
-            let value = quadratic([s.b0, s.b1, s.b2], back).0 / quadratic([1.0, s.a1, s.a2], back).0;
+            let value = quadratic([s.b0, s.b1, s.b2], back).value / quadratic([1.0, s.a1, s.a2], back).value;
             (value * step.powi(m)).arg() - f64::from(m) * step.arg()
         };
         self.sections.iter().map(one).sum()
@@ -115,14 +115,15 @@ impl Chain {
         let mut e = Expansion::ONE;
         for r in &self.sections {
             let s = &r.section;
-            let over = factor([1.0, s.a1, s.a2], &r.poles, z, half);
+            let over = factor(quadratic([1.0, s.a1, s.a2], back), &r.poles, z, half);
+            let above = quadratic([s.b0, s.b1, s.b2], back);
             let beside = r.zeros.iter().any(|root| (z - root).norm_sqr().sqrt() < 3.0 * half + 1e-9);
             // Near a double zero the value drowns in its rounding, and a logarithm would have no slope.
-            let (value, _, rounding) = quadratic([s.b0, s.b1, s.b2], back);
-            let zeros = if beside || value.norm_sqr().sqrt() < DROWNED * rounding {
-                zero([s.b0, s.b1, s.b2], back, half)
+            let zeros = if beside || above.value.norm_sqr().sqrt() < DROWNED * above.rounding {
+                let bend = s.b1.abs() + 4.0 * s.b2.abs();
+                Expansion::plain(Jet::of(above.value, above.first, bend, half, above.rounding))
             } else {
-                factor([s.b0, s.b1, s.b2], &r.zeros, z, half)
+                factor(above, &r.zeros, z, half)
             };
             e = e.times(zeros).over(over);
         }
@@ -130,27 +131,28 @@ impl Chain {
     }
 }
 
-/// a + b q + c q², q = 1/z = e^{-j angle}, and its derivative: dq/d angle = -j q.
-fn quadratic([a, b, c]: [f64; 3], q: Complex<f64>) -> (Complex<f64>, Complex<f64>, f64) {
+/// A quadratic at one angle: value, derivative and the bound of the value's rounding.
+struct Evaluated {
+    value: Complex<f64>,
+    first: Complex<f64>,
+    rounding: f64,
+}
+
+/// a + b q + c q², q = 1/z = e^{-j angle}: dq/d angle = -j q.
+fn quadratic([a, b, c]: [f64; 3], q: Complex<f64>) -> Evaluated {
     let value = a + q * (b + q * c);
     let first = Complex::new(0.0, -1.0) * q * (b + 2.0 * c * q);
-    (value, first, 4.0 * f64::EPSILON * (a.abs() + b.abs() + c.abs()))
+    Evaluated { value, first, rounding: 4.0 * f64::EPSILON * (a.abs() + b.abs() + c.abs()) }
 }
 
 /// A quadratic away from its roots, as its logarithm: |d² ln(z - r)/d angle²| = |r|/|z - r|²; whole powers of z have none.
-fn factor(of: [f64; 3], roots: &[Complex<f64>], z: Complex<f64>, half: f64) -> Expansion {
-    let (value, first, rounding) = quadratic(of, z.conj());
+fn factor(of: Evaluated, roots: &[Complex<f64>], z: Complex<f64>, half: f64) -> Expansion {
+    let Evaluated { value, first, rounding } = of;
     let bend = roots.iter().map(|root| {
         let near = ((z - root).norm_sqr().sqrt() - half).max(0.0);
         root.norm_sqr().sqrt() / (near * near)
     });
     Expansion { value, slope: first / value, bend: bend.sum(), rounding: rounding / value.norm(), zeros: None }
-}
-
-/// A quadratic in or beside a cell with one of its roots.
-fn zero(of: [f64; 3], back: Complex<f64>, half: f64) -> Expansion {
-    let (value, first, rounding) = quadratic(of, back);
-    Expansion::plain(Jet::of(value, first, of[1].abs() + 4.0 * of[2].abs(), half, rounding))
 }
 
 #[cfg(test)]
