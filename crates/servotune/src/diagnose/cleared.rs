@@ -24,10 +24,13 @@ const SMOOTHINGS: [f64; 3] = [3.0, 8.0, 20.0];
 /// The later of the two commands whose shares make any delay between them (samples).
 const LATER: usize = 4;
 /// Laws that are tried by simulation, as they stand and fitted.
-const TRIED: usize = 12;
+const TRIED: usize = 16;
 const FITTED: usize = 3;
 /// Smoothings between rows of the balance.
 const ROWS: f64 = 0.5;
+/// Speeds at which the arm surely slides, over what the sensor's noise makes of the smoothed speed at rest: where it may stick, a drag is
+/// whatever holds it, and its rows tell of no law. Both balances are tried.
+const SLIDES: [f64; 2] = [0.0, 6.0];
 
 /// A record's mean run, smoothed: its motion and what stands on both sides of the balance.
 struct Smoothed {
@@ -53,7 +56,8 @@ fn smooth(x: &[f64], k: usize, weights: &[f64]) -> f64 {
 }
 
 impl Smoothed {
-    fn of(run: &Run, t: f64, width: f64, spindle_rad_s: f64) -> Smoothed {
+    /// Of rows, those whose speed is above `slides` (position_unit/s).
+    fn of(run: &Run, t: f64, width: f64, slides: f64, spindle_rad_s: f64) -> Smoothed {
         let (weights, n) = (weights(width), run.len());
         let x: Vec<f64> = (0..n).map(|k| smooth(&run.position, k, &weights)).collect();
         let beside = |k: usize| [x[k.saturating_sub(1)], x[k], x[(k + 1).min(n - 1)]];
@@ -76,11 +80,10 @@ impl Smoothed {
         };
         let edge = weights.len() + LATER + 1;
         let stride = (ROWS * width).max(1.0) as usize;
-        Smoothed {
-            samples: (0..n).map(sample).collect(),
-            acceleration: (0..n).map(bent).collect(),
-            rows: (edge..n.saturating_sub(edge)).step_by(stride).collect(),
-        }
+        let samples: Vec<Sample> = (0..n).map(sample).collect();
+        let mut rows: Vec<usize> = (edge..n.saturating_sub(edge)).step_by(stride).collect();
+        rows.retain(|&k| samples[k].v.abs() >= slides);
+        Smoothed { samples, acceleration: (0..n).map(bent).collect(), rows }
     }
 }
 
@@ -112,10 +115,13 @@ struct Balanced {
 }
 
 impl<'a> Balance<'a> {
-    fn of(bench: &'a Bench, means: &'a [Run], width: f64) -> Balance<'a> {
+    fn of(bench: &'a Bench, means: &'a [Run], width: f64, slides: f64) -> Balance<'a> {
         let t = bench.scene.sample_time_s;
         let spindle = std::f64::consts::TAU * bench.scene.spindle_hz.unwrap_or(0.0);
-        let parts: Vec<Smoothed> = means.par_iter().map(|m| Smoothed::of(m, t, width, spindle)).collect();
+        // White noise behind a Gaussian of this width: the root mean square of its slope.
+        let jitter = roughness(means) / (2.0 * std::f64::consts::PI.sqrt().sqrt() * width.powf(1.5) * t);
+        let parts: Vec<Smoothed> =
+            means.par_iter().map(|m| Smoothed::of(m, t, width, slides * jitter, spindle)).collect();
         let moving = parts.iter().flat_map(|p| p.rows.iter().map(|&k| p.samples[k].v.abs()));
         let speed = moving.fold(0.0f64, f64::max).max(1e-12);
         let noise = roughness(means).min(bench.levels.sensor_rms);
@@ -244,8 +250,8 @@ pub(super) struct Cleared {
 /// The plant to set out from, where the given one conceals what acts; none where the given one, or a refit of it, does.
 pub(super) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str)) -> Option<Cleared> {
     let means: Vec<Run> = bench.stack.segments.iter().map(|s| mean_run(&bench.runs, &s.runs)).collect();
-    let mut laws: Vec<(f64, Balanced)> =
-        SMOOTHINGS.iter().flat_map(|&w| Balance::of(bench, &means, w).laws()).collect();
+    let balances = SMOOTHINGS.iter().flat_map(|&w| SLIDES.map(|s| Balance::of(bench, &means, w, s)));
+    let mut laws: Vec<(f64, Balanced)> = balances.flat_map(|b| b.laws()).collect();
     if laws.is_empty() {
         return None;
     }

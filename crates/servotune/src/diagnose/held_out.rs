@@ -4,7 +4,7 @@ use super::bench::Bench;
 use super::chance::log_tail;
 use super::corrected::Corrected;
 use super::finding::Finding;
-use super::judge::Judged;
+use super::judge::{Judged, error};
 use super::linear::free_motions;
 use super::model::Model;
 use super::place::{Part, place_of};
@@ -58,12 +58,19 @@ pub(super) fn held_out(bench: &Bench, selection: &Selection, fixed: &Corrected) 
             let e = bench.along(run, model, &own)?;
             Ok(dot(&e, &e) / run.len() as f64)
         };
+        let refit = per_sample(&selection.baseline)?;
+        let mut after = per_sample(&selection.model)?;
+        if selection.stands_by_simulation() {
+            let mut e = error(&fixed.judged(bench, selection), run, None)?;
+            bench.whitener.apply(&mut e);
+            after = after.min(dot(&e, &e) / run.len() as f64);
+        }
         Ok(HeldOut {
             record: run.name.clone(),
             inside: within(span([&run.position[..]].into_iter()), positions)
                 && within(span([&run.input[..]].into_iter()), commands),
             samples: run.len(),
-            whitened: [per_sample(&selection.baseline)?, per_sample(&selection.model)?],
+            whitened: [refit, after],
         })
     };
     bench.runs.iter().filter(|r| r.role == Role::Holdout).map(judge).collect()

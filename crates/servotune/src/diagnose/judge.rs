@@ -13,6 +13,7 @@ use super::trajectory::Trajectory;
 use crate::controller::Law;
 use crate::lti::{Body, DiscretePlant, LtiError, Plant, PlantState, step_chain};
 use crate::numeric::least_squares::{Qr, dot};
+use crate::numeric::random::Random;
 use crate::physics::{Effect, Entry, Machine, Sample, Scene, Setting};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -119,9 +120,17 @@ pub fn error(model: &Judged, run: &Run, closed: Option<&Law>) -> Result<Vec<f64>
         return Ok(begun.found(rest, &begun.linear, 1)?.error);
     }
     let near = begun.found(rest, &begun.linear, 2)?;
-    let (better, _) = begun.better(near.free, ROUNDS)?;
-    Ok(if size(&better.error) < size(&near.error) { better.error } else { near.error })
+    let (better, _) = begun.better(near.free.clone(), ROUNDS)?;
+    let best = if size(&better.error) < size(&near.error) { better } else { near };
+    if begun.closed.is_some() && model.effects.iter().any(|(e, _)| e.is_drag()) {
+        begun.shaken(best)
+    } else {
+        Ok(best.error)
+    }
 }
+
+/// Draws of the sensor's noise over which a sticking machine in closed loop is averaged.
+const DRAWS: u64 = 8;
 
 /// Sum of squares.
 pub fn size(series: &[f64]) -> f64 {
@@ -251,7 +260,20 @@ impl<'a> Begun<'a> {
     }
 
     fn simulated(&self, free: Vec<f64>) -> Result<Vec<f64>, LtiError> {
-        simulate(self.model, self.run, self.closed, self.constant, free)
+        simulate(self.model, self.run, self.closed, self.constant, free, None)
+    }
+
+    /// The error under the noise of the sensor, the mean over several draws: a controller that hears noise shakes a drag loose at every
+    /// reversal, and one that hears none lets it stick.
+    fn shaken(&self, still: Started) -> Result<Vec<f64>, LtiError> {
+        let quiet = self.simulated(still.free.clone())?;
+        let mut mean = still.error;
+        for seed in 0..DRAWS {
+            let noise = Some(Random::stream(seed, 0));
+            let one = simulate(self.model, self.run, self.closed, self.constant, still.free.clone(), noise)?;
+            mean.iter_mut().zip(one.iter().zip(&quiet)).for_each(|(m, (a, b))| *m += (a - b) / DRAWS as f64);
+        }
+        Ok(mean)
     }
 }
 
@@ -268,13 +290,14 @@ fn least_squares(columns: &[Vec<f64>], which: &[usize], series: &[f64]) -> Vec<f
     qr.solve(&mut series.to_vec()).into_iter().map(|s| if s.is_finite() { s } else { 0.0 }).collect()
 }
 
-/// Recorded less simulated position with a free motion of the machine.
+/// Recorded less simulated position with a free motion of the machine, the controller hearing noise of the sensor where it is given.
 fn simulate(
     model: &Judged,
     run: &Run,
     closed: Option<&Law>,
     constant_torque: Option<f64>,
     free: Vec<f64>,
+    mut noise: Option<Random>,
 ) -> Result<Vec<f64>, LtiError> {
     let mut machine = Machine::new(model.plant, &model.effects, model.scene)?
         .begun_at(run.began_s)
@@ -294,9 +317,10 @@ fn simulate(
         let angle = run.spindle_rad.as_ref().map_or(spindle * k as f64 * t, |s| s[k]);
         let y = machine.measure(angle, run.temperature.as_ref().map_or(0.0, |c| c[k]));
         out.push(run.position[k] - y);
+        let heard = y + noise.as_mut().map_or(0.0, |n| model.scene.noise * n.normal());
         let u = match &mut loops {
             Some((law, reference, memory)) => {
-                let sum = step_chain(&law.chain, memory, reference[k] - y) + law.ahead(reference, k);
+                let sum = step_chain(&law.chain, memory, reference[k] - heard) + law.ahead(reference, k);
                 sum.clamp(-law.limit, law.limit) + run.excitation[k]
             }
             None => run.input[k],

@@ -1,7 +1,7 @@
 //! A record made ready: what acted on the plant, what it answered, and whose repeat it is.
 
 use super::rules::LAP_DIGITS;
-use crate::recording::{Case, Role};
+use crate::recording::{Case, Record, Role};
 
 /// One record of a case.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,16 +116,27 @@ const SHORTEST_LAP: usize = 256;
 /// Samples at the start over which a command at rest is averaged.
 const AT_REST: usize = 16;
 
-/// Samples for which a reference stands still at the start, up to [`AT_REST`].
-fn still(reference: Option<&[f64]>) -> usize {
-    reference.map_or(0, |r| r.iter().take(AT_REST).take_while(|v| **v == r[0]).count())
+/// Samples for which a series stands still at the start, up to [`AT_REST`].
+fn still(series: &[f64]) -> usize {
+    series.iter().take(AT_REST).take_while(|v| **v == series[0]).count()
 }
 
-/// A signal before its record began: its mean as long as the reference stands still, what the controller held against springs
-/// and cables for instance; otherwise the first sample.
-fn first(signal: &[f64], reference: Option<&[f64]>) -> f64 {
-    let n = still(reference).max(1).min(signal.len());
-    signal[..n].iter().sum::<f64>() / n as f64
+fn mean(series: &[f64]) -> f64 {
+    series.iter().sum::<f64>() / series.len() as f64
+}
+
+/// Position and command before a record began.
+///
+/// Their means as long as reference and excitation stand still: what the controller held against springs and cables. An excitation that sets in
+/// at once leaves of the position the first sample; the command that held the arm is then the mean of all that was put in, where the reference
+/// never moves.
+fn stood(record: &Record) -> [f64; 2] {
+    let reference = record.reference.as_deref().unwrap_or_default();
+    let quiet = still(reference).min(still(&record.excitation)).max(1).min(record.len());
+    let origin = mean(&record.position[..quiet]);
+    let held = still(reference) >= AT_REST && quiet < AT_REST && reference.iter().all(|r| *r == reference[0]);
+    let before = if held { mean(&record.command) + mean(&record.excitation) } else { mean(&record.command[..quiet]) };
+    [origin, before]
 }
 
 /// The records of a case as runs, groups numbered in the order of their first record.
@@ -143,6 +154,7 @@ pub fn runs(case: &Case) -> Vec<Run> {
             });
             let began_s = session_s;
             session_s += record.len() as f64 * record.sample_time_s;
+            let [origin, before] = stood(record);
             let input: Vec<f64> = record.command.iter().zip(&record.excitation).map(|(c, e)| c + e).collect();
             Run {
                 name: entry.name(),
@@ -150,10 +162,10 @@ pub fn runs(case: &Case) -> Vec<Run> {
                 began_s,
                 from_s: 0.0,
                 group,
-                rested: still(record.reference.as_deref()) >= AT_REST.min(record.position.len()),
+                rested: still(record.reference.as_deref().unwrap_or_default()) >= AT_REST.min(record.position.len()),
                 bumped: false,
-                before: first(&record.command, record.reference.as_deref()),
-                origin: first(&record.position, record.reference.as_deref()),
+                before,
+                origin,
                 reference: record.reference.clone(),
                 command: record.command.clone(),
                 excitation: record.excitation.clone(),

@@ -235,6 +235,6 @@ impl Search<'_> {
         }
         let limit = settings.false_alarm.ln();
         let leftover = leftover(bench, library, &model, simulated.as_ref(), &steps, (baseline.cost, limit));
-        Selection { given, baseline, steps, model, simulated, rivals, leftover, bootstrap }
+        Selection { given, baseline, steps, model, felt, simulated, rivals, leftover, bootstrap }
     }
 }

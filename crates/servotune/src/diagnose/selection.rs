@@ -32,6 +32,8 @@ pub struct Selection {
     pub steps: Vec<Step>,
     /// Where the search ended.
     pub model: Model,
+    /// Whether that model was fitted by simulation all along: along a noisy motion its laws fall far short of themselves.
+    pub felt: bool,
     /// The same fitted once more by simulation, where that holds: what numbers and corrected plant are taken from.
     pub simulated: Option<Model>,
     /// For each effect of the model, others in its place.
@@ -43,6 +45,11 @@ pub struct Selection {
 }
 
 impl Selection {
+    /// Whether the model leaves less in simulation than along the recorded motion: noise of the sensor makes the latter too rough for its laws.
+    pub fn stands_by_simulation(&self) -> bool {
+        self.felt || self.last().cost < self.model.cost
+    }
+
     /// The model that leaves less, along the recorded motion or simulated.
     pub fn best(&self) -> &Model {
         if self.last().cost < self.model.cost { self.last() } else { &self.model }

@@ -53,6 +53,9 @@ pub fn apart(mean: &[Sample], input: &[f64], plant: &DiscretePlant) -> Vec<Sampl
     (0..n).map(sample).collect()
 }
 
+/// Samples of a record that tell its start.
+const TELLS: usize = 8192;
+
 /// The smoother of one machine.
 #[derive(Clone, Debug)]
 pub struct Smoother {
@@ -110,7 +113,7 @@ impl Smoother {
 
     /// Twice the negative logarithm of the likelihood of a record, up to a constant.
     fn cost(&self, y: &[f64], i: &[f64]) -> f64 {
-        let mut z = Vector3::new(y[0], 0.0, 0.0);
+        let mut z = self.started(y, i, Vector3::new(y[0], 0.0, 0.0));
         let s = &self.steady;
         let mut sum = 0.0;
         for (y, i) in y.iter().zip(i) {
@@ -121,6 +124,29 @@ impl Smoother {
         sum / s.spread + y.len() as f64 * s.spread.ln()
     }
 
+    /// The state at a record's first sample that makes the innovations least, from one that is near.
+    ///
+    /// The gains are those of a filter that has settled: where hardly anything unexplained acts they are so small that a wrong start would
+    /// stay in the motion for long.
+    fn started(&self, y: &[f64], i: &[f64], near: Vector3<f64>) -> Vector3<f64> {
+        let s = &self.steady;
+        let (mut z, mut by) = (near, Matrix3::identity());
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for (y, i) in y.iter().zip(i).take(TELLS) {
+            let (e, row) = (y - z[0], by.row(0).into_owned());
+            normal += row.transpose() * row;
+            right += row.transpose() * e;
+            z = self.step * (z + s.gain * e) + self.push * *i;
+            by = self.step * (by - s.gain * row);
+        }
+        // Scaling by the diagonal keeps position, velocity and torque in one matrix.
+        let d = normal.diagonal().map(|x: f64| x.max(1e-300).sqrt().recip());
+        let d = Matrix3::from_diagonal(&d);
+        let scaled = d * normal * d + Matrix3::identity() * f64::EPSILON.sqrt();
+        let moved = scaled.cholesky().map(|c| d * c.solve(&(d * right)));
+        moved.filter(|m| m.iter().all(|v| v.is_finite())).map_or(near, |m| near + m)
+    }
+
     /// Smooths a run; `spindle_hz` stands in for a spindle index that was not recorded.
     pub fn smooth(&self, run: &Run, known: &[f64], sampled: &DiscretePlant, spindle_hz: f64) -> Trajectory {
         let (y, n, t) = (&run.position, run.len(), sampled.sample_time_s());
@@ -129,10 +155,10 @@ impl Smoother {
         let s = &self.steady;
         let mut ahead = Vec::with_capacity(n);
         let mut after = Vec::with_capacity(n);
-        // The start: the first samples' mean, at the speed of their line.
+        // Near the start: the first sample, at the speed of the first samples' line.
         let few = n.min(16);
         let slope = (y[few - 1] - y[0]) / (few - 1) as f64 / t;
-        let mut z = Vector3::new(y[0], slope, 0.0);
+        let mut z = self.started(y, &i, Vector3::new(y[0], slope, 0.0));
         for k in 0..n {
             ahead.push(z);
             let c = z + s.gain * (y[k] - z[0]);

@@ -7,7 +7,7 @@
 
 use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
 use super::parameter::{Parameter, Unit};
-use super::pivot_friction::{SLID, dahl};
+use super::pivot_friction::{SLID, dahl, shortest_loop};
 use super::sample::{Sample, Scene, logarithmic};
 
 /// Inner: pre-sliding length, or the speed of a creep with a minus; Stribeck speed (0 for none), Stribeck rise. Strength: the level at
@@ -30,6 +30,9 @@ static FACTS: Facts = Facts {
 
 /// Speeds over which a creeping drag turns round, over the highest: a slower one is dry, a faster one all but viscous.
 const CREEP: [f64; 2] = [1e-3, 0.3];
+
+/// Lengths to a doubling.
+const OCTAVE: f64 = 1.34;
 
 /// Shortest length that a simulation is fitted with, over the shortest of the grid.
 const DRIER: f64 = 0.02;
@@ -90,10 +93,10 @@ impl Effect for CoulombFriction {
     }
 
     fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        // At most some twelve times the sensor's noise: shorter than what pre-sliding friction could be seen at.
-        let floor = 1e-5 * scene.travel;
-        let (short, long) = ((1.5 * scene.noise).max(0.3 * floor), (12.0 * scene.noise).max(2.0 * floor));
-        let mut all: Vec<Vec<f64>> = logarithmic(short, long, 5).into_iter().map(|l| vec![l, 0.0, 0.0]).collect();
+        // Up to the length from which on pre-sliding friction is told by its loop.
+        let (short, long) = ((1.5 * scene.noise).max(3e-6 * scene.travel), shortest_loop(scene));
+        let count = 1 + (OCTAVE * (long / short).log2()).ceil().max(4.0) as usize;
+        let mut all: Vec<Vec<f64>> = logarithmic(short, long, count).into_iter().map(|l| vec![l, 0.0, 0.0]).collect();
         // A rise that reaches up to the highest speed is no rise but the level.
         let rises = logarithmic(0.015, 0.2, 4);
         all.extend([0.25, 0.5].iter().flat_map(|l| rises.iter().map(move |v| vec![l * long, v * scene.speed, 0.5])));

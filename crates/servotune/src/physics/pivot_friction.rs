@@ -128,6 +128,11 @@ fn loaded_to(left: f64, tail: f64) -> f64 {
     }
 }
 
+/// Shortest sliding length whose hysteresis is told from dry friction: some twelve times the sensor's noise, or a small share of the travel.
+pub(super) fn shortest_loop(scene: &Scene) -> f64 {
+    (12.0 * scene.noise).max(2e-3 * scene.travel)
+}
+
 impl Effect for PivotFriction {
     fn facts(&self) -> &'static Facts {
         &FACTS
@@ -138,9 +143,7 @@ impl Effect for PivotFriction {
     }
 
     fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        // Below some twelve times the sensor's noise the hysteresis cannot be told from dry friction.
-        let low = (12.0 * scene.noise).max(2e-3 * scene.travel);
-        let lengths = logarithmic(low, 4.0 * scene.travel, 14);
+        let lengths = logarithmic(shortest_loop(scene), 4.0 * scene.travel, 14);
         lengths.iter().flat_map(|&l| [0.0, 1.0, 2.0].map(|shape| vec![l, shape])).collect()
     }
 
