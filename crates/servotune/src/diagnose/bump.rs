@@ -18,7 +18,8 @@ use super::stack::Segment;
 use super::trajectory::Trajectory;
 use crate::lti::{LtiError, Plant};
 use crate::numeric::least_squares::dot;
-use crate::physics::{Effect, Sample, effect, library};
+use crate::physics::shock::Shock;
+use crate::physics::{AnyLaw, Effect, Sample, library};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -61,7 +62,7 @@ fn answer(bench: &Bench, sampled: &Sampled, n: usize, width_s: f64) -> Option<An
     let t = bench.scene.sample_time_s;
     let samples = (0..n).map(|k| Sample { t: k as f64 * t, ..Sample::default() }).collect();
     let motion = Trajectory { samples, unexplained: Vec::new(), repeats: Vec::new() };
-    let raw = raw_columns(effect("shock")?, &[0.0, width_s], &bench.scene, &motion);
+    let raw = raw_columns(&Shock { time_s: 0.0, width_s }.into(), &bench.scene, &motion);
     let mut y = vec![0.0; n];
     sampled.direct.add_response(&raw[0], &mut y);
     bench.whitener.apply(&mut y);
@@ -229,8 +230,8 @@ pub(super) fn set_aside(
 fn bent(bench: &Bench, bump: &Bump) -> bool {
     let Ok(sampled) = Sampled::of(&bench.form.given, bench.scene.sample_time_s) else { return false };
     let explains = |e: &dyn Effect| {
-        let gain = |inner: &Vec<f64>| Difference::of(bench, &sampled, e, inner).gain();
-        e.scan_points(&bench.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
+        let gain = |law: &AnyLaw| Difference::of(bench, &sampled, law).gain();
+        e.grid(&bench.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
     };
     library().iter().filter(|e| e.is_hard_nonlinearity()).any(|e| explains(*e) > PUSH_BY_AMPLIFIER * bump.gain)
 }

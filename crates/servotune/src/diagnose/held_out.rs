@@ -88,7 +88,7 @@ fn loudest(bench: &Bench) -> f64 {
 ///
 /// None where a law goes by a clock of its own, which each record starts anew.
 pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) -> Option<&'a HeldOut> {
-    if model.chosen.iter().any(|c| c.effect.facts().per_record || c.effect.has_own_clock()) {
+    if model.chosen.iter().any(|c| c.setting.facts().per_record || c.effect().has_own_clock()) {
         return None;
     }
     let loudest = loudest(bench);
