@@ -5,6 +5,7 @@ mod physics_common;
 
 use physics_common::{along, run, scene};
 use servotune::lti::Body;
+use servotune::physics::coulomb_friction::CoulombFriction;
 use servotune::physics::encoder_cyclic_error::Harmonics;
 use servotune::physics::torque_factor_rolloff::Shape;
 use servotune::physics::{AnyLaw, COLUMNS, Entry, Given, Sample, Setting, facts, library};
@@ -120,4 +121,33 @@ fn entries_say_what_the_laws_do() {
         assert!(!f.fixed || (f.columns == 1 && f.entry != Entry::Torque), "{}", f.name);
         assert!(f.says.len() > 20 && f.equation.len() > 5 && f.experiment.len() > 20, "{}", f.name);
     }
+}
+
+#[test]
+fn a_law_with_another_number_is_the_same_law_with_another_number() {
+    let scene = scene();
+    for e in library() {
+        let grid = e.grid(&scene);
+        for law in &grid {
+            let numbers = law.numbers();
+            assert_eq!((numbers.len(), law.size()), (grid[0].numbers().len(), grid[0].size()), "{law:?}");
+            assert!(law.told() <= law.size() && law.effect().facts().name == e.facts().name, "{law:?}");
+            let own: Vec<f64> = numbers.iter().map(|n| n.unwrap_or(0.0)).collect();
+            assert_eq!(law.with_numbers(&own), *law);
+            for (place, number) in numbers.iter().enumerate() {
+                // A number that this form has not is not made by giving it.
+                let moved = law.with_number(place, 3.5);
+                assert!(moved.same_class(law), "{law:?} {moved:?}");
+                assert_eq!(moved.number(place), number.map(|_| 3.5), "{law:?}");
+                assert_eq!(moved == *law, number.is_none_or(|n| n == 3.5), "{law:?}");
+            }
+        }
+    }
+    let first = |name: &str| library().iter().find(|e| e.facts().name == name).unwrap().grid(&scene).swap_remove(0);
+    assert!(!first("sensor_lag").same_class(&first("amplifier_lag")));
+    // A drag that creeps and one that sticks are two classes; two that stick over other lengths are one.
+    assert!(!AnyLaw::from(CoulombFriction::creeping(1.0)).same_class(&CoulombFriction::sticking(1.0, None).into()));
+    assert!(
+        AnyLaw::from(CoulombFriction::sticking(2.0, None)).same_class(&CoulombFriction::sticking(1.0, None).into())
+    );
 }

@@ -142,10 +142,6 @@ fn law_figure(s: &Shown, c: &Chosen, segment: usize, value: &[f64]) -> Result<Fi
     })
 }
 
-/// Effects that change stiffness and damping with the amplitude of the motion.
-const AMPLITUDE: [&str; 5] =
-    ["pivot_friction", "coulomb_friction", "nonlinear_spring", "cable_spring", "aerodynamic_drag"];
-
 /// Acceleration per command, stiffness (1/s²) and viscous rate (1/s): x'' = b u - k x - c x'.
 fn numbers(plant: &Plant) -> [f64; 3] {
     let [b, k, c] = match plant.body {
@@ -189,8 +185,8 @@ fn at_amplitude(plant: &Plant, effects: &[&Setting], scene: &Scene, amplitude: f
 /// Natural frequency and damping over amplitude; none where nothing that was found changes them.
 pub(super) fn amplitude_figure(s: &Shown) -> Result<Option<Figure>, ReportError> {
     let (fixed, scene) = (&s.made.corrected, &s.made.bench.scene);
-    let effects: Vec<&Setting> = fixed.effects.iter().filter(|s| AMPLITUDE.contains(&s.facts().name)).collect();
-    if effects.iter().all(|s| s.facts().name == "cable_spring") {
+    let effects: Vec<&Setting> = fixed.effects.iter().filter(|s| s.law.effect().acts_on_body()).collect();
+    if effects.iter().all(|s| matches!(s.law, AnyLaw::CableSpring(_))) {
         return Ok(None);
     }
     let amplitudes = servotune::physics::logarithmic(1e-3 * scene.travel, 2.0 * scene.travel, 25);

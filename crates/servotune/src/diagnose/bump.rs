@@ -11,15 +11,14 @@ use super::finding::{Estimate, Finding, Where};
 use super::fitted::refit;
 use super::judge::{Judged, error};
 use super::linear::{Sampled, free_motions};
-use super::name::text_of;
 use super::rules::{PUSH_BY_AMPLIFIER, PUSH_CHANCE, PUSH_STAYS, PUSH_SUSPECTED, PUSH_WHOLE, PUSHED_RECORDS};
 use super::run::Run;
 use super::stack::Segment;
 use super::trajectory::Trajectory;
 use crate::lti::{LtiError, Plant};
 use crate::numeric::least_squares::dot;
-use crate::physics::shock::Shock;
-use crate::physics::{AnyLaw, Effect, Sample, library};
+use crate::physics::shock::{self, Shock};
+use crate::physics::{AnyLaw, Effect, Facts, Sample, library};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -264,7 +263,7 @@ impl Bump {
 
     /// The finding, in a machine with these units.
     pub(super) fn finding(&self, runs: &[Run], command_unit: &str) -> Finding {
-        let (says, port) = text_of("shock");
+        let &Facts { name: effect, says, port, .. } = &shock::FACTS;
         let number = |value: f64, off: f64, unit: &str| Estimate {
             value,
             low: value - off,
@@ -273,8 +272,8 @@ impl Bump {
         };
         let name = &runs[self.run].name;
         Finding {
-            effect: "shock".into(),
-            family: vec!["shock".into()],
+            effect: effect.into(),
+            family: vec![effect.into()],
             port,
             p_value: self.log_p.min(0.0).exp().max(1e-300),
             says: format!(

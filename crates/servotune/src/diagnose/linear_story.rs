@@ -16,7 +16,7 @@ use super::simulated::simulated_with;
 use crate::lti::Plant;
 use crate::physics::amplifier_lag::AmplifierLag;
 use crate::physics::sensor_lag::SensorLag;
-use crate::physics::{AnyLaw, Parameter, Setting};
+use crate::physics::{AnyLaw, Facts, Parameter, Setting, extra_delay, misalignment};
 use std::collections::BTreeMap;
 
 /// How a restricted model is fitted.
@@ -190,17 +190,17 @@ fn simple_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection) -> bool
         let sigma =
             bench.form.knobs.iter().position(|k| *k == Knob::Delay).map_or(0.0, |i| selection.model.refitted.spread(i))
                 * t;
-        let (says, port) = text_of("extra_delay");
-        let mut family = vec!["extra_delay".to_owned()];
+        let &Facts { name: effect, says, port, .. } = &extra_delay::FACTS;
+        let mut family = vec![effect.to_owned()];
         if value > 0.0 {
             family.extend(lags_like(bench, way, value, delay));
         }
         // Only a controller's replay tells a late log from a late machine.
         if d.replay.is_none() {
-            family.push("misalignment".into());
+            family.push(misalignment::FACTS.name.into());
         }
         let f = Finding {
-            effect: "extra_delay".into(),
+            effect: effect.into(),
             family,
             port,
             p_value: log_tail(fixed - delay, 1).min(0.0).exp().max(1e-300),

@@ -15,7 +15,10 @@ use super::rules::{
 };
 use super::run::Run;
 use super::selection::Selection;
-use crate::physics::{AnyLaw, Effect, Entry, Facts, Parameter, Setting, Share, effect, facts, library};
+use crate::physics::{
+    AnyLaw, Effect, Entry, Facts, Parameter, Setting, Share, coulomb_friction, effect, facts, library,
+    line_disturbance, linear_parameters, repeatable_runout, unexplained,
+};
 use std::collections::BTreeMap;
 
 /// Difference of the fit below which two laws are one family, for an effect that explains so much.
@@ -27,6 +30,10 @@ pub(super) fn family_width(gain: f64) -> f64 {
 const ALIKE: f64 = 1e-6;
 /// By how much free numbers are moved to see what they enter.
 const NUDGE: f64 = 1.01;
+
+/// What a line is named: a hum, or run-out where it is an order of the spindle.
+pub(super) const HUM: &str = line_disturbance::FACTS.name;
+pub(super) const RUNOUT: &str = repeatable_runout::FACTS.name;
 
 /// Whether two names are both drags.
 pub(super) fn same_drag(a: &str, b: &str) -> bool {
@@ -63,10 +70,13 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
     // A line at a multiple of the spindle is run-out, whichever law carried it.
     // A pre-sliding length that the sensor's noise covers is no pre-sliding: the drag is dry.
     let dry = chosen.setting.law.presliding_length().is_some_and(|l| l < DRY_LENGTH * bench.scene.noise);
-    let name = match own {
-        "line_disturbance" if spindle(chosen.setting.law.first_number()) => "repeatable_runout",
-        _ if dry => "coulomb_friction",
-        _ => own,
+    let line = chosen.effect().is_tone();
+    let name = if line && spindle(chosen.setting.law.first_number()) {
+        RUNOUT
+    } else if dry {
+        coulomb_friction::FACTS.name
+    } else {
+        own
     };
     let mut family = vec![name.to_owned()];
     for Rival { name: rival, cost, .. } in &selection.rivals[at] {
@@ -74,7 +84,7 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
             && !family.iter().any(|f| f == rival)
             && *rival != own
             && !same_drag(rival, name)
-            && !(name == "repeatable_runout" && *rival == "line_disturbance" && spindle_hz.is_some())
+            && !(name == RUNOUT && *rival == HUM && spindle_hz.is_some())
         {
             family.push((*rival).to_owned());
         }
@@ -85,28 +95,27 @@ pub(super) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option
             family.push(twin.to_owned());
         }
     }
-    if own == "repeatable_runout"
+    if own == RUNOUT
         && spindle_hz.is_some_and(|s| single_order(&chosen.setting).is_some_and(|hz| hz > MAINS_ORDER * s && mains(hz)))
     {
-        family.push("line_disturbance".to_owned());
+        family.push(HUM.to_owned());
     }
     // Nobody said how fast a spindle turns: any line may be one of its orders.
-    if name == "line_disturbance" && spindle_hz.is_none() && !family.iter().any(|f| f == "repeatable_runout") {
-        family.push("repeatable_runout".to_owned());
+    if name == HUM && spindle_hz.is_none() && !family.iter().any(|f| f == RUNOUT) {
+        family.push(RUNOUT.to_owned());
     }
     // Where the refit leaves next to nothing, a slight curve in the spectrum may be what its own straightness falls short of.
-    let line = chosen.effect().is_tone();
     let curve =
         line || chosen.setting.facts().port == crate::physics::Port::Structure && c.concealed > SLIGHT_CONFOUNDED;
     let slight = SLIGHT.max(SLIGHT_SHARE * (selection.given - selection.baseline.cost));
     if curve && gain < slight && selection.baseline.excess_sigma() < SLIGHT_NEAR_NOISE {
-        family.push("linear_parameters".to_owned());
+        family.push(linear_parameters::FACTS.name.to_owned());
     }
     let log_p = log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library().len() as f64).ln();
     let (says, port) = text_of(name);
     let signal = effect_signal(bench, selection, at);
     let mut parameters = estimates(bench, selection, at);
-    if name == "repeatable_runout" && line {
+    if name == RUNOUT && line {
         parameters.insert("base_hz".into(), plain(bench.scene.spindle_hz.unwrap_or(0.0), "Hz"));
     }
     let place = place(bench, &bench.stack, &signal);
@@ -252,8 +261,8 @@ pub(super) fn unexplained(bench: &Bench, selection: &Selection, explained: f64) 
     };
     let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
     Finding {
-        effect: "unexplained".into(),
-        family: vec!["unexplained".into()],
+        effect: unexplained::FACTS.name.into(),
+        family: vec![unexplained::FACTS.name.into()],
         port: crate::physics::Port::Torque,
         p_value: log_tail(model.excess() + model.freedom, model.freedom as usize).min(0.0).exp().max(1e-300),
         says: format!(

@@ -15,14 +15,14 @@ use super::free_form_said::FreeForm;
 use super::free_form_shape::{Shape, lag};
 use super::free_form_stretches::Stretches;
 use super::judge::{Judged, errors, rms};
-use super::name::{everywhere, text_of};
+use super::name::everywhere;
 use super::rules::{CURVE_CLEARLY, CURVE_NEAR, CURVE_NO_WORSE};
 use super::run::Run;
 use super::selection::Selection;
 use crate::controller::Law;
 use crate::lti::{CurveKnot, PhysicsEntry, Plant};
-use crate::physics::sensor_curve::SensorCurve;
-use crate::physics::{CurvePort, Setting};
+use crate::physics::sensor_curve::{self, SensorCurve};
+use crate::physics::{CurvePort, Facts, Setting};
 use crate::recording::Role;
 
 /// A model with a curve.
@@ -199,7 +199,7 @@ fn described(bench: &Bench, found: &Estimated, explained_share: f64) -> FreeForm
 
 /// The finding of a reading that folds or ends at limits.
 fn reading_finding(bench: &Bench, best: &Foretelling, found: &Estimated) -> Finding {
-    let (says, port) = text_of("sensor_curve");
+    let &Facts { name: effect, says, port, .. } = &sensor_curve::FACTS;
     let none = || Setting::fixed(SensorCurve::Folded { lowest: 0.0, at: 0.0 });
     let setting = best.trial.reading.effect().unwrap_or_else(none);
     let from = best.trial.reading_from();
@@ -215,8 +215,8 @@ fn reading_finding(bench: &Bench, best: &Foretelling, found: &Estimated) -> Find
     let log_p = -0.5 * samples * (found.linear.left_out / best.left_out).ln();
     let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
     Finding {
-        effect: "sensor_curve".into(),
-        family: vec!["sensor_curve".into()],
+        effect: effect.into(),
+        family: vec![effect.into()],
         port,
         p_value: log_p.min(0.0).exp().max(1e-300),
         says: format!("{form}: {says}."),

@@ -18,7 +18,7 @@ use super::rules::{
 use super::selection::Selection;
 use super::swing::swing;
 use crate::lti::Plant;
-use crate::physics::{Port, library};
+use crate::physics::{AnyLaw, Port, library};
 
 /// Findings that the search has no part in.
 pub(super) struct ByOthers {
@@ -150,7 +150,7 @@ impl<'a> Evidence<'a> {
     /// There, without a name: unless it is a gain that swings in a phase of its own.
     fn unnamed(&self, d: &mut Diagnosis, explained: f64) {
         // A swing in one phase for all records may have taken the first step of one that has a phase in each.
-        let of_the_gain = self.model.chosen.iter().all(|c| c.setting.facts().name == "parametric_gain");
+        let of_the_gain = self.model.chosen.iter().all(|c| matches!(c.setting.law, AnyLaw::ParametricGain(_)));
         match of_the_gain.then(|| swing(self.bench, self.selection)).flatten() {
             Some(f) => {
                 d.verdict = Verdict::Named;

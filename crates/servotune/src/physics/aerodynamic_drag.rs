@@ -39,6 +39,10 @@ impl Parametric for AerodynamicDrag {
         &FACTS
     }
 
+    fn acts_on_body() -> bool {
+        true
+    }
+
     fn shown_over() -> ShownOver {
         ShownOver::Velocity
     }

@@ -66,6 +66,10 @@ impl Parametric for CableSpring {
         &FACTS
     }
 
+    fn acts_on_body() -> bool {
+        true
+    }
+
     fn shown_over() -> ShownOver {
         ShownOver::Position
     }

@@ -132,6 +132,10 @@ impl Parametric for CoulombFriction {
         &FACTS
     }
 
+    fn acts_on_body() -> bool {
+        true
+    }
+
     fn shown_over() -> ShownOver {
         ShownOver::Loop
     }

@@ -295,6 +295,11 @@ pub trait Parametric: Clone + PartialEq + std::fmt::Debug + Sized {
         false
     }
 
+    /// Whether stiffness or damping of the body change with the amplitude of the motion under it, or stand beside what does so: friction, springs.
+    fn acts_on_body() -> bool {
+        false
+    }
+
     /// Length over which a drag turns round (position_unit), where it is a spring before it slides.
     fn presliding_length(&self) -> Option<f64> {
         None

@@ -268,6 +268,7 @@ pub trait Effect: Sync {
     fn is_on_every_machine(&self) -> bool;
     fn may_occur_several_times(&self) -> bool;
     fn is_hard_nonlinearity(&self) -> bool;
+    fn acts_on_body(&self) -> bool;
 }
 
 /// The effect whose laws are these.
@@ -334,6 +335,10 @@ where
 
     fn is_hard_nonlinearity(&self) -> bool {
         L::is_hard_nonlinearity()
+    }
+
+    fn acts_on_body(&self) -> bool {
+        L::acts_on_body()
     }
 }
 

@@ -77,6 +77,10 @@ impl Parametric for NonlinearSpring {
         &FACTS
     }
 
+    fn acts_on_body() -> bool {
+        true
+    }
+
     fn shown_over() -> ShownOver {
         ShownOver::Position
     }

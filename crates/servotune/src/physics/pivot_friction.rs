@@ -167,6 +167,10 @@ impl Parametric for PivotFriction {
         &FACTS
     }
 
+    fn acts_on_body() -> bool {
+        true
+    }
+
     fn shown_over() -> ShownOver {
         ShownOver::Loop
     }
