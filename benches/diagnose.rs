@@ -8,7 +8,9 @@
 use servotune::diagnose::{DiagnoseSettings, diagnose};
 use servotune::document::write_text;
 use servotune::numeric::random::Random;
-use servotune::physics::{Effect, Setting, effect};
+use servotune::physics::Setting;
+use servotune::physics::pivot_friction::{Loading, PivotFriction};
+use servotune::physics::torque_factor_rolloff::{Shape, TorqueFactorRolloff};
 use servotune::recording::{Case, RecordSettings};
 use servotune::twin::recording::{multisine, record, scene, stroke};
 use servotune::twin::{MachineClass, nominal_controller, paper_machine};
@@ -34,13 +36,8 @@ const RECORDS: [(&str, f64, f64, usize, bool); 8] = [
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
-fn law(name: &str, inner: &[f64], strengths: &[f64]) -> Outcome<(&'static dyn Effect, Setting)> {
-    let found = effect(name).ok_or_else(|| format!("no effect named {name}"))?;
-    Ok((found, Setting { inner: inner.to_vec(), strengths: strengths.to_vec() }))
-}
-
 /// Writes the case of the paper's tunable machine with these effects.
-fn write_case(folder: &Path, effects: &[(&'static dyn Effect, Setting)]) -> Outcome<()> {
+fn write_case(folder: &Path, effects: &[Setting]) -> Outcome<()> {
     let plant = paper_machine(MachineClass::Tunable)?;
     let controller = nominal_controller()?;
     let t = controller.sample_time_s;
@@ -48,7 +45,7 @@ fn write_case(folder: &Path, effects: &[(&'static dyn Effect, Setting)]) -> Outc
     write_text(&folder.join("controller.toml"), &toml::to_string(&controller)?)?;
     let mut case = "id = \"speed\"\nplant = \"plant.toml\"\ncontroller = \"controller.toml\"\n".to_owned();
     let scene = scene(&plant, t, 15.0, SAMPLES, NOISE);
-    let effects: Vec<(&dyn Effect, &Setting)> = effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
+    let effects: Vec<&Setting> = effects.iter().collect();
     let mut draw = 0;
     for (name, rms, distance, repeats, held) in RECORDS {
         let excitation = if rms > 0.0 { multisine(SAMPLES, 220, rms) } else { vec![0.0; SAMPLES] };
@@ -82,13 +79,13 @@ fn cpu_s() -> f64 {
 fn run() -> Outcome<()> {
     let words: Vec<String> = std::env::args().collect();
     let out = words.iter().position(|w| w == "--out").and_then(|i| words.get(i + 1)).map(PathBuf::from);
-    let friction = || law("pivot_friction", &[2.5, 0.0], &[0.012]);
+    let friction = || Setting::new(PivotFriction { sliding_length: 2.5, loading: Loading::Dahl }, vec![0.012]);
     // 8 % less torque at the ends of the travel.
-    let rolloff = || law("torque_factor_rolloff", &[1.0, 1.0], &[0.0, 0.08, 0.0, 0.0]);
+    let rolloff = || Setting::new(TorqueFactorRolloff { shape: Shape::Parabola }, vec![0.0, 0.08, 0.0, 0.0]);
     let machines = [
         ("nothing missing", vec![]),
-        ("bearing that sticks", vec![friction()?]),
-        ("bearing that sticks, torque factor that falls off", vec![friction()?, rolloff()?]),
+        ("bearing that sticks", vec![friction()]),
+        ("bearing that sticks, torque factor that falls off", vec![friction(), rolloff()]),
     ];
     let mut page = String::from("| machine | verdict | findings | wall (s) | processor (s) |\n|---|---|---|---|---|\n");
     for (name, effects) in machines {

@@ -7,7 +7,8 @@ use servotune::diagnose::Diagnosis;
 use servotune::document::write_text;
 use servotune::lti::{Plant, PlantFile};
 use servotune::numeric::random::Random;
-use servotune::physics::{Effect, Setting, effect};
+use servotune::physics::Setting;
+use servotune::physics::pivot_friction::{Loading, PivotFriction};
 use servotune::twin::recording::{Row, multisine, record, scene, stroke};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -48,15 +49,15 @@ fn write_case(folder: &Path, plant: &Plant, controller: &Controller) -> Result<(
     let mut case = "id = \"demo\"\nplant = \"plant.toml\"\ncontroller = \"controller.toml\"\n".to_owned();
     let t = controller.sample_time_s;
     let scene = scene(plant, t, RECORDS[5].2, SAMPLES, NOISE);
-    let friction = effect("pivot_friction");
-    let setting = Setting { inner: vec![LENGTH, 0.0], strengths: vec![LEVEL] };
-    let effects: Vec<(&dyn Effect, &Setting)> = friction.into_iter().map(|e| (e as &dyn Effect, &setting)).collect();
+    let bearing = PivotFriction { sliding_length: LENGTH, loading: Loading::Dahl };
+    let friction = Setting::new(bearing, vec![LEVEL]);
     let mut draw = 0;
     for (name, rms, distance, repeats, held) in RECORDS {
         let excitation = if rms > 0.0 { multisine(SAMPLES, LINES, rms) } else { vec![0.0; SAMPLES] };
         let reference = stroke(SAMPLES, SAMPLES / 10, SAMPLES / 3, distance);
         for i in 1..=repeats {
-            let rows = record(&scene, &effects, controller, &reference, &excitation, &mut Random::stream(58, draw))?;
+            let rows =
+                record(&scene, &[&friction], controller, &reference, &excitation, &mut Random::stream(58, draw))?;
             draw += 1;
             let file = format!("records/{name}_{i}.csv");
             write_text(&folder.join(&file), &csv(&rows, t))?;

@@ -140,9 +140,8 @@ fn the_machine_with_a_curve_agrees_with_an_independent_simulation() {
 #[test]
 fn the_describing_function_of_a_cubic_curve_is_the_textbook_s() {
     let r = restored(&curve("torque", "position", -40.0, 40.0, |x| -2e-5 * x.powi(3))).unwrap();
-    let (effect, setting) = (r.parts[0].0, &r.parts[0].1);
     for a in [5.0, 20.0, 35.0] {
-        let n = describing(effect, setting, &r.scene, a, 100.0).unwrap();
+        let n = describing(&r.parts[0], &r.scene, a, 100.0).unwrap();
         // -3/4 k A²; 160 knots meet a cubic within their spacing's square.
         assert!((n.re / (-0.75 * 2e-5 * a * a) - 1.0).abs() < 5e-3 && n.im.abs() < 1e-9, "{a}: {n}");
     }
@@ -163,7 +162,7 @@ fn a_reading_that_folds_closes_no_loop_and_one_that_is_limited_does() {
     assert!(free.seen().unwrap_err().to_string().contains("free_form"));
     let limited = restored("effect = \"sensor_curve\"\nlowest_reading = -5.0\nhighest_reading = 5.0\n").unwrap();
     limited.seen().unwrap();
-    let n = describing(limited.parts[0].0, &limited.parts[0].1, &limited.scene, 10.0, 50.0).unwrap();
+    let n = describing(&limited.parts[0], &limited.scene, 10.0, 50.0).unwrap();
     // A clipped sine: 2/pi (asin r + r sqrt(1 - r²)), less the 1 of what is clipped; r = 1/2.
     let clip = 2.0 / PI * (0.5f64.asin() + 0.5 * 0.75f64.sqrt()) - 1.0;
     assert!((n.re - clip).abs() < 1e-5 && n.im.abs() < 1e-9, "{n}");

@@ -5,7 +5,10 @@ mod physics_common;
 
 use physics_common::{along, run, scene};
 use servotune::lti::Body;
-use servotune::physics::{COLUMNS, Entry, Given, Sample, Setting, facts, library};
+use servotune::physics::coulomb_friction::CoulombFriction;
+use servotune::physics::encoder_cyclic_error::Harmonics;
+use servotune::physics::torque_factor_rolloff::Shape;
+use servotune::physics::{AnyLaw, COLUMNS, Entry, Given, Sample, Setting, facts, library};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -40,26 +43,30 @@ fn parameters_and_restore_are_inverse_at_every_point_of_every_grid() {
         }
         for e in library() {
             let facts = e.facts();
-            let grid = e.scan_points(&scene);
+            let grid = e.grid(&scene);
             assert!(!grid.is_empty(), "{}", facts.name);
-            for inner in grid {
+            for law in grid {
                 let strengths: Vec<f64> =
                     (0..facts.columns).map(|c| if facts.fixed { 1.0 } else { 0.03 * (c as f64 - 1.4) }).collect();
-                let mut setting = Setting { inner, strengths };
+                let mut setting = Setting { law, strengths };
                 // What a simpler form of a law leaves out has no strength.
-                let unused = |name: &str, c: usize| match name {
-                    "encoder_cyclic_error" => setting.inner[1] < 1.5 && c >= 2,
-                    "torque_factor_rolloff" => setting.inner[0] < 3.5 && c != 1,
+                let unused = |law: &AnyLaw, c: usize| match law {
+                    AnyLaw::EncoderCyclicError(wave) => wave.harmonics == Harmonics::First && c >= 2,
+                    AnyLaw::TorqueFactorRolloff(fall) => fall.shape != Shape::Polynomial && c != 1,
                     _ => false,
                 };
-                let gone: Vec<usize> = (0..facts.columns).filter(|c| unused(facts.name, *c)).collect();
+                let gone: Vec<usize> = (0..facts.columns).filter(|c| unused(&setting.law, *c)).collect();
                 gone.into_iter().for_each(|c| setting.strengths[c] = 0.0);
                 let named: BTreeMap<String, f64> =
-                    e.parameters(&setting, &scene).iter().map(|p| (p.name.to_string(), p.value)).collect();
+                    setting.parameters(&scene).iter().map(|p| (p.name.to_string(), p.value)).collect();
                 let back = e.setting_of(&Given::new(facts.name, &named), &scene).unwrap();
-                for (a, b) in [(&setting.inner, &back.inner), (&setting.strengths, &back.strengths)] {
+                assert!(setting.law.same_class(&back.law), "{}: {setting:?} {back:?}", facts.name);
+                let strengths = |s: &Setting| s.strengths.iter().map(|s| Some(*s)).collect::<Vec<_>>();
+                for (a, b) in [(setting.law.numbers(), back.law.numbers()), (strengths(&setting), strengths(&back))] {
                     assert_eq!(a.len(), b.len(), "{}", facts.name);
-                    for (x, y) in a.iter().zip(b) {
+                    for (x, y) in a.into_iter().zip(b) {
+                        assert_eq!(x.is_some(), y.is_some(), "{}: {setting:?} {back:?}", facts.name);
+                        let (x, y) = (x.unwrap_or(0.0), y.unwrap_or(0.0));
                         // Polar form and back, or a sum and its difference: a few roundings.
                         assert!((x - y).abs() <= 1e-12 * (1.0 + x.abs()), "{}: {setting:?} {back:?}", facts.name);
                     }
@@ -88,20 +95,20 @@ fn columns_are_finite_pure_and_zero_at_rest() {
     });
     for e in library() {
         let facts = e.facts();
-        for inner in e.scan_points(&scene) {
-            let mut moved = e.law(&inner, &scene);
+        for law in e.grid(&scene) {
+            let mut moved = law.in_motion(&scene);
             for pair in moving.windows(2) {
                 let (mut first, mut second) = ([0.0; COLUMNS], [0.0; COLUMNS]);
                 moved.columns(&pair[0], &pair[1], &mut first[..facts.columns]);
                 moved.columns(&pair[0], &pair[1], &mut second[..facts.columns]);
-                assert!(first == second && first.iter().all(|c| c.is_finite()), "{} {inner:?}", facts.name);
+                assert!(first == second && first.iter().all(|c| c.is_finite()), "{law:?}");
                 moved.commit(&pair[0], &pair[1]);
             }
             if !restless.contains(&facts.name) {
-                let resting = if inner.contains(&scene.centre) { scene.centre } else { 0.0 };
+                let resting = if law.numbers().contains(&Some(scene.centre)) { scene.centre } else { 0.0 };
                 let rest = along(20, |_| Sample { x: resting, ..Sample::default() });
-                let all = run(e.law(&inner, &scene).as_mut(), &rest);
-                assert!(all.iter().flatten().all(|c| *c == 0.0), "{} {inner:?}", facts.name);
+                let all = run(law.in_motion(&scene).as_mut(), &rest);
+                assert!(all.iter().flatten().all(|c| *c == 0.0), "{law:?}");
             }
         }
     }
@@ -114,4 +121,33 @@ fn entries_say_what_the_laws_do() {
         assert!(!f.fixed || (f.columns == 1 && f.entry != Entry::Torque), "{}", f.name);
         assert!(f.says.len() > 20 && f.equation.len() > 5 && f.experiment.len() > 20, "{}", f.name);
     }
+}
+
+#[test]
+fn a_law_with_another_number_is_the_same_law_with_another_number() {
+    let scene = scene();
+    for e in library() {
+        let grid = e.grid(&scene);
+        for law in &grid {
+            let numbers = law.numbers();
+            assert_eq!((numbers.len(), law.size()), (grid[0].numbers().len(), grid[0].size()), "{law:?}");
+            assert!(law.told() <= law.size() && law.effect().facts().name == e.facts().name, "{law:?}");
+            let own: Vec<f64> = numbers.iter().map(|n| n.unwrap_or(0.0)).collect();
+            assert_eq!(law.with_numbers(&own), *law);
+            for (place, number) in numbers.iter().enumerate() {
+                // A number that this form has not is not made by giving it.
+                let moved = law.with_number(place, 3.5);
+                assert!(moved.same_class(law), "{law:?} {moved:?}");
+                assert_eq!(moved.number(place), number.map(|_| 3.5), "{law:?}");
+                assert_eq!(moved == *law, number.is_none_or(|n| n == 3.5), "{law:?}");
+            }
+        }
+    }
+    let first = |name: &str| library().iter().find(|e| e.facts().name == name).unwrap().grid(&scene).swap_remove(0);
+    assert!(!first("sensor_lag").same_class(&first("amplifier_lag")));
+    // A drag that creeps and one that sticks are two classes; two that stick over other lengths are one.
+    assert!(!AnyLaw::from(CoulombFriction::creeping(1.0)).same_class(&CoulombFriction::sticking(1.0, None).into()));
+    assert!(
+        AnyLaw::from(CoulombFriction::sticking(2.0, None)).same_class(&CoulombFriction::sticking(1.0, None).into())
+    );
 }

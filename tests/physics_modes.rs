@@ -5,7 +5,9 @@ mod physics_common;
 
 use nalgebra::Complex;
 use physics_common::{T, scene};
-use servotune::physics::{Sample, Scene, effect};
+use servotune::physics::modal_damping::ModalDamping;
+use servotune::physics::mode_shift::{ModeForm, ModeShift};
+use servotune::physics::{AnyLaw, Parametric, Sample, Scene};
 
 #[test]
 fn a_mode_that_moves_rings_at_its_new_frequency() {
@@ -24,23 +26,18 @@ fn a_mode_that_moves_rings_at_its_new_frequency() {
     let d = 1.0 + slope * x;
     let s = Complex::new(0.0, 7700.0);
     let share = |d: f64| residue / d / (s - pole * d) + residue.conj() / d / (s - pole.conj() * d);
+    let moving = |form| ModeShift { mode: 0, shift_per_position: slope, centre: 0.0, form };
     let stage = |d: f64| quadratic(s, m.zero_rad_s * d, m.zero_damping_ratio) / quadratic(s, w0 * d, z);
-    settles(&scene, ("mode_shift", &[0.0, slope, 0.0, 0.0]), x, 60_000, s, share(d) - share(1.0));
-    settles(&scene, ("mode_shift", &[0.0, slope, 0.0, 1.0]), x, 60_000, s, body(s) * (stage(d) - stage(1.0)));
+    settles(&scene, moving(ModeForm::Modal), x, 60_000, s, share(d) - share(1.0));
+    settles(&scene, moving(ModeForm::Stage), x, 60_000, s, body(s) * (stage(d) - stage(1.0)));
 }
 
 /// Holds what a law at a place adds to the answer to a tone against a response, over the last cycles of `count` fine steps.
-fn settles(
-    scene: &Scene,
-    (name, inner): (&str, &[f64]),
-    x: f64,
-    count: usize,
-    s: Complex<f64>,
-    response: Complex<f64>,
-) {
+fn settles(scene: &Scene, moving: impl Into<AnyLaw>, x: f64, count: usize, s: Complex<f64>, response: Complex<f64>) {
     let fine = T / 25.0;
     let small = Scene { sample_time_s: fine, ..scene.clone() };
-    let mut law = effect(name).unwrap().law(inner, &small);
+    let moving = moving.into();
+    let mut law = moving.in_motion(&small);
     let at = |k: usize| {
         let t = k as f64 * fine;
         Sample { t, x, i: (s.im * (t + 0.5 * fine)).sin(), ..Sample::default() }
@@ -55,7 +52,7 @@ fn settles(
             (worst, largest) = (worst.max((out[0] - expected).abs()), largest.max(expected.abs()));
         }
     }
-    assert!(worst < 1e-3 * largest, "{name}: {worst} of {largest}");
+    assert!(worst < 1e-3 * largest, "{moving:?}: {worst} of {largest}");
 }
 
 #[test]
@@ -64,9 +61,8 @@ fn damping_that_grows_shortens_the_ring_down() {
     let scene = scene();
     let m = scene.plant.modes[0];
     let a = m.pole_rad_s * m.pole_damping_ratio;
-    let effect = effect("modal_damping").unwrap();
     let envelope = |growth: f64| {
-        let mut law = effect.law(&[0.0, growth, 0.0], &scene);
+        let mut law = ModalDamping { mode: 0, growth, form: ModeForm::Modal }.in_motion(&scene);
         let mut rows = Vec::new();
         for k in 0..200usize {
             let sample = |k: usize| Sample { i: if k == 0 { 100.0 } else { 0.0 }, ..Sample::default() };
@@ -113,5 +109,5 @@ fn a_damper_of_a_stage_is_one_of_a_fixed_ratio_where_it_is_at_its_bound() {
     let more = 49.0 * 2.0 * z * w0 * s;
     let stage = (zero + more) / (quadratic(w0, z) + more) - zero / quadratic(w0, z);
     let response = 75.0 * 369.0 * 369.0 / quadratic(369.0, 0.22) * stage;
-    settles(&scene, ("modal_damping", &[0.0, 1e15, 1.0]), 0.0, 120_000, s, response);
+    settles(&scene, ModalDamping { mode: 0, growth: 1e15, form: ModeForm::Stage }, 0.0, 120_000, s, response);
 }

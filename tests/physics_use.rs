@@ -293,12 +293,11 @@ fn what_an_effect_reports_it_takes_back() {
     let scene = restored(&plant, &[]).scene;
     let scene = servotune::physics::Scene { spindle_hz: Some(120.0), duration_s: 0.5, ..scene };
     for effect in servotune::physics::library() {
-        let Some(inner) = effect.scan_points(&scene).into_iter().next() else { continue };
+        let Some(law) = effect.grid(&scene).into_iter().next() else { continue };
         let strengths =
             if effect.facts().fixed { vec![1.0; effect.facts().columns] } else { vec![0.1; effect.facts().columns] };
-        let setting = servotune::physics::Setting { inner, strengths };
-        let parameters: Vec<(&str, f64)> =
-            effect.parameters(&setting, &scene).iter().map(|p| (p.name, p.value)).collect();
+        let setting = servotune::physics::Setting { law, strengths };
+        let parameters: Vec<(&str, f64)> = setting.parameters(&scene).iter().map(|p| (p.name, p.value)).collect();
         let with = Plant { physics: vec![entry(effect.facts().name, &parameters)], ..plant.clone() };
         let context = Context { spindle_hz: Some(120.0), duration_s: 0.5, ..Context::default() };
         let r = Restored::of(&with, &context);

@@ -3,7 +3,7 @@
 
 use nalgebra::Complex;
 use servotune::lti::{Body, Mode, Plant};
-use servotune::physics::{COLUMNS, Law, Sample, Scene, Setting, describing, effect};
+use servotune::physics::{AnyLaw, COLUMNS, Law, Sample, Scene, Setting, describing};
 
 pub const T: f64 = 39.6e-6;
 
@@ -52,13 +52,12 @@ pub fn along(count: usize, mut at: impl FnMut(f64) -> Sample) -> Vec<Sample> {
     (0..count).map(|k| Sample { t: k as f64 * T, ..at(k as f64 * T) }).collect()
 }
 
-pub fn law(name: &str, inner: &[f64]) -> Box<dyn Law> {
-    effect(name).unwrap().law(inner, &scene())
+pub fn law(of: impl Into<AnyLaw>) -> Box<dyn Law> {
+    of.into().in_motion(&scene())
 }
 
-pub fn df(name: &str, inner: &[f64], strength: f64, amplitude: f64, w: f64) -> Complex<f64> {
-    let setting = Setting { inner: inner.to_vec(), strengths: vec![strength] };
-    describing(effect(name).unwrap(), &setting, &scene(), amplitude, w).unwrap()
+pub fn df(of: impl Into<AnyLaw>, strength: f64, amplitude: f64, w: f64) -> Complex<f64> {
+    describing(&Setting::new(of, vec![strength]), &scene(), amplitude, w).unwrap()
 }
 
 pub fn close(found: Complex<f64>, expected: Complex<f64>, tolerance: f64) {

@@ -9,7 +9,7 @@ use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Scale, Series};
 use super::time::{CurveKind, TimeCurve, TimePanel, time};
 use servotune::diagnose::{Chosen, Trajectory};
 use servotune::lti::{Body, Plant};
-use servotune::physics::{COLUMNS, Effect, Entry, Sample, Scene, Setting, ShownOver, describing};
+use servotune::physics::{AnyLaw, COLUMNS, Entry, Sample, Scene, Setting, ShownOver, describing};
 use std::f64::consts::TAU;
 
 /// Points of a curve that is no function of time and so is not thinned when drawn.
@@ -18,16 +18,10 @@ const POINTS: usize = 5000;
 const ENOUGH: f64 = 0.15;
 
 /// What an effect adds along a trajectory, strengths applied, at its place of entry.
-pub(super) fn added(
-    effect: &dyn Effect,
-    inner: &[f64],
-    strengths: &[f64],
-    scene: &Scene,
-    motion: &Trajectory,
-) -> Vec<f64> {
-    let facts = effect.facts();
+pub(super) fn added(law: &AnyLaw, strengths: &[f64], scene: &Scene, motion: &Trajectory) -> Vec<f64> {
+    let facts = law.facts();
     let samples = &motion.samples;
-    let mut law = effect.law(inner, scene);
+    let mut law = law.in_motion(scene);
     let mut out = [0.0; COLUMNS];
     let mut step = |from: &Sample, to: &Sample| {
         law.columns(from, to, &mut out[..facts.columns]);
@@ -42,8 +36,8 @@ pub(super) fn added(
 
 /// Strengths of a chosen effect in one segment.
 pub(super) fn own(c: &Chosen, segment: usize) -> &[f64] {
-    if c.effect.facts().per_record {
-        c.setting.strengths.get(segment * c.effect.facts().columns..).unwrap_or(&[])
+    if c.setting.facts().per_record {
+        c.setting.strengths.get(segment * c.setting.facts().columns..).unwrap_or(&[])
     } else {
         &c.setting.strengths
     }
@@ -58,7 +52,7 @@ pub(super) fn law_figures(s: &Shown) -> Result<Vec<Figure>, ReportError> {
             .trajectories
             .iter()
             .enumerate()
-            .map(|(i, motion)| added(c.effect, &c.setting.inner, own(c, i), &bench.scene, motion))
+            .map(|(i, motion)| added(&c.setting.law, own(c, i), &bench.scene, motion))
             .collect();
         let energy = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>() / x.len().max(1) as f64;
         let best = (0..every.len()).max_by(|&a, &b| energy(&every[a]).total_cmp(&energy(&every[b])));
@@ -70,9 +64,9 @@ pub(super) fn law_figures(s: &Shown) -> Result<Vec<Figure>, ReportError> {
 }
 
 fn law_figure(s: &Shown, c: &Chosen, segment: usize, value: &[f64]) -> Result<Figure, ReportError> {
-    let (bench, facts) = (&s.made.bench, c.effect.facts());
+    let (bench, facts) = (&s.made.bench, c.setting.facts());
     let motion = &bench.trajectories[segment].samples;
-    let way = c.effect.shown_over();
+    let way = c.effect().shown_over();
     let largest = motion.iter().fold(0.0f64, |m, k| m.max(k.i.abs()));
     let (quantity, unit) = match (facts.entry, way) {
         (_, ShownOver::FactorOverPosition | ShownOver::FactorOverTime) => ("Torque per command", "1"),
@@ -148,10 +142,6 @@ fn law_figure(s: &Shown, c: &Chosen, segment: usize, value: &[f64]) -> Result<Fi
     })
 }
 
-/// Effects that change stiffness and damping with the amplitude of the motion.
-const AMPLITUDE: [&str; 5] =
-    ["pivot_friction", "coulomb_friction", "nonlinear_spring", "cable_spring", "aerodynamic_drag"];
-
 /// Acceleration per command, stiffness (1/s²) and viscous rate (1/s): x'' = b u - k x - c x'.
 fn numbers(plant: &Plant) -> [f64; 3] {
     let [b, k, c] = match plant.body {
@@ -167,20 +157,15 @@ fn numbers(plant: &Plant) -> [f64; 3] {
 
 /// Natural frequency (Hz) and damping ratio of the body with its torque effects at one amplitude (position_unit): the
 /// frequency at which the describing function's stiffness balances the inertia.
-fn at_amplitude(
-    plant: &Plant,
-    effects: &[(&dyn Effect, &Setting)],
-    scene: &Scene,
-    amplitude: f64,
-) -> Option<(f64, f64)> {
+fn at_amplitude(plant: &Plant, effects: &[&Setting], scene: &Scene, amplitude: f64) -> Option<(f64, f64)> {
     let [b, k, c] = numbers(plant);
     let mut w = if k > 0.0 { k.sqrt() } else { TAU };
     for _ in 0..40 {
         let mut stiffness = k;
         let mut rate = c;
-        for (e, s) in effects {
+        for s in effects {
             // The torque -N x holds back where N is negative: x'' + c x' + (k - b Re N) x = 0, Im N/w the rate.
-            let n = describing(*e, s, scene, amplitude, w)?;
+            let n = describing(s, scene, amplitude, w)?;
             stiffness -= b * n.re;
             rate -= b * n.im / w;
         }
@@ -200,13 +185,8 @@ fn at_amplitude(
 /// Natural frequency and damping over amplitude; none where nothing that was found changes them.
 pub(super) fn amplitude_figure(s: &Shown) -> Result<Option<Figure>, ReportError> {
     let (fixed, scene) = (&s.made.corrected, &s.made.bench.scene);
-    let effects: Vec<(&dyn Effect, &Setting)> = fixed
-        .effects
-        .iter()
-        .filter(|(e, _)| AMPLITUDE.contains(&e.facts().name))
-        .map(|(e, x)| (*e as &dyn Effect, x))
-        .collect();
-    if effects.iter().all(|(e, _)| e.facts().name == "cable_spring") {
+    let effects: Vec<&Setting> = fixed.effects.iter().filter(|s| s.law.effect().acts_on_body()).collect();
+    if effects.iter().all(|s| matches!(s.law, AnyLaw::CableSpring(_))) {
         return Ok(None);
     }
     let amplitudes = servotune::physics::logarithmic(1e-3 * scene.travel, 2.0 * scene.travel, 25);
@@ -260,12 +240,12 @@ pub(super) fn unexplained_figure(s: &Shown) -> Result<Option<Figure>, ReportErro
     let drives = |e: Entry| matches!(e, Entry::Torque | Entry::Command);
     let settled = |mut x: Vec<f64>| x.split_off((START * x.len() as f64) as usize);
     let found = |i: usize| {
-        let lasting = s.made.corrected.effects.iter().map(|(e, x)| (*e as &dyn Effect, &x.inner, &x.strengths[..]));
-        let passing = s.made.selection.model.chosen.iter().filter(|c| c.effect.facts().per_record);
-        let passing = passing.map(|c| (c.effect as &dyn Effect, &c.setting.inner, own(c, i)));
+        let lasting = s.made.corrected.effects.iter().map(|x| (&x.law, &x.strengths[..]));
+        let passing = s.made.selection.model.chosen.iter().filter(|c| c.setting.facts().per_record);
+        let passing = passing.map(|c| (&c.setting.law, own(c, i)));
         let mut sum: Option<Vec<f64>> = None;
-        for (effect, inner, strengths) in lasting.chain(passing).filter(|p| drives(p.0.facts().entry)) {
-            let part = added(effect, inner, strengths, &bench.scene, &bench.trajectories[i]);
+        for (law, strengths) in lasting.chain(passing).filter(|p| drives(p.0.facts().entry)) {
+            let part = added(law, strengths, &bench.scene, &bench.trajectories[i]);
             match &mut sum {
                 Some(sum) => sum.iter_mut().zip(part).for_each(|(f, p)| *f += p),
                 None => sum = Some(part),

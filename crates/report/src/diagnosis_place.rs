@@ -50,13 +50,13 @@ fn rms(x: &[f64]) -> f64 {
 fn strongest(s: &Shown, map: &Map, f: &Finding) -> Option<usize> {
     let bench = &s.made.bench;
     let chosen = &s.made.selection.model.chosen;
-    let Some(c) = chosen.iter().find(|c| f.family.iter().any(|n| n == c.effect.facts().name)) else {
+    let Some(c) = chosen.iter().find(|c| f.family.iter().any(|n| n == c.setting.facts().name)) else {
         return map.order.first().copied();
     };
     let sampled = DiscretePlant::of(&bench.scene.plant, s.sample_time_s()).ok()?;
     let mut signal = bench.stack.series(|i| {
-        let mut y = added(c.effect, &c.setting.inner, own(c, i), &bench.scene, &bench.trajectories[i]);
-        if c.effect.facts().entry != Entry::Position {
+        let mut y = added(&c.setting.law, own(c, i), &bench.scene, &bench.trajectories[i]);
+        if c.setting.facts().entry != Entry::Position {
             let mut state = PlantState::at_rest(&sampled);
             for v in &mut y {
                 let u = std::mem::replace(v, state.position());

@@ -285,12 +285,12 @@ impl Bench {
             let mut torque: Vec<f64> =
                 motion.samples.iter().map(|s| arm * (carrier.spring * s.x + carrier.damper * s.v)).collect();
             for c in chosen {
-                let facts = c.effect.facts();
+                let facts = c.setting.facts();
                 let sensed = facts.entry == Entry::Position && matches!(facts.port, Port::Sensor | Port::Disk);
                 if !sensed && facts.entry == Entry::Position {
                     continue;
                 }
-                let raw = raw_columns(c.effect, &c.setting.inner, &self.scene, motion);
+                let raw = raw_columns(&c.setting.law, &self.scene, motion);
                 for (column, s) in raw.iter().zip(c.own(i)) {
                     // A command reaches the arm late, like the one it is added to.
                     let late = (facts.entry == Entry::Command).then(|| acting(&sampled.delayed, column, 0.0));
@@ -320,9 +320,8 @@ impl Bench {
         let alone = std::slice::from_ref(run);
         let smoother = Smoother::of(&carrier.plant, &sampled.delayed, self.levels.sensor_rms, alone, &[Vec::new()]);
         let motion = [smoother.smooth(run, &[], &sampled.delayed, self.scene.spindle_hz.unwrap_or(0.0))];
-        let lasting: Vec<&Chosen> = model.chosen.iter().filter(|c| !c.effect.facts().per_record).collect();
-        let drives: Vec<Drive> =
-            lasting.iter().map(|c| drive(c.effect, &c.setting.inner, &self.scene, &motion)).collect();
+        let lasting: Vec<&Chosen> = model.chosen.iter().filter(|c| !c.setting.facts().per_record).collect();
+        let drives: Vec<Drive> = lasting.iter().map(|c| drive(&c.setting.law, &self.scene, &motion)).collect();
         let parts: Vec<(&Drive, &[f64])> =
             drives.iter().zip(lasting.iter().map(|c| &c.setting.strengths[..])).collect();
         let e = simulation_error(&sampled, &carrier, &parts, run, &motion[0], 0);

@@ -11,14 +11,14 @@ use super::finding::{Estimate, Finding, Where};
 use super::fitted::refit;
 use super::judge::{Judged, error};
 use super::linear::{Sampled, free_motions};
-use super::name::text_of;
 use super::rules::{PUSH_BY_AMPLIFIER, PUSH_CHANCE, PUSH_STAYS, PUSH_SUSPECTED, PUSH_WHOLE, PUSHED_RECORDS};
 use super::run::Run;
 use super::stack::Segment;
 use super::trajectory::Trajectory;
 use crate::lti::{LtiError, Plant};
 use crate::numeric::least_squares::dot;
-use crate::physics::{Effect, Sample, effect, library};
+use crate::physics::shock::{self, Shock};
+use crate::physics::{AnyLaw, Effect, Facts, Sample, library};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -61,7 +61,7 @@ fn answer(bench: &Bench, sampled: &Sampled, n: usize, width_s: f64) -> Option<An
     let t = bench.scene.sample_time_s;
     let samples = (0..n).map(|k| Sample { t: k as f64 * t, ..Sample::default() }).collect();
     let motion = Trajectory { samples, unexplained: Vec::new(), repeats: Vec::new() };
-    let raw = raw_columns(effect("shock")?, &[0.0, width_s], &bench.scene, &motion);
+    let raw = raw_columns(&Shock { time_s: 0.0, width_s }.into(), &bench.scene, &motion);
     let mut y = vec![0.0; n];
     sampled.direct.add_response(&raw[0], &mut y);
     bench.whitener.apply(&mut y);
@@ -203,7 +203,7 @@ pub(super) fn set_aside(
     iterations: usize,
 ) -> Result<Vec<Bump>, LtiError> {
     // Around a plant that was cleared of a law that sticks, repeats differ by when it lets go.
-    let sticks = bench.foretold.as_ref().is_some_and(|law| law.effect.is_hard_nonlinearity());
+    let sticks = bench.foretold.as_ref().is_some_and(|law| law.effect().is_hard_nonlinearity());
     if sticks || bench.repeats.is_empty() || strongest(bench).is_none() {
         return Ok(Vec::new());
     }
@@ -231,8 +231,8 @@ pub(super) fn set_aside(
 fn bent(bench: &Bench, bump: &Bump) -> bool {
     let Ok(sampled) = Sampled::of(&bench.form.given, bench.scene.sample_time_s) else { return false };
     let explains = |e: &dyn Effect| {
-        let gain = |inner: &Vec<f64>| Difference::of(bench, &sampled, e, inner).gain();
-        e.scan_points(&bench.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
+        let gain = |law: &AnyLaw| Difference::of(bench, &sampled, law).gain();
+        e.grid(&bench.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
     };
     library().iter().filter(|e| e.is_hard_nonlinearity()).any(|e| explains(*e) > PUSH_BY_AMPLIFIER * bump.gain)
 }
@@ -265,7 +265,7 @@ impl Bump {
 
     /// The finding, in a machine with these units.
     pub(super) fn finding(&self, runs: &[Run], command_unit: &str) -> Finding {
-        let (says, port) = text_of("shock");
+        let &Facts { name: effect, says, port, .. } = &shock::FACTS;
         let number = |value: f64, off: f64, unit: &str| Estimate {
             value,
             low: value - off,
@@ -274,8 +274,8 @@ impl Bump {
         };
         let name = &runs[self.run].name;
         Finding {
-            effect: "shock".into(),
-            family: vec!["shock".into()],
+            effect: effect.into(),
+            family: vec![effect.into()],
             port,
             p_value: self.log_p.min(0.0).exp().max(1e-300),
             says: format!(

@@ -8,9 +8,7 @@ use crate::physics::{Effect, Setting};
 /// The best that one effect can do.
 #[derive(Clone)]
 pub struct Candidate {
-    /// The effect.
-    pub effect: &'static dyn Effect,
-    /// Its best numbers.
+    /// Its law with its best numbers.
     pub setting: Setting,
     /// Fall of the sum of squares of the whitened error.
     pub gain: f64,
@@ -20,22 +18,21 @@ pub struct Candidate {
     pub points: usize,
     /// Free strengths.
     pub strengths: usize,
-    /// Which inner parameters are continuous.
+    /// Which numbers of the law are continuous.
     pub continuous: Vec<bool>,
-    /// Range of each inner parameter's magnitude on the grid.
+    /// Range of each number's magnitude on the grid.
     pub range: Vec<[f64; 2]>,
 }
 
 impl Candidate {
+    /// The effect that it is one of.
+    pub fn effect(&self) -> &'static dyn Effect {
+        self.setting.law.effect()
+    }
+
     /// As an effect of a model, taken in a step.
     pub fn chosen(&self, step: usize) -> Chosen {
-        Chosen {
-            effect: self.effect,
-            setting: self.setting.clone(),
-            continuous: self.continuous.clone(),
-            range: self.range.clone(),
-            step,
-        }
+        Chosen { setting: self.setting.clone(), continuous: self.continuous.clone(), range: self.range.clone(), step }
     }
 
     /// Logarithm of an upper bound of the chance that noise alone gives this gain somewhere on the grid, for `effects`

@@ -5,13 +5,11 @@ use crate::physics::{Effect, Setting};
 /// An effect that is part of the model, with its numbers.
 #[derive(Clone)]
 pub struct Chosen {
-    /// The effect.
-    pub effect: &'static dyn Effect,
-    /// Its numbers.
+    /// Its law, with numbers and strengths.
     pub setting: Setting,
-    /// Which inner parameters may be refined.
+    /// Which numbers of the law may be refined.
     pub continuous: Vec<bool>,
-    /// Range of each inner parameter's magnitude.
+    /// Range of each number's magnitude.
     pub range: Vec<[f64; 2]>,
     /// The step of the search that found it.
     pub step: usize,
@@ -19,14 +17,19 @@ pub struct Chosen {
 
 impl std::fmt::Debug for Chosen {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} {:?}", self.effect.facts().name, self.setting)
+        write!(f, "{} {:?}", self.setting.facts().name, self.setting)
     }
 }
 
 impl Chosen {
+    /// The effect that it is one of.
+    pub fn effect(&self) -> &'static dyn Effect {
+        self.setting.law.effect()
+    }
+
     /// The strengths in one segment of the stack.
     pub fn own(&self, segment: usize) -> &[f64] {
-        let facts = self.effect.facts();
+        let facts = self.setting.facts();
         let from = if facts.per_record { segment * facts.columns } else { 0 };
         self.setting.strengths.get(from..).unwrap_or(&[])
     }
@@ -34,7 +37,7 @@ impl Chosen {
     /// Free numbers of the law.
     pub(super) fn numbers(&self) -> usize {
         let set = self.setting.strengths.iter().filter(|s| **s != 0.0).count();
-        let strengths = if self.effect.facts().fixed { 0 } else { set };
+        let strengths = if self.setting.facts().fixed { 0 } else { set };
         strengths + self.continuous.iter().filter(|c| **c).count()
     }
 }

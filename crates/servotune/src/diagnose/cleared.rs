@@ -16,7 +16,7 @@ use super::run::{Run, mean_run};
 use super::simulation_problem::{Problem, descended};
 use crate::lti::{Body, Plant};
 use crate::numeric::least_squares::Qr;
-use crate::physics::{Effect, Entry, Sample, Scene, Setting, library};
+use crate::physics::{AnyLaw, Effect, Entry, Sample, Scene, Setting, library};
 use rayon::prelude::*;
 
 /// Standard deviations of the smoothing (samples): wide for slow machines, narrow for fast ones.
@@ -136,10 +136,10 @@ impl<'a> Balance<'a> {
     }
 
     /// The balance with a law, or without.
-    fn solved(&self, law: Option<(&'static dyn Effect, &[f64])>) -> Option<Balanced> {
+    fn solved(&self, law: Option<&AnyLaw>) -> Option<Balanced> {
         let scene = &self.scene;
         let weights = weights(self.width);
-        let facts = law.map(|(e, _)| e.facts());
+        let facts = law.map(|l| l.facts());
         let own = facts.map_or(0, |f| if f.fixed { 0 } else { f.columns });
         let free_body = matches!(self.bench.form.given.body, Body::FreeInertia { .. });
         let count = 4 + own + self.parts.len();
@@ -151,7 +151,7 @@ impl<'a> Balance<'a> {
         let mut from = 0;
         for (r, (part, run)) in self.parts.iter().zip(self.means).enumerate() {
             let to = from + part.rows.len();
-            let raw = law.map_or(Vec::new(), |(e, inner)| columns_along(e, inner, scene, &part.samples));
+            let raw = law.map_or(Vec::new(), |l| columns_along(l, scene, &part.samples));
             let mut u = run.input.clone();
             let enters = facts.map(|f| (f.entry, f.fixed));
             if let Some((Entry::Command, true)) = enters {
@@ -187,16 +187,15 @@ impl<'a> Balance<'a> {
             return None;
         }
         let plant = self.plant(gain, LATER as f64 * numbers[1] / gain, numbers[2], numbers[3]);
-        let law = law.map(|(effect, inner)| {
+        let law = law.map(|law| {
             let strengths = match facts.is_some_and(|f| f.fixed) {
                 true => vec![1.0],
                 false => numbers[4..4 + own].iter().map(|s| s / gain).collect(),
             };
-            let setting = Setting { inner: inner.to_vec(), strengths };
-            let (continuous, range) = super::scan::freedom(&effect.scan_points(scene), inner);
-            Chosen { effect, setting, continuous, range, step: 0 }
+            let (continuous, range) = super::scan::freedom(&law.effect().grid(scene), law);
+            Chosen { setting: Setting::new(law.clone(), strengths), continuous, range, step: 0 }
         });
-        if law.as_ref().is_some_and(|l| !l.effect.is_possible(&l.setting, &[])) {
+        if law.as_ref().is_some_and(|l| !l.setting.is_possible(&[])) {
             return None;
         }
         Some(Balanced { plant, law, left })
@@ -231,8 +230,8 @@ impl<'a> Balance<'a> {
         };
         let effects: Vec<&'static dyn Effect> = library().iter().filter(bends).copied().collect();
         let best = |e: &&'static dyn Effect| -> Option<(f64, Balanced)> {
-            let grid = e.scan_points(&self.scene);
-            let all = grid.iter().filter_map(|inner| self.solved(Some((*e, inner))));
+            let grid = e.grid(&self.scene);
+            let all = grid.iter().filter_map(|law| self.solved(Some(law)));
             let best = all.min_by(|a, b| a.left.total_cmp(&b.left))?;
             let share = best.left / linear.left;
             (share < CLEARED_TELLS).then_some((share, best))

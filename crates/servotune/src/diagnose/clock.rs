@@ -6,10 +6,11 @@ use super::bench::Bench;
 use super::chance::log_tail;
 use super::finding::{Estimate, Finding};
 use super::linear::{Knob, body_numbers, rate_of};
-use super::name::{everywhere, text_of};
+use super::name::everywhere;
 use super::rules::ONE_NUMBER;
 use super::run::Run;
 use crate::numeric::golden::golden_section;
+use crate::physics::{Facts, time_base_drift};
 use std::collections::BTreeMap;
 
 /// Largest scale that is looked for, and how finely.
@@ -66,13 +67,13 @@ impl Clock {
 
     /// The finding.
     pub fn finding(&self, bench: &Bench) -> Finding {
-        let (says, port) = text_of("time_base_drift");
+        let &Facts { name: effect, says, port, .. } = &time_base_drift::FACTS;
         let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
         let off = 1.96 * self.sigma;
         let (value, unit) = (self.relative, "1".to_owned());
         Finding {
-            effect: "time_base_drift".into(),
-            family: vec!["time_base_drift".into()],
+            effect: effect.into(),
+            family: vec![effect.into()],
             port,
             p_value: log_tail(self.given - self.cost, 1).min(0.0).exp().max(1e-300),
             says: format!(

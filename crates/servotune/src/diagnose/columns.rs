@@ -7,7 +7,7 @@ use super::linear::Sampled;
 use super::run::Run;
 use super::trajectory::Trajectory;
 use super::whiten::Whitener;
-use crate::physics::{COLUMNS, Effect, Entry, Sample, Scene};
+use crate::physics::{AnyLaw, COLUMNS, Entry, Sample, Scene};
 
 /// What an effect's law gives along every mean run, before strengths.
 #[derive(Clone, Debug)]
@@ -34,12 +34,12 @@ impl Drive {
 }
 
 /// The law of an effect along every trajectory.
-pub fn drive(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectories: &[Trajectory]) -> Drive {
-    let facts = effect.facts();
+pub fn drive(law: &AnyLaw, scene: &Scene, trajectories: &[Trajectory]) -> Drive {
+    let facts = law.facts();
     Drive {
         entry: facts.entry,
         apart: if facts.per_record { facts.columns } else { 0 },
-        segments: trajectories.iter().map(|t| raw_columns(effect, inner, scene, t)).collect(),
+        segments: trajectories.iter().map(|t| raw_columns(law, scene, t)).collect(),
     }
 }
 
@@ -80,15 +80,15 @@ pub(super) fn entering(
 ///
 /// Repeats differ by what the controller made of the noise, and what a bent law does to each is not what it would do to their mean: the mean's
 /// peaks stay below a limit that every one of them meets, the mean turns round once where each turns at a time of its own.
-pub fn raw_columns(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectory: &Trajectory) -> Vec<Vec<f64>> {
+pub fn raw_columns(law: &AnyLaw, scene: &Scene, trajectory: &Trajectory) -> Vec<Vec<f64>> {
     let samples = &trajectory.samples;
-    if !effect.is_hard_nonlinearity() || trajectory.repeats.is_empty() {
-        return columns_along(effect, inner, scene, samples);
+    if !law.effect().is_hard_nonlinearity() || trajectory.repeats.is_empty() {
+        return columns_along(law, scene, samples);
     }
     let share = 1.0 / trajectory.repeats.len() as f64;
-    let mut mean = vec![vec![0.0; samples.len()]; effect.facts().columns];
+    let mut mean = vec![vec![0.0; samples.len()]; law.facts().columns];
     for own in &trajectory.repeats {
-        for (mean, column) in mean.iter_mut().zip(columns_along(effect, inner, scene, own)) {
+        for (mean, column) in mean.iter_mut().zip(columns_along(law, scene, own)) {
             mean.iter_mut().zip(&column).for_each(|(m, c)| *m += share * c);
         }
     }
@@ -96,10 +96,10 @@ pub fn raw_columns(effect: &dyn Effect, inner: &[f64], scene: &Scene, trajectory
 }
 
 /// The columns of an effect along a motion.
-pub(super) fn columns_along(effect: &dyn Effect, inner: &[f64], scene: &Scene, samples: &[Sample]) -> Vec<Vec<f64>> {
-    let facts = effect.facts();
+pub(super) fn columns_along(law: &AnyLaw, scene: &Scene, samples: &[Sample]) -> Vec<Vec<f64>> {
+    let facts = law.facts();
     let n = samples.len();
-    let mut law = effect.law(inner, scene);
+    let mut moving = law.in_motion(scene);
     let mut out = vec![vec![0.0; n]; facts.columns];
     let mut value = [0.0; COLUMNS];
     let by = if facts.entry == Entry::Torque { scene.arm_over_record() } else { 1.0 };
@@ -113,8 +113,8 @@ pub(super) fn columns_along(effect: &dyn Effect, inner: &[f64], scene: &Scene, s
         };
         // A torque acts on the arm itself, in front of the modes.
         let (from, to) = (from.scaled(by), to.scaled(by));
-        law.columns(&from, &to, &mut value[..facts.columns]);
-        law.commit(&from, &to);
+        moving.columns(&from, &to, &mut value[..facts.columns]);
+        moving.commit(&from, &to);
         for (column, v) in out.iter_mut().zip(&value) {
             column[k] = *v;
         }
@@ -123,15 +123,9 @@ pub(super) fn columns_along(effect: &dyn Effect, inner: &[f64], scene: &Scene, s
 }
 
 /// The same in the recorded position.
-pub fn position_columns(
-    effect: &dyn Effect,
-    inner: &[f64],
-    scene: &Scene,
-    trajectory: &Trajectory,
-    sampled: &Sampled,
-) -> Vec<Vec<f64>> {
-    let raw = raw_columns(effect, inner, scene, trajectory);
-    let through = match effect.facts().entry {
+pub fn position_columns(law: &AnyLaw, scene: &Scene, trajectory: &Trajectory, sampled: &Sampled) -> Vec<Vec<f64>> {
+    let raw = raw_columns(law, scene, trajectory);
+    let through = match law.facts().entry {
         Entry::Position => return raw,
         Entry::Command => &sampled.delayed,
         Entry::Torque => &sampled.direct,
@@ -147,14 +141,13 @@ pub fn position_columns(
 
 /// The same, whitened.
 pub fn white_columns(
-    effect: &dyn Effect,
-    inner: &[f64],
+    law: &AnyLaw,
     scene: &Scene,
     trajectory: &Trajectory,
     sampled: &Sampled,
     whitener: &Whitener,
 ) -> Vec<Vec<f64>> {
-    let mut all = position_columns(effect, inner, scene, trajectory, sampled);
+    let mut all = position_columns(law, scene, trajectory, sampled);
     all.iter_mut().for_each(|c| whitener.apply(c));
     all
 }

@@ -58,7 +58,7 @@ pub(super) fn confirm(
         Ok(all)
     };
     let mut out = Vec::new();
-    let strays = |c: &Chosen| c.effect.facts().per_record || c.effect.has_own_clock();
+    let strays = |c: &Chosen| c.setting.facts().per_record || c.effect().has_own_clock();
     if asked.is_empty() || model.chosen.iter().any(strays) {
         return Ok(out);
     }
@@ -75,7 +75,7 @@ pub(super) fn confirm(
             .iter()
             .zip(&without)
             .fold((0.0, 0.0), |(says, gains), (a, b)| (says + (a - b).powi(2), gains + b * b - a * a));
-        out.push(Confirmation { effect: c.effect.facts().name, says: sums.0, gains: sums.1 });
+        out.push(Confirmation { effect: c.setting.facts().name, says: sums.0, gains: sums.1 });
     }
     Ok(out)
 }

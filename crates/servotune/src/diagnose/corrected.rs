@@ -10,7 +10,8 @@ use super::linear::{LinearForm, body_numbers};
 use super::rules::FREE_BODY;
 use super::selection::Selection;
 use crate::lti::{Body, PhysicsEntry, Plant};
-use crate::physics::{Effect, Scene, Setting, effect};
+use crate::physics::cable_spring::CableSpring;
+use crate::physics::{Scene, Setting};
 
 /// The plant and the effects that simulate it.
 #[derive(Clone)]
@@ -18,17 +19,17 @@ pub struct Corrected {
     /// The plant, physics entries included.
     pub plant: Plant,
     /// The effects of the entries.
-    pub effects: Vec<(&'static dyn Effect, Setting)>,
+    pub effects: Vec<Setting>,
 }
 
 impl Corrected {
     /// The same as a model to be judged, with what is each record's own.
     pub(super) fn judged<'a>(&'a self, bench: &'a Bench, selection: &'a Selection) -> Judged<'a> {
-        let own = selection.model.chosen.iter().filter(|c| c.effect.facts().per_record);
+        let own = selection.model.chosen.iter().filter(|c| c.setting.facts().per_record);
         Judged {
             plant: &self.plant,
-            effects: self.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect(),
-            own: own.map(|c| (c.effect as &dyn Effect, &c.setting.inner[..])).collect(),
+            effects: self.effects.iter().collect(),
+            own: own.map(|c| &c.setting.law).collect(),
             lines: &bench.lines,
             fit: Some((bench, &selection.model)),
             scene: &bench.scene,
@@ -39,16 +40,16 @@ impl Corrected {
 /// Makes the corrected model of a fit; `per_record` effects belong to records, not to the machine, and stay out.
 pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[Chosen], scene: &Scene) -> Corrected {
     let mut plant = form.plant(p);
-    let mut effects: Vec<(&'static dyn Effect, Setting)> = Vec::new();
+    let mut effects: Vec<Setting> = Vec::new();
     let mut entries = Vec::new();
-    let named = |name: &str, e: &dyn Effect, s: &Setting| PhysicsEntry {
-        effect: name.into(),
-        parameters: e.parameters(s, scene).into_iter().map(|q| (q.name.to_owned(), q.value)).collect(),
+    let named = |s: &Setting| PhysicsEntry {
+        effect: s.facts().name.into(),
+        parameters: s.parameters(scene).into_iter().map(|q| (q.name.to_owned(), q.value)).collect(),
         curve: None,
     };
-    for c in chosen.iter().filter(|c| !c.effect.facts().per_record) {
-        entries.push(named(c.effect.facts().name, c.effect, &c.setting));
-        effects.push((c.effect, c.setting.clone()));
+    for c in chosen.iter().filter(|c| !c.setting.facts().per_record) {
+        entries.push(named(&c.setting));
+        effects.push(c.setting.clone());
     }
     let carrier = form.carrier(p);
     let (b, k0, c0) = body_numbers(&carrier.plant.body);
@@ -56,12 +57,10 @@ pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[Chosen], scene: &Scene)
     if k0 > 0.0 && stiffness < FREE_BODY * k0 {
         let viscous = c0 - carrier.damper * b * form.given.resonance_gain;
         plant.body = Body::FreeInertia { acceleration_gain: b, viscous_rate_per_s: viscous.max(0.0) };
-        if let Some(spring) = effect("cable_spring") {
-            let strength = stiffness / (b * form.given.resonance_gain);
-            let setting = Setting { inner: vec![0.0, 0.0], strengths: vec![strength, 0.0] };
-            entries.push(named("cable_spring", spring, &setting));
-            effects.push((spring, setting));
-        }
+        let strength = stiffness / (b * form.given.resonance_gain);
+        let spring = Setting::new(CableSpring { creep_time_s: None, centre: 0.0 }, vec![strength, 0.0]);
+        entries.push(named(&spring));
+        effects.push(spring);
     }
     plant.physics = entries;
     Corrected { plant, effects }

@@ -22,7 +22,7 @@ pub(super) fn deep(step: &Step) -> bool {
 /// bends falls far short of itself.
 pub(super) fn by_simulation_first(bench: &Bench, step: &mut Step) {
     let last = |m: &Model| {
-        m.chosen.last().map(|c| (c.effect.facts().name, c.effect.is_drag() || c.effect.is_hard_nonlinearity()))
+        m.chosen.last().map(|c| (c.setting.facts().name, c.effect().is_drag() || c.effect().is_hard_nonlinearity()))
     };
     let mut order: Vec<usize> = (0..step.tried.len()).collect();
     let rank = |i: &usize| {
@@ -49,7 +49,7 @@ pub(super) fn felt_scan(bench: &Bench, library: &[&'static dyn Effect], model: &
 /// A model with one law more, all of it fitted by simulation; none where nothing is won.
 pub(super) fn felt_trial(bench: &Bench, model: &Model, chosen: Vec<Chosen>) -> Option<Model> {
     let numbers = |c: &[Chosen]| -> usize {
-        let strengths = |c: &Chosen| if c.effect.facts().fixed { 0 } else { c.setting.strengths.len() };
+        let strengths = |c: &Chosen| if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
         c.iter().map(|c| strengths(c) + c.continuous.iter().filter(|c| **c).count()).sum()
     };
     let mut start = model.clone();
@@ -71,12 +71,11 @@ pub(super) fn foretold(bench: &Bench, model: &Model, step: &mut Step) -> bool {
     start.refitted.plant = bench.form.given.clone();
     let Some(found) = felt_trial(bench, &start, vec![law.clone()]) else { return false };
     let candidate = Candidate {
-        effect: law.effect,
         setting: found.chosen[0].setting.clone(),
         gain: model.evidence - found.evidence,
         concealed: 0.0,
-        points: law.effect.scan_points(&bench.scene).len(),
-        strengths: if law.effect.facts().fixed { 1 } else { law.setting.strengths.len() },
+        points: law.effect().grid(&bench.scene).len(),
+        strengths: if law.setting.facts().fixed { 1 } else { law.setting.strengths.len() },
         continuous: law.continuous,
         range: law.range,
     };

@@ -9,7 +9,7 @@ use super::columns::columns_along;
 use super::difference::Difference;
 use super::linear::{Sampled, free_motions};
 use crate::numeric::least_squares::dot;
-use crate::physics::{Effect, Entry, Sample};
+use crate::physics::{AnyLaw, Entry, Sample};
 
 impl Difference {
     /// What the law takes of the sum of squares, its strength being 1.
@@ -18,16 +18,16 @@ impl Difference {
     }
 
     /// The differences of a law among the repeats; zero where it answers in proportion to the command.
-    pub fn of(bench: &Bench, sampled: &Sampled, effect: &dyn Effect, inner: &[f64]) -> Difference {
+    pub fn of(bench: &Bench, sampled: &Sampled, law: &AnyLaw) -> Difference {
         let mut sum = Difference::default();
-        if !effect.is_hard_nonlinearity() || effect.facts().entry != Entry::Command {
+        if !law.effect().is_hard_nonlinearity() || law.facts().entry != Entry::Command {
             return sum;
         }
         let t = bench.scene.sample_time_s;
         let free = |n: usize| free_motions(&bench.form.given.body, t, n).to_vec();
         for (s, motion) in bench.stack.segments.iter().zip(&bench.trajectories).filter(|(s, _)| s.runs.len() > 1) {
             let answer = |(&run, own): (&usize, &Vec<Sample>)| {
-                let column = columns_along(effect, inner, &bench.scene, own).swap_remove(0);
+                let column = columns_along(law, &bench.scene, own).swap_remove(0);
                 let mut y = vec![0.0; s.len];
                 sampled.delayed.add_response(&column, &mut y);
                 (run, y)
@@ -55,9 +55,9 @@ impl Difference {
 
 /// What all effects of a model take of what repeats differ by.
 pub fn differing(bench: &Bench, chosen: &[Chosen], p: &[f64]) -> f64 {
-    if !chosen.iter().any(|c| c.effect.is_hard_nonlinearity()) {
+    if !chosen.iter().any(|c| c.effect().is_hard_nonlinearity()) {
         return 0.0;
     }
     let Ok(sampled) = Sampled::of(&bench.form.carrier(p).plant, bench.scene.sample_time_s) else { return 0.0 };
-    chosen.iter().map(|c| Difference::of(bench, &sampled, c.effect, &c.setting.inner).gain()).sum()
+    chosen.iter().map(|c| Difference::of(bench, &sampled, &c.setting.law).gain()).sum()
 }

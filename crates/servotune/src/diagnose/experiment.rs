@@ -7,7 +7,7 @@ use super::judge::{Judged, error};
 use super::run::Run;
 use super::selection::Selection;
 use super::whiten::Whitener;
-use crate::physics::{Effect, Scene, facts};
+use crate::physics::{Scene, facts};
 
 /// Scales of the existing excitations that are tried.
 const SCALES: [f64; 4] = [0.3, 1.0, 2.0, 4.0];
@@ -35,8 +35,8 @@ pub(super) fn propose(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
     // The rival: the runner-up of the first step, or the linear refit.
     let rival = selection.steps.first().and_then(|s| {
         let taken = s.taken?;
-        let best = s.tried[taken].1.chosen.last()?.effect.facts().name;
-        let others = s.tried.iter().filter(|t| t.1.chosen.last().is_some_and(|c| c.effect.facts().name != best));
+        let best = s.tried[taken].1.chosen.last()?.setting.facts().name;
+        let others = s.tried.iter().filter(|t| t.1.chosen.last().is_some_and(|c| c.setting.facts().name != best));
         others.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost)).map(|t| &t.1)
     });
     let rival = rival.unwrap_or(&selection.baseline);
@@ -68,8 +68,7 @@ pub(super) fn propose(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
 fn difference(bench: &Bench, run: &Run, a: &super::model::Model, b: &super::model::Model) -> f64 {
     let simulate = |m: &super::model::Model| {
         let fixed = super::corrected::corrected(&bench.form, &m.refitted.p, &m.chosen, &bench.scene);
-        let effects: Vec<(&dyn Effect, _)> = fixed.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
-        let scene: &Scene = &bench.scene;
+        let (effects, scene): (_, &Scene) = (fixed.effects.iter().collect(), &bench.scene);
         error(&Judged { plant: &fixed.plant, effects, own: Vec::new(), lines: &[], fit: None, scene }, run, None).ok()
     };
     let (Some(x), Some(y)) = (simulate(a), simulate(b)) else { return 0.0 };

@@ -20,7 +20,7 @@ pub(super) fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64], iterations: 
     let mut fit = bench.fit(chosen);
     let refitted = fit.refit(p, iterations);
     let chosen = fit.chosen;
-    let begun = chosen.iter().map(|c| begun(bench, &c.setting.inner, c.effect)).sum::<usize>();
+    let begun = chosen.iter().map(|c| begun(bench, &c.setting.law)).sum::<usize>();
     let used = refitted.count() + 3 * bench.stack.segments.len() + begun;
     let freedom = bench.stack.total as f64 - used as f64;
     let known = bench.repeats.iter().map(|r| r.1.len()).sum::<usize>() as f64 - bench.stack.total as f64;

@@ -6,7 +6,10 @@
 use super::free_form_gauge::Plain;
 use super::rules::{CURVE_LIKE, CURVE_LOPSIDED};
 use crate::numeric::least_squares::Qr;
-use crate::physics::CurvePort;
+use crate::physics::{
+    CurvePort, Facts, aerodynamic_drag, cable_spring, coulomb_friction, current_saturation, dead_band,
+    encoder_scale_error, nonlinear_spring, sensor_curve, torque_factor_rolloff, torque_ripple, unexplained,
+};
 
 /// The nearest law of the library.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -21,7 +24,7 @@ pub struct Likeness {
 
 /// One shape to compare with.
 struct Form {
-    effect: &'static str,
+    facts: &'static Facts,
     words: &'static str,
     value: Vec<f64>,
 }
@@ -32,61 +35,69 @@ const KINKS: [f64; 7] = [0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.75];
 fn forms(c: &Plain) -> Vec<Form> {
     let [low, high] = [c.at[0], c.at[c.at.len() - 1]];
     let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
-    let over = |effect, words, f: &dyn Fn(f64) -> f64| {
+    let over = |facts, words, f: &dyn Fn(f64) -> f64| {
         let value = c.at.iter().map(|a| f(*a)).collect();
-        Form { effect, words, value }
+        Form { facts, words, value }
     };
     let mut all = Vec::new();
     match c.port {
         CurvePort::TorqueOverVelocity => {
             for s in KINKS {
-                all.push(over("coulomb_friction", "dry friction", &|v| -(v / (s * half)).tanh()));
+                all.push(over(&coulomb_friction::FACTS, "dry friction", &|v| -(v / (s * half)).tanh()));
             }
-            all.push(over("aerodynamic_drag", "drag of the air", &|v| -v * v.abs()));
+            all.push(over(&aerodynamic_drag::FACTS, "drag of the air", &|v| -v * v.abs()));
         }
         CurvePort::TorqueOverPosition => {
-            all.push(over("nonlinear_spring", "a stiffening spring", &|x| -(x - centre).powi(3)));
+            all.push(over(&nonlinear_spring::FACTS, "a stiffening spring", &|x| -(x - centre).powi(3)));
             for s in KINKS.into_iter().chain([0.9]) {
                 let depth = |d: f64| (d.abs() - s * half).max(0.0) * d.signum();
-                all.push(over("nonlinear_spring", "a spring that meets a stop", &|x| -depth(x - centre)));
+                all.push(over(&nonlinear_spring::FACTS, "a spring that meets a stop", &|x| -depth(x - centre)));
             }
-            all.push(over("cable_spring", "a cable that pulls harder to one side", &|x| -(x - centre).powi(2)));
+            all.push(over(&cable_spring::FACTS, "a cable that pulls harder to one side", &|x| -(x - centre).powi(2)));
             for waves in 1..=6 {
                 let w = std::f64::consts::PI * f64::from(waves) / half;
-                all.push(over("torque_ripple", "a ripple of the torque", &|x| (w * (x - centre)).sin()));
-                all.push(over("torque_ripple", "a ripple of the torque", &|x| (w * (x - centre)).cos()));
+                all.push(over(&torque_ripple::FACTS, "a ripple of the torque", &|x| (w * (x - centre)).sin()));
+                all.push(over(&torque_ripple::FACTS, "a ripple of the torque", &|x| (w * (x - centre)).cos()));
             }
         }
         CurvePort::AmplifierOverCommand => {
             for s in KINKS {
                 let edge = s * half;
-                all.push(over("dead_band", "an amplifier that ignores small commands", &|u| u - u.clamp(-edge, edge)));
-                all.push(over("current_saturation", "an amplifier that runs out of current", &|u| {
+                all.push(over(&dead_band::FACTS, "an amplifier that ignores small commands", &|u| {
+                    u - u.clamp(-edge, edge)
+                }));
+                all.push(over(&current_saturation::FACTS, "an amplifier that runs out of current", &|u| {
                     u.clamp(-edge, edge)
                 }));
             }
         }
         CurvePort::GainOverPosition => {
-            all.push(over("torque_factor_rolloff", "a motor that pushes less towards the ends", &|x| {
+            all.push(over(&torque_factor_rolloff::FACTS, "a motor that pushes less towards the ends", &|x| {
                 -(x - centre).powi(2)
             }));
-            all.push(over("torque_factor_rolloff", "a motor that pushes less towards the ends", &|x| {
+            all.push(over(&torque_factor_rolloff::FACTS, "a motor that pushes less towards the ends", &|x| {
                 -(x - centre).powi(4)
             }));
         }
         CurvePort::SensorOverPosition => {
             for s in KINKS.into_iter().chain([0.0]) {
                 for edge in [centre + s * half, centre - s * half] {
-                    all.push(over("sensor_curve", "a reading folded like an absolute value", &|x| (x - edge).abs()));
+                    all.push(over(&sensor_curve::FACTS, "a reading folded like an absolute value", &|x| {
+                        (x - edge).abs()
+                    }));
                 }
             }
             for s in KINKS {
                 let edge = s * half;
                 let read = |x: f64| (x - centre).clamp(-edge, edge);
-                all.push(over("sensor_curve", "a reading that ends at a limit", &read));
+                all.push(over(&sensor_curve::FACTS, "a reading that ends at a limit", &read));
             }
-            all.push(over("encoder_scale_error", "a scale that stretches over the stroke", &|x| (x - centre).powi(2)));
-            all.push(over("encoder_scale_error", "a scale that stretches over the stroke", &|x| (x - centre).powi(3)));
+            all.push(over(&encoder_scale_error::FACTS, "a scale that stretches over the stroke", &|x| {
+                (x - centre).powi(2)
+            }));
+            all.push(over(&encoder_scale_error::FACTS, "a scale that stretches over the stroke", &|x| {
+                (x - centre).powi(3)
+            }));
         }
     }
     all
@@ -129,24 +140,25 @@ pub(super) fn likeness(c: &Plain) -> Likeness {
         columns.push(form.value.clone());
         let (shares, left) = fitted(&c.value, &columns, &c.weight);
         // Friction that gives energy, an end where the torque grows: another law.
-        let directed = c.port == CurvePort::SensorOverPosition || form.effect == "torque_ripple" || shares[2] > 0.0;
+        let directed =
+            c.port == CurvePort::SensorOverPosition || form.facts.name == torque_ripple::FACTS.name || shares[2] > 0.0;
         if directed && shares.iter().all(|s| s.is_finite()) && best.as_ref().is_none_or(|b| left < b.0) {
             best = Some((left, form));
         }
     }
     let Some((left, form)) = best else {
-        return Likeness { effect: "unexplained", share: 0.0, says: "like none of the named laws".into() };
+        return Likeness { effect: unexplained::FACTS.name, share: 0.0, says: "like none of the named laws".into() };
     };
     let share = if whole > 0.0 { 1.0 - left / whole } else { 0.0 };
     let percent = 100.0 * share;
     if share < CURVE_LIKE {
         let says =
             format!("like none of the named laws: the nearest, {}, holds {percent:.0} % of the curve", form.words);
-        return Likeness { effect: form.effect, share, says };
+        return Likeness { effect: form.facts.name, share, says };
     }
     let beside = lopsided(c, &form).map_or(String::new(), |text| format!(", but {text}"));
     let says = format!("like {}{beside}; that shape holds {percent:.0} % of the curve", form.words);
-    Likeness { effect: form.effect, share, says }
+    Likeness { effect: form.facts.name, share, says }
 }
 
 /// How much weaker a shape is on one side than on the other.

@@ -6,7 +6,7 @@
 use super::bench::Bench;
 use crate::physics::amplifier_lag::AmplifierLag;
 use crate::physics::sensor_curve::SensorCurve;
-use crate::physics::{CurvePort, Effect, Setting};
+use crate::physics::{CurvePort, Setting};
 
 /// What stands beside the linear plant.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,13 +47,14 @@ impl Shape {
     }
 
     /// The effect that it is; none where it is none.
-    pub fn effect(&self) -> Option<(&'static dyn Effect, Setting)> {
-        static READING: SensorCurve = SensorCurve;
+    pub fn effect(&self) -> Option<Setting> {
         match self {
             Shape::Linear => None,
-            Shape::Fold([lowest, at]) => Some((&READING, SensorCurve::folded(*lowest, *at))),
-            Shape::Limits([low, high]) => Some((&READING, SensorCurve::limited(*low, low.max(*high)))),
-            Shape::Curve(port, at, value) => Some((port.effect(), port.setting(at, value))),
+            Shape::Fold([lowest, at]) => Some(Setting::fixed(SensorCurve::Folded { lowest: *lowest, at: *at })),
+            Shape::Limits([low, high]) => {
+                Some(Setting::fixed(SensorCurve::Limited { low: *low, high: low.max(*high) }))
+            }
+            Shape::Curve(port, at, value) => Some(Setting::fixed(port.curve(at, value))),
         }
     }
 
@@ -96,22 +97,25 @@ impl Shape {
 }
 
 /// The amplifier's lag as an effect of the plant file.
-pub(super) fn lag(seconds: f64) -> (&'static dyn Effect, Setting) {
-    static LAG: AmplifierLag = AmplifierLag;
-    (&LAG, Setting { inner: vec![seconds], strengths: vec![1.0] })
+pub(super) fn lag(seconds: f64) -> Setting {
+    Setting::fixed(AmplifierLag { time_constant_s: seconds })
 }
 
 /// The effects of a lag of the amplifier, a shape and a reading behind it, in this order. The lag stands behind the amplifier's own curve,
 /// or behind none, so that a record may begin while it still fades.
-pub(super) fn effects(lag_s: Option<f64>, shape: &Shape, reading: &Shape) -> Vec<(&'static dyn Effect, Setting)> {
+pub(super) fn effects(lag_s: Option<f64>, shape: &Shape, reading: &Shape) -> Vec<Setting> {
     let mut own = shape.effect();
     let mut all = Vec::new();
     if let Some(lag_s) = lag_s {
         let port = CurvePort::AmplifierOverCommand;
-        let bare = || (port.effect(), port.setting(&[-1.0, 1.0], &[-1.0, 1.0]));
-        let amplifier = matches!(shape, Shape::Curve(CurvePort::AmplifierOverCommand, ..));
-        let (effect, setting) = own.take_if(|_| amplifier).unwrap_or_else(bare);
-        all.push((effect, CurvePort::lagged(setting, lag_s)));
+        let curve = match shape {
+            Shape::Curve(CurvePort::AmplifierOverCommand, at, value) => {
+                own = None;
+                port.curve(at, value)
+            }
+            _ => port.curve(&[-1.0, 1.0], &[-1.0, 1.0]),
+        };
+        all.push(Setting::fixed(curve.lagged(lag_s)));
     }
     all.extend(own);
     all.extend(reading.effect());

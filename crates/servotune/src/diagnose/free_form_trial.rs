@@ -13,7 +13,7 @@ use super::run::Run;
 use crate::lti::{Body, Plant};
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
 use crate::numeric::spline::roughness_rows;
-use crate::physics::{CurvePort, Effect, Setting};
+use crate::physics::{CurvePort, Setting};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -67,7 +67,7 @@ struct Start {
 /// A trial's model, ready to be simulated.
 struct Made {
     plant: Plant,
-    effects: Vec<(&'static dyn Effect, Setting)>,
+    effects: Vec<Setting>,
 }
 
 /// Linear parameters that the shape leaves free: what it can hold itself stays.
@@ -159,7 +159,7 @@ impl<'a> Trial<'a> {
     /// Does something with every stretch under the model at `x`, in parallel.
     fn each<T: Send>(&self, x: &[f64], of: impl Fn(usize, &Run, &Judged) -> T + Sync) -> Vec<T> {
         let made = self.made(x);
-        let effects = || made.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
+        let effects = || made.effects.iter().collect();
         let scene = &self.bench.scene;
         let one = |(i, run): (usize, &Run)| {
             let judged = Judged { plant: &made.plant, effects: effects(), own: vec![], lines: &[], fit: None, scene };
@@ -314,8 +314,8 @@ fn seen(all: &[Vec<f64>], reads: bool) -> Vec<Vec<f64>> {
 /// Places of the arm, less where it stood, from which a record may begin.
 fn start_places(judged: &Judged, run: &Run, reads: bool) -> Vec<f64> {
     let mut all = vec![0.0];
-    let Some((effect, setting)) = judged.effects.last().filter(|_| reads) else { return all };
-    let law = effect.law(&setting.inner, judged.scene);
+    let Some(setting) = judged.effects.last().filter(|_| reads) else { return all };
+    let law = setting.law.in_motion(judged.scene);
     let missing = |x: f64| {
         let at = crate::physics::Sample { x, ..Default::default() };
         let mut out = [0.0];

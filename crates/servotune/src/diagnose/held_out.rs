@@ -17,7 +17,7 @@ use super::selection::Selection;
 use super::stack::Segment;
 use crate::lti::LtiError;
 use crate::numeric::least_squares::dot;
-use crate::physics::Port;
+use crate::physics::{Port, unexplained};
 use crate::recording::Role;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -95,7 +95,7 @@ fn loudest(bench: &Bench) -> f64 {
 ///
 /// None where a law goes by a clock of its own, which each record starts anew.
 pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) -> Option<&'a HeldOut> {
-    if model.chosen.iter().any(|c| c.effect.facts().per_record || c.effect.has_own_clock()) {
+    if model.chosen.iter().any(|c| c.setting.facts().per_record || c.effect().has_own_clock()) {
         return None;
     }
     let loudest = loudest(bench);
@@ -138,8 +138,8 @@ pub(super) fn unseen(bench: &Bench, selection: &Selection, h: &HeldOut) -> Optio
     let place = place_of(&[part], t);
     let n = h.samples as f64;
     Some(Finding {
-        effect: "unexplained".into(),
-        family: vec!["unexplained".into()],
+        effect: unexplained::FACTS.name.into(),
+        family: vec![unexplained::FACTS.name.into()],
         port: Port::Torque,
         p_value: log_tail(h.whitened[0] * n, h.samples).min(0.0).exp().max(1e-300),
         says: format!(

@@ -14,7 +14,7 @@ use crate::controller::Law;
 use crate::lti::{Body, DiscretePlant, LtiError, Plant, PlantState, step_chain};
 use crate::numeric::least_squares::{Qr, dot};
 use crate::numeric::random::Random;
-use crate::physics::{Effect, Entry, Machine, Sample, Scene, Setting};
+use crate::physics::{AnyLaw, Entry, Machine, Sample, Scene, Setting};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -33,10 +33,10 @@ pub struct Judged<'a> {
     /// The plant.
     pub plant: &'a Plant,
     /// Its effects.
-    pub effects: Vec<(&'a dyn Effect, &'a Setting)>,
-    /// Effects whose strengths are each record's own, with their inner parameters: fitted to the record that is judged, like
+    pub effects: Vec<&'a Setting>,
+    /// Effects whose strengths are each record's own, as their laws: fitted to the record that is judged, like
     /// its start.
-    pub own: Vec<(&'a dyn Effect, &'a [f64])>,
+    pub own: Vec<&'a AnyLaw>,
     /// Lines whose phase is each record's own.
     pub lines: &'a [Line],
     /// The bench and the fit that the model comes from, for records that do not begin at rest: the constant torque on them is
@@ -68,8 +68,8 @@ impl Judged<'_> {
         let direct = Sampled::of(self.plant, t)?.direct;
         let mut all = free_motions(&self.plant.body, t, run.len()).to_vec();
         all.extend(self.lines.iter().flat_map(|l| l.columns(run, t)));
-        all.extend(self.effects.iter().flat_map(|(e, s)| e.free_motions(&s.inner, self.scene, run.len())));
-        for tau in self.effects.iter().filter_map(|(e, s)| e.memory_time_s(&s.inner)) {
+        all.extend(self.effects.iter().flat_map(|s| s.law.free_motions(self.scene, run.len())));
+        for tau in self.effects.iter().filter_map(|s| s.law.memory_time_s()) {
             let left: Vec<f64> = (0..run.len()).map(|k| (-(k as f64 * t) / tau).exp()).collect();
             let mut y = vec![0.0; run.len()];
             direct.add_response(&left, &mut y);
@@ -86,10 +86,10 @@ impl Judged<'_> {
             })
             .collect();
         let motion = Trajectory { samples, unexplained: Vec::new(), repeats: Vec::new() };
-        for (effect, inner) in &self.own {
-            for column in raw_columns(*effect, inner, self.scene, &motion) {
+        for law in &self.own {
+            for column in raw_columns(law, self.scene, &motion) {
                 let mut y = vec![0.0; column.len()];
-                match effect.facts().entry {
+                match law.facts().entry {
                     Entry::Position => y = column,
                     _ => direct.add_response(&column, &mut y),
                 }
@@ -122,7 +122,7 @@ pub fn error(model: &Judged, run: &Run, closed: Option<&Law>) -> Result<Vec<f64>
     let near = begun.found(rest, &begun.linear, 2)?;
     let (better, _) = begun.better(near.free.clone(), ROUNDS)?;
     let best = if size(&better.error) < size(&near.error) { better } else { near };
-    if begun.closed.is_some() && model.effects.iter().any(|(e, _)| e.is_drag()) {
+    if begun.closed.is_some() && model.effects.iter().any(|s| s.law.effect().is_drag()) {
         begun.shaken(best)
     } else {
         Ok(best.error)

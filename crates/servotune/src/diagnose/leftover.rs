@@ -29,7 +29,7 @@ pub(super) fn leftover(
     }
     let chance = |c: &Candidate| c.log_p_value(library.len()).max(hums(bench, c, c.gain, library.len()));
     let strongest = |candidates: &[Candidate]| {
-        let possible = candidates.iter().filter(|c| c.effect.is_possible(&c.setting, &[]));
+        let possible = candidates.iter().filter(|c| c.setting.is_possible(&[]));
         possible.min_by(|a, b| chance(a).total_cmp(&chance(b))).filter(|c| chance(c) < limit).cloned()
     };
     let along = match steps.last().filter(|s| s.taken.is_none()) {
@@ -45,7 +45,7 @@ pub(super) fn leftover(
     };
     let taken = (before - simulated.map_or(model.cost, |s| s.cost.min(model.cost))).max(f64::MIN_POSITIVE);
     Some(Leftover {
-        effect: left.effect.facts().name.into(),
+        effect: left.setting.facts().name.into(),
         gain: left.gain,
         share: left.gain / taken,
         p_value: chance(&left).exp().max(1e-300),

@@ -5,11 +5,12 @@ use super::finding::{Estimate, Finding, Where};
 use super::linear::{Sampled, free_motions};
 use super::lines::Line;
 use super::lines::mains;
-use super::name::{everywhere, text_of};
+use super::name::{HUM, RUNOUT, everywhere, text_of};
 use super::rules::{HUM_COHERENCE, HUM_FADES, HUM_SPREAD};
 use super::run::Run;
 use super::selection::Selection;
 use crate::lti::FrequencyResponse;
+use crate::physics::unexplained;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -134,8 +135,8 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Findin
         }
         let lines: Vec<&Line> = orders.iter().map(|o| o.0).collect();
         let alone = orders.len() == 1 && first.order.is_some_and(|o| o > 1) && mains(first.hz);
-        let family: &[&str] = if alone { &["repeatable_runout", "line_disturbance"] } else { &["repeatable_runout"] };
-        out.push(make("repeatable_runout", family, &lines, parameters));
+        let family: &[&str] = if alone { &[RUNOUT, HUM] } else { &[RUNOUT] };
+        out.push(make(RUNOUT, family, &lines, parameters));
     }
     let sampled = Sampled::of(&selection.model.refitted.plant, bench.scene.sample_time_s);
     for (l, phasors) in hums.iter().filter(|l| l.0.order.is_none()) {
@@ -149,10 +150,10 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Findin
             parameters.insert("amplitude_command".into(), estimate(&values, 1.0 / gain, &given.command_unit));
         }
         let family: &[&str] = match bench.scene.spindle_hz {
-            Some(_) => &["line_disturbance"],
-            None => &["line_disturbance", "repeatable_runout"],
+            Some(_) => &[HUM],
+            None => &[HUM, RUNOUT],
         };
-        out.push(make("line_disturbance", family, &[l], parameters));
+        out.push(make(HUM, family, &[l], parameters));
     }
     (out, others.iter().map(|(l, _)| l.hz).collect())
 }
@@ -160,19 +161,19 @@ pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Findin
 /// Whether two findings are of one hum: their frequencies lie within their intervals of each other.
 pub(super) fn same_line(a: &Finding, b: &Finding) -> bool {
     let of = |f: &Finding| f.parameters.get("frequency_hz").map(|e| [e.low, e.high]);
-    let hum = |f: &Finding| f.effect == "line_disturbance";
+    let hum = |f: &Finding| f.effect == HUM;
     hum(a) && hum(b) && of(a).zip(of(b)).is_some_and(|(a, b)| a[0] <= b[1] && b[0] <= a[1])
 }
 
 /// What shows at some frequencies (Hz) in every repeat differently, and is no hum.
 pub(super) fn unsteady(bench: &Bench, frequencies_hz: &[f64]) -> Finding {
     let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
-    let (_, port) = text_of("unexplained");
+    let port = unexplained::FACTS.port;
     let strongest = bench.lines.iter().filter(|l| frequencies_hz.contains(&l.hz)).map(|l| l.log_p).fold(0.0, f64::min);
     let at: Vec<String> = frequencies_hz.iter().map(|f| format!("{f:.3}")).collect();
     Finding {
-        effect: "unexplained".into(),
-        family: vec!["unexplained".into()],
+        effect: unexplained::FACTS.name.into(),
+        family: vec![unexplained::FACTS.name.into()],
         port,
         p_value: strongest.exp().max(1e-300),
         says: format!(

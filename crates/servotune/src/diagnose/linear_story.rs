@@ -14,7 +14,9 @@ use super::rules::{FAMILY, LAGS_ALIKE, ONE_NUMBER};
 use super::selection::Selection;
 use super::simulated::simulated_with;
 use crate::lti::Plant;
-use crate::physics::{Parameter, Setting, effect};
+use crate::physics::amplifier_lag::AmplifierLag;
+use crate::physics::sensor_lag::SensorLag;
+use crate::physics::{AnyLaw, Facts, Parameter, Setting, extra_delay, misalignment};
 use std::collections::BTreeMap;
 
 /// How a restricted model is fitted.
@@ -67,24 +69,22 @@ impl Way<'_> {
 
 /// Lags that fit as well as a delay of `delay_s` does, beside linear parameters as given: a lag far above the band is a delay.
 fn lags_like(bench: &Bench, way: Way, delay_s: f64, cost: f64) -> Vec<String> {
-    let as_good =
-        |name: &&str| lag(name, delay_s).is_some_and(|l| way.restricted(bench, |_| false, Some(l)).0 < cost + FAMILY);
-    LAGS.into_iter().filter(as_good).map(str::to_owned).collect()
+    let as_good = |law: &AnyLaw| way.restricted(bench, |_| false, Some(lag(law.clone(), delay_s))).0 < cost + FAMILY;
+    lags(delay_s).into_iter().filter(as_good).map(|law| law.facts().name.to_owned()).collect()
 }
 
-/// The lags of the library, and the iterations in which one of them alone is fitted.
-const LAGS: [&str; 2] = ["amplifier_lag", "sensor_lag"];
+/// The lags of the library with this time constant (s).
+fn lags(time_constant_s: f64) -> [AnyLaw; 2] {
+    [AmplifierLag { time_constant_s }.into(), SensorLag { time_constant_s }.into()]
+}
+
+/// Iterations in which a lag alone is fitted.
 const ITERATIONS: usize = 16;
 
 /// A lag whose time constant is looked for near a delay.
-fn lag(name: &str, near_s: f64) -> Option<Chosen> {
-    Some(Chosen {
-        effect: effect(name)?,
-        setting: Setting { inner: vec![near_s], strengths: vec![1.0] },
-        continuous: vec![true],
-        range: vec![[0.1 * near_s, 10.0 * near_s]],
-        step: 0,
-    })
+fn lag(law: AnyLaw, near_s: f64) -> Chosen {
+    let range = vec![[0.1 * near_s, 10.0 * near_s]];
+    Chosen { setting: Setting::fixed(law), continuous: vec![true], range, step: 0 }
 }
 
 /// A lag in the place of every change of the linear parameters.
@@ -100,19 +100,18 @@ impl Lag {
     /// like it.
     fn alone(bench: &Bench, near_s: f64) -> Vec<Lag> {
         let form = LinearForm { knobs: Vec::new(), ..bench.form.clone() };
-        let fitted = |name: &str| {
-            let chosen = lag(name, near_s)?;
-            let mut fit = Fit { form: &form, ..bench.fit(vec![chosen]) };
+        let fitted = |law: AnyLaw| {
+            let mut fit = Fit { form: &form, ..bench.fit(vec![lag(law, near_s)]) };
             let r = fit.refit(&[], ITERATIONS);
-            Some(Lag { spread: r.spread(0), cost: r.cost, chosen: fit.chosen.swap_remove(0) })
+            Lag { spread: r.spread(0), cost: r.cost, chosen: fit.chosen.swap_remove(0) }
         };
-        let mut all: Vec<Lag> = LAGS.into_iter().filter_map(fitted).collect();
+        let mut all: Vec<Lag> = lags(near_s).into_iter().map(fitted).collect();
         all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         all
     }
 
     fn name(&self) -> &'static str {
-        self.chosen.effect.facts().name
+        self.chosen.setting.facts().name
     }
 
     /// The finding; `before` is the sum of squares of the given plant.
@@ -120,8 +119,8 @@ impl Lag {
         let (says, port) = text_of(self.name());
         let given = &bench.form.given;
         let parameters = |by: f64| {
-            let setting = Setting { inner: vec![self.chosen.setting.inner[0] * by.exp()], strengths: vec![1.0] };
-            self.chosen.effect.parameters(&setting, &bench.scene)
+            let law = &self.chosen.setting.law;
+            Setting::fixed(law.with_number(0, law.first_number() * by.exp())).parameters(&bench.scene)
         };
         let off = 1.96 * self.spread;
         let ends = parameters(-off).into_iter().zip(parameters(off));
@@ -191,17 +190,17 @@ fn simple_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection) -> bool
         let sigma =
             bench.form.knobs.iter().position(|k| *k == Knob::Delay).map_or(0.0, |i| selection.model.refitted.spread(i))
                 * t;
-        let (says, port) = text_of("extra_delay");
-        let mut family = vec!["extra_delay".to_owned()];
+        let &Facts { name: effect, says, port, .. } = &extra_delay::FACTS;
+        let mut family = vec![effect.to_owned()];
         if value > 0.0 {
             family.extend(lags_like(bench, way, value, delay));
         }
         // Only a controller's replay tells a late log from a late machine.
         if d.replay.is_none() {
-            family.push("misalignment".into());
+            family.push(misalignment::FACTS.name.into());
         }
         let f = Finding {
-            effect: "extra_delay".into(),
+            effect: effect.into(),
             family,
             port,
             p_value: log_tail(fixed - delay, 1).min(0.0).exp().max(1e-300),

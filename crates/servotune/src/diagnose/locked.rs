@@ -15,8 +15,8 @@ use nalgebra::{DMatrix, DVector};
 /// Whether the strengths of effect `at`, which are each record's own, follow the motion; false where too few repeats tell.
 pub(super) fn follows_motion(bench: &Bench, model: &Model, at: usize) -> bool {
     let chosen = &model.chosen[at];
-    let facts = chosen.effect.facts();
-    if !facts.per_record || !chosen.effect.independent_of_motion() {
+    let facts = chosen.setting.facts();
+    if !facts.per_record || !chosen.effect().independent_of_motion() {
         return false;
     }
     let carrier = bench.form.carrier(&model.refitted.p).plant;
@@ -29,8 +29,8 @@ pub(super) fn follows_motion(bench: &Bench, model: &Model, at: usize) -> bool {
     let (mut within, mut repeats) = (0.0, 0);
     for (i, s) in segments.iter().enumerate() {
         let motion = &bench.trajectories[i];
-        let inner = &chosen.setting.inner;
-        let columns = white_columns(chosen.effect, inner, &bench.scene, motion, &sampled, &bench.whitener);
+        let law = &chosen.setting.law;
+        let columns = white_columns(law, &bench.scene, motion, &sampled, &bench.whitener);
         let mut basis = Basis::default();
         let free: Vec<Vec<f64>> = columns
             .into_iter()

@@ -2,8 +2,9 @@
 
 use super::finding::{Estimate, Finding, Where};
 use super::hygiene::{Replay, SampleFault};
-use super::name::{everywhere, plain, text_of};
+use super::name::{everywhere, plain};
 use super::run::Run;
+use crate::physics::{Facts, controller_mismatch, linear_parameters, lost_samples, misalignment};
 use std::collections::BTreeMap;
 
 /// The position log is shifted: the documented controller says by how much.
@@ -26,13 +27,13 @@ pub(super) fn early(shift_samples: f64, sample_time_s: f64, runs: &[&Run]) -> Fi
 
 /// The position log is off by so many samples, known to `off`.
 fn slipped(samples: f64, off: f64, sample_time_s: f64, why: &str, runs: &[&Run]) -> Finding {
-    let (says, port) = text_of("misalignment");
+    let &Facts { name: effect, says, port, .. } = &misalignment::FACTS;
     let shift = Estimate { value: samples, low: samples - off, high: samples + off, unit: "samples".into() };
     let parameters =
         BTreeMap::from([("samples".to_owned(), shift), ("shift_s".to_owned(), plain(samples * sample_time_s, "s"))]);
     Finding {
-        effect: "misalignment".into(),
-        family: vec!["misalignment".into()],
+        effect: effect.into(),
+        family: vec![effect.into()],
         port,
         p_value: 1e-300,
         says: format!("In the log {says}: {why}."),
@@ -62,8 +63,8 @@ pub(super) fn unit(factor: f64, runs: &[&Run]) -> Finding {
 /// The position is logged with a factor.
 fn scaled(sign: &str, why: &str, parameters: BTreeMap<String, Estimate>, runs: &[&Run]) -> Finding {
     Finding {
-        effect: "linear_parameters".into(),
-        family: vec!["linear_parameters".into()],
+        effect: linear_parameters::FACTS.name.into(),
+        family: vec![linear_parameters::FACTS.name.into()],
         port: crate::physics::Port::Time,
         p_value: 1e-300,
         says: format!("The position is logged {sign}: {why}."),
@@ -74,10 +75,10 @@ fn scaled(sign: &str, why: &str, parameters: BTreeMap<String, Estimate>, runs: &
 
 /// The command does not follow from the documented law.
 pub(super) fn controller_mismatch(r: &Replay, runs: &[&Run]) -> Finding {
-    let (says, port) = text_of("controller_mismatch");
+    let &Facts { name: effect, says, port, .. } = &controller_mismatch::FACTS;
     Finding {
-        effect: "controller_mismatch".into(),
-        family: vec!["controller_mismatch".into()],
+        effect: effect.into(),
+        family: vec![effect.into()],
         port,
         p_value: 1e-300,
         says: format!(
@@ -91,7 +92,7 @@ pub(super) fn controller_mismatch(r: &Replay, runs: &[&Run]) -> Finding {
 
 /// Samples are missing, doubled or stuck.
 pub(super) fn samples(faults: &[SampleFault]) -> Finding {
-    let (out_of_step, port) = text_of("lost_samples");
+    let &Facts { name: effect, says: out_of_step, port, .. } = &lost_samples::FACTS;
     let first = &faults[0];
     let (says, what) = match (first.stuck, first.samples > 0.0) {
         (true, _) => ("the position stands still in the log while the arm moves on", "samples"),
@@ -100,8 +101,8 @@ pub(super) fn samples(faults: &[SampleFault]) -> Finding {
     };
     let records: Vec<String> = faults.iter().map(|f| f.record.clone()).collect();
     Finding {
-        effect: "lost_samples".into(),
-        family: vec!["lost_samples".into()],
+        effect: effect.into(),
+        family: vec![effect.into()],
         port,
         p_value: 1e-300,
         says: format!("{says}: record {} at {:.6} s, {} {what}.", first.record, first.time_s, first.samples.abs()),

@@ -30,10 +30,10 @@ impl Model {
         let knobs = self.refitted.p.len();
         let mut from = knobs;
         self.chosen.iter().all(|c| {
-            let count = if c.effect.facts().fixed { 0 } else { c.setting.strengths.len() };
+            let count = if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
             let errors: Vec<f64> = (from..from + count).map(|i| self.refitted.spread(i)).collect();
             from += count;
-            c.effect.is_possible(&c.setting, &errors)
+            c.setting.is_possible(&errors)
         })
     }
 

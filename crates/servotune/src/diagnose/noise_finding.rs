@@ -6,10 +6,11 @@
 use super::bench::Bench;
 use super::chance::log_tail;
 use super::finding::{Estimate, Finding, FitFigures};
-use super::name::{everywhere, text_of};
+use super::name::everywhere;
 use super::rules::{NOISE_DEPARTED, NOISE_LARGER, NOISE_SLOPE, NOISE_WITH_SPEED};
 use super::run::Run;
 use super::unrest::Unrest;
+use crate::physics::{Facts, broadband_disturbance, encoder_noise, jitter, quantisation};
 use crate::recording::NominalNoise;
 
 /// Least error of a step, as a share of it: no scale is graduated better.
@@ -44,7 +45,7 @@ fn counted(bench: &Bench) -> Option<Finding> {
     let off = grid.off.max(GRADUATION * grid.step);
     let unit = bench.form.given.position_unit.clone();
     let step = Estimate { value: grid.step, low: grid.step - off, high: grid.step + off, unit };
-    Some(statistic("quantisation", vec![("step", step)], 1e-300, &fitted(bench)))
+    Some(statistic(&quantisation::FACTS, vec![("step", step)], 1e-300, &fitted(bench)))
 }
 
 /// Torque without a pattern, with level and corner.
@@ -56,7 +57,7 @@ fn wind(bench: &Bench, u: &Unrest) -> Finding {
     let corner = Estimate { value: u.corner_hz, low, high, unit: "Hz".into() };
     let p_value = (-0.5 * u.ahead).exp().max(1e-300);
     let mut f = statistic(
-        "broadband_disturbance",
+        &broadband_disturbance::FACTS,
         vec![("rms_command", level), ("corner_hz", corner)],
         p_value,
         &fitted(bench),
@@ -76,7 +77,8 @@ fn loud(bench: &Bench, stated: f64) -> Option<Finding> {
     let unit = bench.form.given.position_unit.clone();
     let rms = Estimate { value: level, low: level - off, high: level + off, unit };
     let gain = n as f64 * ((level / stated).powi(2) - 1.0 - 2.0 * (level / stated).ln());
-    let mut f = statistic("encoder_noise", vec![("rms", rms)], log_tail(gain, 1).exp().max(1e-300), &fitted(bench));
+    let mut f =
+        statistic(&encoder_noise::FACTS, vec![("rms", rms)], log_tail(gain, 1).exp().max(1e-300), &fitted(bench));
     f.says = format!("{} {:.2} times the stated level.", f.says.trim_end_matches('.').to_owned() + ":", level / stated);
     Some(f)
 }
@@ -119,13 +121,13 @@ fn faster(bench: &Bench) -> Option<Finding> {
     let off = 0.5 * 1.96 * seconds / z;
     let rms = Estimate { value: seconds, low: seconds - off, high: seconds + off, unit: "s".into() };
     let p_value = log_tail(z * z, 1).exp().max(1e-300);
-    let mut f = statistic("jitter", vec![("rms_s", rms)], p_value, &fitted(bench));
-    f.family.push("encoder_noise".into());
+    let mut f = statistic(&jitter::FACTS, vec![("rms_s", rms)], p_value, &fitted(bench));
+    f.family.push(encoder_noise::FACTS.name.into());
     Some(f)
 }
 
-fn statistic(name: &str, parameters: Vec<(&str, Estimate)>, p_value: f64, runs: &[&Run]) -> Finding {
-    let (says, port) = text_of(name);
+fn statistic(facts: &Facts, parameters: Vec<(&str, Estimate)>, p_value: f64, runs: &[&Run]) -> Finding {
+    let &Facts { name, says, port, .. } = facts;
     Finding {
         effect: name.into(),
         family: vec![name.into()],

@@ -1,4 +1,4 @@
-//! All linear parameters fitted to all fit records at once, with the strengths and inner parameters of the effects that
+//! All linear parameters fitted to all fit records at once, with the strengths and numbers of the effects that
 //! were chosen so far; by the whitened simulation error.
 
 use super::columns::{Drive, Entering, drive, entering};
@@ -10,7 +10,7 @@ use super::stack::{Basis, Segment};
 use super::trajectory::Trajectory;
 use crate::lti::Plant;
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
-use crate::physics::{Effect, Setting};
+use crate::physics::{AnyLaw, Setting};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -23,7 +23,7 @@ pub struct Refitted {
     pub plant: Plant,
     /// Sum of squares of the whitened error.
     pub cost: f64,
-    /// Errors of the linear parameters, then of the effects' strengths and inner parameters, in their order: directions that err
+    /// Errors of the linear parameters, then of the effects' strengths and numbers, in their order: directions that err
     /// independently, each by one standard deviation. The covariance is the sum of their squares d dᵀ.
     pub directions: Vec<Vec<f64>>,
     /// Whether the method met its tolerance.
@@ -44,20 +44,20 @@ impl Refitted {
 
 /// Step of the finite difference in a linear parameter: the answer is smooth and known to ten digits.
 const STEP: f64 = 1e-5;
-/// Relative step in an inner parameter: laws have kinks, and smaller steps see only them.
-const INNER_STEP: f64 = 1e-3;
+/// Relative step in a number of a law: laws have kinks, and smaller steps see only them.
+const NUMBER_STEP: f64 = 1e-3;
 
 struct Problem<'a, 'f> {
     fit: &'a Fit<'f>,
-    /// Directions of each record's own, those of the effects aside: they move with the inner parameters.
+    /// Directions of each record's own, those of the effects aside: they move with the numbers of the laws.
     local: Basis,
-    /// Inner parameters to refine: effect and place.
-    inner: Vec<(usize, usize)>,
+    /// Numbers to refine: effect and place.
+    numbers: Vec<(usize, usize)>,
     /// Strengths: effect and place.
     strengths: Vec<(usize, usize)>,
-    /// What each effect's law gives along every mean run, for the inner parameters it was last asked for: most of what a
+    /// What each effect's law gives along every mean run, for the numbers it was last asked for: most of what a
     /// refit asks for differs in other numbers.
-    drives: Vec<(Vec<f64>, Drive)>,
+    drives: Vec<Option<(AnyLaw, Drive)>>,
 }
 
 impl Problem<'_, '_> {
@@ -67,8 +67,9 @@ impl Problem<'_, '_> {
         for (v, &(e, i)) in x[p..].iter().zip(&self.strengths) {
             all[e].strengths[i] = *v;
         }
-        for (v, &(e, i)) in x[p + self.strengths.len()..].iter().zip(&self.inner) {
-            all[e].inner[i] = v.exp().copysign(all[e].inner[i]);
+        for (v, &(e, i)) in x[p + self.strengths.len()..].iter().zip(&self.numbers) {
+            let law = &mut all[e].law;
+            *law = law.with_number(i, v.exp().copysign(law.number(i).unwrap_or(1.0)));
         }
         all
     }
@@ -78,9 +79,10 @@ impl Problem<'_, '_> {
         let fit = self.fit;
         let settings = self.settings(x);
         self.drives.resize_with(settings.len(), Default::default);
-        for ((s, c), kept) in settings.into_iter().zip(&fit.chosen).zip(&mut self.drives) {
-            if kept.1.segments.is_empty() || kept.0 != s.inner {
-                *kept = (s.inner.clone(), drive(c.effect, &s.inner, fit.scene, fit.trajectories));
+        for (s, kept) in settings.into_iter().zip(&mut self.drives) {
+            if kept.as_ref().is_none_or(|(law, _)| *law != s.law) {
+                let made = drive(&s.law, fit.scene, fit.trajectories);
+                *kept = Some((s.law, made));
             }
         }
     }
@@ -93,10 +95,10 @@ impl Problem<'_, '_> {
             return runs.iter().map(|r| vec![f64::INFINITY; r.len()]).collect();
         };
         let settings = self.settings(x);
-        let drives: Vec<Cow<Drive>> = (fit.chosen.iter().zip(&settings).zip(&self.drives))
-            .map(|((c, s), (inner, kept))| match *inner == s.inner {
-                true => Cow::Borrowed(kept),
-                false => Cow::Owned(drive(c.effect, &s.inner, fit.scene, fit.trajectories)),
+        let drives: Vec<Cow<Drive>> = (settings.iter().zip(&self.drives))
+            .map(|(s, kept)| match kept {
+                Some((law, kept)) if *law == s.law => Cow::Borrowed(kept),
+                _ => Cow::Owned(drive(&s.law, fit.scene, fit.trajectories)),
             })
             .collect();
         let parts: Vec<(&Drive, &[f64])> =
@@ -120,8 +122,7 @@ impl Problem<'_, '_> {
 
     /// Every direction of each record's own.
     fn taken(&self, settings: &[Setting]) -> Cow<'_, Basis> {
-        let chosen: Vec<(&dyn Effect, &[f64])> =
-            self.fit.chosen.iter().zip(settings).map(|(c, s)| (c.effect as &dyn Effect, &s.inner[..])).collect();
+        let chosen: Vec<&AnyLaw> = settings.iter().map(|s| &s.law).collect();
         let mut basis = Cow::Borrowed(&self.local);
         for (start, column) in self.fit.free(&chosen) {
             basis.to_mut().add_local(start, column);
@@ -157,7 +158,7 @@ impl Residuals for Problem<'_, '_> {
     }
 
     fn cols(&self) -> usize {
-        self.fit.form.knobs.len() + self.strengths.len() + self.inner.len()
+        self.fit.form.knobs.len() + self.strengths.len() + self.numbers.len()
     }
 
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) {
@@ -171,10 +172,10 @@ impl Residuals for Problem<'_, '_> {
         let this = &*self;
         let settings = this.settings(x);
         let drives: Vec<(&Drive, &[f64])> =
-            this.drives.iter().zip(&settings).map(|(d, s)| (&d.1, &s.strengths[..])).collect();
+            this.drives.iter().flatten().zip(&settings).map(|(d, s)| (&d.1, &s.strengths[..])).collect();
         let slopes = Slopes::at(this.fit, &x[..p], &drives);
         let taken = this.taken(&settings);
-        let base = if this.inner.is_empty() { Vec::new() } else { this.error(x) };
+        let base = if this.numbers.is_empty() { Vec::new() } else { this.error(x) };
         j.par_chunks_exact_mut(this.rows()).enumerate().for_each(|(i, column)| {
             let raw = match (i.checked_sub(p), &slopes) {
                 (None, Some(slopes)) => slopes.knob(i, STEP),
@@ -182,9 +183,9 @@ impl Residuals for Problem<'_, '_> {
                 (_, None) => return,
                 (Some(_), _) => {
                     let mut moved = x.to_vec();
-                    moved[i] += INNER_STEP;
+                    moved[i] += NUMBER_STEP;
                     for ((c, a), b) in column.iter_mut().zip(this.error(&moved)).zip(&base) {
-                        *c = (a - b) / INNER_STEP;
+                        *c = (a - b) / NUMBER_STEP;
                     }
                     return;
                 }
@@ -200,7 +201,7 @@ impl Residuals for Problem<'_, '_> {
     fn limit(&self, i: usize) -> Limit {
         let p = self.fit.form.knobs.len();
         if i >= p + self.strengths.len() {
-            let (e, k) = self.inner[i - p - self.strengths.len()];
+            let (e, k) = self.numbers[i - p - self.strengths.len()];
             // A law far outside its range is another law.
             let [low, high] = self.fit.chosen[e].range[k];
             return Limit { low: low.ln(), high: high.ln(), step: 0.3 };
@@ -224,9 +225,9 @@ impl Residuals for Problem<'_, '_> {
 
 impl Fit<'_> {
     /// Whitened motions of their own that effects may begin a record in, with the first sample of each.
-    fn free(&self, effects: &[(&dyn Effect, &[f64])]) -> Vec<(usize, Vec<f64>)> {
+    fn free(&self, effects: &[&AnyLaw]) -> Vec<(usize, Vec<f64>)> {
         let of = |s: &Segment| {
-            let all = effects.iter().flat_map(|(e, inner)| e.free_motions(inner, self.scene, s.len));
+            let all = effects.iter().flat_map(|law| law.free_motions(self.scene, s.len));
             all.map(|mut c| {
                 self.whitener.apply(&mut c);
                 (s.start, c)
@@ -239,8 +240,7 @@ impl Fit<'_> {
     /// Directions of each record's own start, constant torque and lines, and of what the effects may begin it in.
     pub fn local_basis(&self) -> Basis {
         let mut basis = self.plain_basis();
-        let chosen: Vec<(&dyn Effect, &[f64])> =
-            self.chosen.iter().map(|c| (c.effect as &dyn Effect, &c.setting.inner[..])).collect();
+        let chosen: Vec<&AnyLaw> = self.chosen.iter().map(|c| &c.setting.law).collect();
         self.free(&chosen).into_iter().for_each(|(start, c)| basis.add_local(start, c));
         basis
     }
@@ -260,20 +260,25 @@ impl Fit<'_> {
 
     fn problem(&self) -> Problem<'_, '_> {
         let mut strengths = Vec::new();
-        let mut inner = Vec::new();
+        let mut numbers = Vec::new();
         for (e, c) in self.chosen.iter().enumerate() {
-            if !c.effect.facts().fixed {
+            if !c.setting.facts().fixed {
                 strengths.extend((0..c.setting.strengths.len()).map(|i| (e, i)));
             }
-            inner.extend((0..c.setting.inner.len()).filter(|&i| c.continuous[i]).map(|i| (e, i)));
+            numbers.extend((0..c.continuous.len()).filter(|&i| c.continuous[i]).map(|i| (e, i)));
         }
-        Problem { fit: self, local: self.plain_basis(), inner, strengths, drives: Vec::new() }
+        Problem { fit: self, local: self.plain_basis(), numbers, strengths, drives: Vec::new() }
     }
 
     fn start(&self, p: &[f64], problem: &Problem) -> Vec<f64> {
         let mut x = p.to_vec();
         x.extend(problem.strengths.iter().map(|&(e, i)| self.chosen[e].setting.strengths[i]));
-        x.extend(problem.inner.iter().map(|&(e, i)| self.chosen[e].setting.inner[i].abs().ln()));
+        x.extend(
+            problem
+                .numbers
+                .iter()
+                .map(|&(e, i)| self.chosen[e].setting.law.number(i).map_or(f64::NAN, |n| n.abs().ln())),
+        );
         x
     }
 

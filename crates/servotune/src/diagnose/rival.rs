@@ -18,8 +18,8 @@ use super::worth::begun;
 pub(super) fn more(bench: &Bench, law: &Chosen, than: &Chosen) -> f64 {
     let price = (bench.stack.total as f64).ln();
     let of = |c: &Chosen| {
-        let numbers = c.numbers() + begun(bench, &c.setting.inner, c.effect);
-        price * numbers as f64 - if c.effect.is_on_every_machine() { USUAL_LAW } else { 0.0 }
+        let numbers = c.numbers() + begun(bench, &c.setting.law);
+        price * numbers as f64 - if c.effect().is_on_every_machine() { USUAL_LAW } else { 0.0 }
     };
     of(law) - of(than)
 }
@@ -45,7 +45,7 @@ pub(super) fn by_simulation(
             }
             let Some(s) = simulated(bench, &r.model) else { continue };
             r.cost = model.cost + (s.cost - by_simulation.cost);
-            let facts = r.model.chosen[at].effect.facts();
+            let facts = r.model.chosen[at].setting.facts();
             let dearer = if facts.per_record { OWN_OF_RECORD * won } else { 0.0 };
             let ahead = by_simulation.cost - s.cost - dearer - more(bench, &s.chosen[at], &by_simulation.chosen[at]);
             if ahead > RIVAL_BETTER && r.model.possible() && best.as_ref().is_none_or(|b| ahead > b.0) {
@@ -54,7 +54,7 @@ pub(super) fn by_simulation(
         }
         if let Some((_, i, s)) = best {
             let other = rivals[at][i].model.clone();
-            let name = model.chosen[at].effect.facts().name;
+            let name = model.chosen[at].setting.facts().name;
             let old = std::mem::replace(model, other);
             // Along the recorded motion the old one may stay ahead; its family is told by simulation alone from here on.
             let cost = model.cost + (by_simulation.cost - s.cost);

@@ -13,14 +13,20 @@ use super::linear::Sampled;
 use super::stack::{Basis, Explained, Normal};
 use crate::lti::Plant;
 use crate::numeric::least_squares::dot;
-use crate::physics::{Effect, Entry, Setting};
+use crate::physics::{AnyLaw, Effect, Entry, Setting};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
-/// Magnitudes of each inner parameter on a grid, ascending, each once; none where all are whole, which are kinds and no measures.
-fn magnitudes(grid: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let count = grid.first().map_or(0, Vec::len);
+/// The numbers of each law of a grid, 0 where its form has one not.
+fn numbers(grid: &[AnyLaw]) -> Vec<Vec<f64>> {
+    grid.iter().map(|law| law.numbers().into_iter().map(|n| n.unwrap_or(0.0)).collect()).collect()
+}
+
+/// Magnitudes of each number over some points, ascending, each once; none where all are whole, which the search takes one by one.
+fn magnitudes(points: &[&Vec<f64>]) -> Vec<Vec<f64>> {
+    let count = points.first().map_or(0, |p| p.len());
     let measure = |i: usize| {
-        let mut values: Vec<f64> = grid.iter().map(|p| p[i].abs()).collect();
+        let mut values: Vec<f64> = points.iter().map(|p| p[i].abs()).collect();
         values.sort_by(f64::total_cmp);
         values.dedup();
         if values.iter().all(|v| v.fract() == 0.0) { Vec::new() } else { values }
@@ -28,57 +34,66 @@ fn magnitudes(grid: &[Vec<f64>]) -> Vec<Vec<f64>> {
     (0..count).map(measure).collect()
 }
 
-/// Fewest magnitudes of a parameter that is a grid's sweep: neighbours differ little in it. Of [`COARSE`] it is a measure still, but
+/// Fewest magnitudes of a number that is a grid's sweep: neighbours differ little in it. Of [`COARSE`] it is a measure still, but
 /// its neighbours lie far apart (a damping).
 const SWEPT: usize = 4;
 const COARSE: usize = 3;
 /// How far beyond its ends a coarse parameter may go.
 const BEYOND: f64 = 3.0;
 
-fn swept(grid: &[Vec<f64>]) -> Vec<bool> {
-    magnitudes(grid).iter().map(|m| m.len() >= SWEPT).collect()
-}
-
 /// Measures that are never 0: they may be refined, sign kept. A class that holds a swept one at one place does not know it.
-fn continuous(grid: &[Vec<f64>], class: &[usize]) -> Vec<bool> {
-    let known = |i: usize| class.iter().any(|&p| grid[p][i] != grid[class[0]][i]);
+fn continuous(grid: &[AnyLaw], class: &[usize]) -> Vec<bool> {
+    let points = numbers(grid);
+    let known = |i: usize| class.iter().any(|&p| points[p][i] != points[class[0]][i]);
     let free = |(i, m): (usize, &Vec<f64>)| m.len() >= COARSE && m[0] != 0.0 && (m.len() == COARSE || known(i));
-    magnitudes(grid).iter().enumerate().map(free).collect()
+    magnitudes(&of_member(grid, &points, class[0])).iter().enumerate().map(free).collect()
 }
 
 /// From the least to the greatest magnitude of each number: of a coarse one on the grid, of a swept one in its class.
-fn range(grid: &[Vec<f64>], class: &[usize]) -> Vec<[f64; 2]> {
+fn range(grid: &[AnyLaw], class: &[usize]) -> Vec<[f64; 2]> {
+    let points = numbers(grid);
     let wide = |(i, m): (usize, &Vec<f64>)| {
         if m.len() == COARSE {
             return [m[0] / BEYOND, m[COARSE - 1] * BEYOND];
         }
-        let own = class.iter().map(|&p| grid[p][i].abs());
+        let own = class.iter().map(|&p| points[p][i].abs());
         own.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
     };
-    magnitudes(grid).iter().enumerate().map(wide).collect()
+    magnitudes(&of_member(grid, &points, class[0])).iter().enumerate().map(wide).collect()
 }
 
-/// Points that differ in swept parameters only, signs kept; in the order of these.
-fn classes(grid: &[Vec<f64>]) -> Vec<Vec<usize>> {
-    let free = swept(grid);
+/// The points of a grid that are the same thing as point `at`: of the same mode, of the same shape.
+fn of_member<'a>(grid: &[AnyLaw], points: &'a [Vec<f64>], at: usize) -> Vec<&'a Vec<f64>> {
+    let own = grid[at].member();
+    grid.iter().zip(points).filter(|(law, _)| law.member() == own).map(|(_, p)| p).collect()
+}
+
+/// Points that differ in swept numbers only, signs and discrete choices kept; in the order of these.
+fn classes(grid: &[AnyLaw]) -> Vec<Vec<usize>> {
+    let points = numbers(grid);
+    let mut swept: BTreeMap<usize, Vec<bool>> = BTreeMap::new();
     let mut all: Vec<Vec<usize>> = Vec::new();
-    let same = |a: &[f64], b: &[f64]| (0..a.len()).all(|i| a[i] == b[i] || (free[i] && (a[i] < 0.0) == (b[i] < 0.0)));
-    for (i, point) in grid.iter().enumerate() {
-        match all.iter_mut().find(|c| same(&grid[c[0]], point)) {
+    for (i, law) in grid.iter().enumerate() {
+        let of = || magnitudes(&of_member(grid, &points, i)).iter().map(|m| m.len() >= SWEPT).collect();
+        let free = swept.entry(law.member()).or_insert_with(of);
+        let same =
+            |a: &[f64], b: &[f64]| (0..a.len()).all(|i| a[i] == b[i] || (free[i] && (a[i] < 0.0) == (b[i] < 0.0)));
+        match all.iter_mut().find(|c| grid[c[0]].same_class(law) && same(&points[c[0]], &points[i])) {
             Some(c) => c.push(i),
             None => all.push(vec![i]),
         }
     }
-    let along = |i: usize| free.iter().zip(&grid[i]).filter(|(f, _)| **f).map(|(_, v)| *v);
     for class in &mut all {
+        let free = &swept[&grid[class[0]].member()];
+        let along = |i: usize| free.iter().zip(&points[i]).filter(|(f, _)| **f).map(|(_, v)| *v);
         class.sort_by(|&a, &b| along(a).partial_cmp(along(b)).unwrap_or(std::cmp::Ordering::Equal));
     }
     all
 }
 
-/// Which inner numbers of a point of a grid may be refined, and their ranges.
-pub(super) fn freedom(grid: &[Vec<f64>], inner: &[f64]) -> (Vec<bool>, Vec<[f64; 2]>) {
-    let own = classes(grid).into_iter().find(|class| class.iter().any(|&i| grid[i] == inner));
+/// Which numbers of a point of a grid may be refined, and their ranges.
+pub(super) fn freedom(grid: &[AnyLaw], law: &AnyLaw) -> (Vec<bool>, Vec<[f64; 2]>) {
+    let own = classes(grid).into_iter().find(|class| class.iter().any(|&i| grid[i] == *law));
     own.map_or_else(Default::default, |class| (continuous(grid, &class), range(grid, &class)))
 }
 
@@ -139,20 +154,19 @@ impl<'a, 'f> Ground<'a, 'f> {
     }
 
     /// What an effect shows in what repeats differ by.
-    fn difference(&self, effect: &dyn Effect, inner: &[f64]) -> Option<Difference> {
+    fn difference(&self, law: &AnyLaw) -> Option<Difference> {
         self.repeats
-            .filter(|_| effect.is_hard_nonlinearity())
-            .map(|bench| Difference::of(bench, &self.sampled, effect, inner))
+            .filter(|_| law.effect().is_hard_nonlinearity())
+            .map(|bench| Difference::of(bench, &self.sampled, law))
     }
 
     /// The normal equations of an effect at one point.
-    fn normal(&self, effect: &'static dyn Effect, inner: &[f64]) -> Normal {
-        let facts = effect.facts();
+    fn normal(&self, law: &AnyLaw) -> Normal {
+        let facts = law.facts();
         let fit = self.fit;
         let segments = &fit.stack.segments;
         let whole = |i: usize| {
-            let mut columns =
-                white_columns(effect, inner, fit.scene, &fit.trajectories[i], &self.sampled, fit.whitener);
+            let mut columns = white_columns(law, fit.scene, &fit.trajectories[i], &self.sampled, fit.whitener);
             let weight = segments[i].weight;
             columns.iter_mut().flatten().for_each(|v| *v *= weight);
             columns
@@ -172,15 +186,15 @@ impl<'a, 'f> Ground<'a, 'f> {
             spans = vec![[0, fit.stack.total]; facts.columns];
         }
         let mut normal = Normal::of(&self.basis, &self.error, &columns, &spans);
-        if let Some(difference) = self.difference(effect, inner) {
+        if let Some(difference) = self.difference(law) {
             normal.add(&difference);
         }
         normal
     }
 
     /// Its right-hand side alone.
-    fn right(&self, effect: &'static dyn Effect, inner: &[f64]) -> Vec<f64> {
-        let facts = effect.facts();
+    fn right(&self, law: &AnyLaw) -> Vec<f64> {
+        let facts = law.facts();
         let fit = self.fit;
         let seen = match facts.entry {
             Entry::Command => &self.seen[0],
@@ -189,7 +203,7 @@ impl<'a, 'f> Ground<'a, 'f> {
         };
         let mut out = vec![0.0; if facts.per_record { 0 } else { facts.columns }];
         for (s, trajectory) in fit.stack.segments.iter().zip(fit.trajectories) {
-            let raw = raw_columns(effect, inner, fit.scene, trajectory);
+            let raw = raw_columns(law, fit.scene, trajectory);
             let each = raw.iter().map(|c| dot(c, &seen[s.start..s.start + s.len]));
             if facts.per_record {
                 out.extend(each);
@@ -197,26 +211,25 @@ impl<'a, 'f> Ground<'a, 'f> {
                 out.iter_mut().zip(each).for_each(|(o, v)| *o += v);
             }
         }
-        if let Some(difference) = self.difference(effect, inner) {
+        if let Some(difference) = self.difference(law) {
             out[0] += difference.along;
         }
         out
     }
 
     /// How well an effect does at one point.
-    fn explain(&self, effect: &'static dyn Effect, inner: &[f64]) -> Explained {
-        self.normal(effect, inner).explained(effect.facts().fixed)
+    fn explain(&self, law: &AnyLaw) -> Explained {
+        self.normal(law).explained(law.facts().fixed)
     }
 
-    /// The best point of every effect, one candidate for each combination of its discrete inner parameters, the strongest of them refined.
+    /// The best point of every effect, one candidate for each combination of its discrete choices, the strongest of them refined.
     pub fn best(&self, effects: &[&'static dyn Effect]) -> Vec<Candidate> {
         let mut classes = self.scan(effects);
         classes.par_iter_mut().take(REFINED).for_each(|peaks| {
             peaks.par_iter_mut().for_each(|c| {
                 self.refine(c);
-                if let Some(inner) = c.effect.equivalent(&c.setting).filter(|_| !c.effect.is_possible(&c.setting, &[]))
-                {
-                    self.put(c, inner);
+                if let Some(law) = c.setting.law.equivalent().filter(|_| !c.setting.is_possible(&[])) {
+                    self.put(c, law);
                     self.refine(c);
                 }
             });
@@ -230,8 +243,8 @@ impl<'a, 'f> Ground<'a, 'f> {
         let mut all: Vec<Vec<Candidate>> = effects
             .par_iter()
             .flat_map(|e| {
-                let grid = e.scan_points(self.fit.scene);
-                classes(&grid).into_par_iter().map(move |class| self.peaks(*e, &grid, &class))
+                let grid = e.grid(self.fit.scene);
+                classes(&grid).into_par_iter().map(move |class| self.peaks(&grid, &class))
             })
             .collect();
         all.retain(|peaks| !peaks.is_empty());
@@ -240,14 +253,14 @@ impl<'a, 'f> Ground<'a, 'f> {
     }
 
     /// The strongest points of a class, none beside another; none where none can be worked out.
-    fn peaks(&self, effect: &'static dyn Effect, grid: &[Vec<f64>], class: &[usize]) -> Vec<Candidate> {
-        let fixed = effect.facts().fixed;
+    fn peaks(&self, grid: &[AnyLaw], class: &[usize]) -> Vec<Candidate> {
+        let fixed = grid[class[0]].facts().fixed;
         let last = class.len() - 1;
         // Near the ends points lie farther apart: the longest waves, the lowest frequencies.
         let ends =
             |i: &usize| i.is_multiple_of(STRIDE) || (i.min(&(last - i)) < &STRIDE && (last - i).is_multiple_of(FIRST));
         let anchors: Vec<usize> = (0..=last).filter(|i| last < STRIDE || *i == last || ends(i)).collect();
-        let known: Vec<Normal> = anchors.par_iter().map(|&i| self.normal(effect, &grid[class[i]])).collect();
+        let known: Vec<Normal> = anchors.par_iter().map(|&i| self.normal(&grid[class[i]])).collect();
         let worth: Vec<f64> = (0..=last)
             .into_par_iter()
             .map(|i| {
@@ -257,7 +270,7 @@ impl<'a, 'f> Ground<'a, 'f> {
                 }
                 let (low, high) = (anchors[next - 1], anchors[next]);
                 let share = (i - low) as f64 / (high - low) as f64;
-                let right = self.right(effect, &grid[class[i]]);
+                let right = self.right(&grid[class[i]]);
                 Normal::between(&known[next - 1], &known[next], share, right).guessed(fixed)
             })
             .collect();
@@ -266,8 +279,7 @@ impl<'a, 'f> Ground<'a, 'f> {
         let mut looked: Vec<usize> = (0..=last).filter(|i| !anchors.contains(i)).collect();
         looked.sort_by(|&a, &b| top(b).cmp(&top(a)).then(worth[b].total_cmp(&worth[a])));
         looked.truncate(PROMISING + last / MORE);
-        let promising: Vec<(usize, Normal)> =
-            looked.par_iter().map(|&i| (i, self.normal(effect, &grid[class[i]]))).collect();
+        let promising: Vec<(usize, Normal)> = looked.par_iter().map(|&i| (i, self.normal(&grid[class[i]]))).collect();
         let all = anchors.into_iter().zip(known).chain(promising).map(|(i, normal)| (i, normal.explained(fixed)));
         let mut all: Vec<(usize, Explained)> = all.filter(|(_, s)| s.gain.is_finite()).collect();
         // The sort is stable: of equals the order of their making stands.
@@ -277,12 +289,11 @@ impl<'a, 'f> Ground<'a, 'f> {
             let rises = peaks.first().is_none_or(|(_, best)| s.gain > RISES * best.gain);
             if peaks.len() < PEAKS && rises && peaks.iter().all(|(at, _)| i.abs_diff(*at) > BESIDE) {
                 let candidate = Candidate {
-                    effect,
                     gain: s.gain,
                     concealed: s.concealed,
                     points: grid.len(),
                     strengths: if fixed { 1 } else { s.strengths.len() },
-                    setting: Setting { inner: grid[class[i]].clone(), strengths: s.strengths },
+                    setting: Setting { law: grid[class[i]].clone(), strengths: s.strengths },
                     continuous: continuous(grid, class),
                     range: range(grid, class),
                 };
@@ -292,39 +303,40 @@ impl<'a, 'f> Ground<'a, 'f> {
         peaks.into_iter().map(|(_, c)| c).collect()
     }
 
-    /// Puts a candidate at other inner numbers.
-    fn put(&self, candidate: &mut Candidate, inner: Vec<f64>) {
-        let s = self.explain(candidate.effect, &inner);
+    /// Puts a candidate at other numbers.
+    fn put(&self, candidate: &mut Candidate, law: AnyLaw) {
+        let s = self.explain(&law);
         candidate.gain = s.gain;
         candidate.concealed = s.concealed;
-        candidate.setting = Setting { inner, strengths: s.strengths };
+        candidate.setting = Setting { law, strengths: s.strengths };
     }
 
-    /// Moves the continuous inner parameters of a candidate to where it explains most: one at a time, by steps that shrink.
+    /// Moves the continuous numbers of a candidate to where it explains most: one at a time, by steps that shrink.
     fn refine(&self, candidate: &mut Candidate) {
         let mut step: Vec<f64> = candidate.continuous.iter().map(|&c| if c { 0.1 } else { 0.0 }).collect();
         for _ in 0..10 {
             let mut moved = false;
-            for i in 0..step.len() {
-                if step[i] < 1e-4 {
+            for (i, step) in step.iter_mut().enumerate() {
+                if *step < 1e-4 {
                     continue;
                 }
                 let mut better = false;
                 for way in [1.0, -1.0] {
-                    let mut inner = candidate.setting.inner.clone();
+                    let Some(number) = candidate.setting.law.number(i) else { continue };
                     let [low, high] = candidate.range[i];
-                    inner[i] = (inner[i].abs() * (way * step[i]).exp()).clamp(low, high).copysign(inner[i]);
-                    let s = self.explain(candidate.effect, &inner);
+                    let moved = (number.abs() * (way * *step).exp()).clamp(low, high).copysign(number);
+                    let law = candidate.setting.law.with_number(i, moved);
+                    let s = self.explain(&law);
                     if s.gain > candidate.gain {
                         candidate.gain = s.gain;
                         candidate.concealed = s.concealed;
-                        candidate.setting = Setting { inner, strengths: s.strengths };
+                        candidate.setting = Setting { law, strengths: s.strengths };
                         better = true;
                         break;
                     }
                 }
                 if !better {
-                    step[i] *= 0.4;
+                    *step *= 0.4;
                 }
                 moved = true;
             }

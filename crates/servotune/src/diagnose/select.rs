@@ -106,7 +106,7 @@ impl Search<'_> {
         let worth = Worth { bench, laws: self.library.len(), settings, model, felt: *felt };
         for i in worth.of(step) {
             let c = &step.candidates[i];
-            progress(&format!("refit with {}", c.effect.facts().name));
+            progress(&format!("refit with {}", c.setting.facts().name));
             let mut chosen = model.chosen.clone();
             chosen.push(c.chosen(self.steps.len()));
             if *felt {
@@ -129,8 +129,8 @@ impl Search<'_> {
         let (i, tried) = &step.tried[t];
         let c = &step.candidates[*i];
         let price = (self.bench.stack.total as f64).ln();
-        let begun = begun(self.bench, &c.setting.inner, c.effect);
-        let own = c.effect.facts().per_record || begun > 0;
+        let begun = begun(self.bench, &c.setting.law);
+        let own = c.setting.facts().per_record || begun > 0;
         let dearer = if own { OWN_OF_RECORD * (self.model.evidence - tried.evidence).max(0.0) } else { 0.0 };
         tried.evidence + price * (numbers(c) + begun as f64) + dearer
     }
@@ -145,7 +145,7 @@ impl Search<'_> {
             gain = gain.min(taken_by_last(bench, next, settings.iterations));
         }
         let explained = (self.baseline.evidence - model.evidence).max(0.0);
-        let dragged = model.chosen.iter().any(|c| c.effect.is_drag());
+        let dragged = model.chosen.iter().any(|c| c.effect().is_drag());
         let share = if dragged && gain < BESIDE_DRAG * explained { REST_BESIDE_DRAG } else { settings.share };
         let asked = share * (model.excess() - 2.0 * model.sigma).max(0.0);
         let minor = ADDS.get(model.chosen.len()).copied().unwrap_or(0.0) * explained;
@@ -155,7 +155,7 @@ impl Search<'_> {
     /// Logarithm of the chance that noise alone gives a candidate this gain.
     fn chance(&self, c: &Candidate, gain: f64) -> f64 {
         let laws = self.library.len();
-        let free = c.strengths.max(1) + begun(self.bench, &c.setting.inner, c.effect);
+        let free = c.strengths.max(1) + begun(self.bench, &c.setting.law);
         let log_p = log_tail(gain, free) + (c.points.max(1) as f64).ln() + (laws as f64).ln();
         log_p.max(hums(self.bench, c, gain, laws))
     }

@@ -27,7 +27,7 @@ pub(super) fn prune(bench: &Bench, model: &mut Model, before: f64, iterations: u
         let all: Vec<Model> = (0..model.chosen.len()).map(without).collect();
         let Some((i, best)) = all.into_iter().enumerate().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost)) else { return };
         let c = &model.chosen[i];
-        let numbers = (c.setting.strengths.len() + c.setting.inner.len()) as f64;
+        let numbers = (c.setting.strengths.len() + c.setting.law.size()) as f64;
         if best.cost - model.cost > (price * numbers).max(SECOND_ADDS * (before - best.cost)) {
             return;
         }
@@ -46,7 +46,7 @@ pub(super) fn spare(
     before: f64,
     iterations: usize,
 ) {
-    let drag = |c: &Chosen| c.effect.is_drag();
+    let drag = |c: &Chosen| c.effect().is_drag();
     let most = model.chosen.iter().map(|c| gain_of(steps, c)).fold(0.0, f64::max);
     let small = |c: &Chosen| gain_of(steps, c) < SMALL_BESIDE_DRAG * most;
     let price = (bench.stack.total as f64).ln();
@@ -62,7 +62,7 @@ pub(super) fn spare(
         }
         let Some((at, less, s)) = without.into_iter().min_by(|a, b| a.2.cost.total_cmp(&b.2.cost)) else { return };
         let c = &model.chosen[at];
-        let numbers = (c.setting.strengths.len() + c.setting.inner.len()) as f64;
+        let numbers = (c.setting.strengths.len() + c.setting.law.size()) as f64;
         if s.cost - by_simulation.cost > (price * numbers).max(SECOND_ADDS * (before - s.cost)) {
             return;
         }
@@ -74,10 +74,9 @@ pub(super) fn spare(
 /// Most forms of one law that are tried in the place of another.
 const FORMS: usize = 2;
 
-/// What tells two forms of one law apart: how many numbers they have, and the kind that the first inner one names.
-fn form(c: &Chosen) -> (&'static str, usize, u64) {
-    let kind = c.setting.inner.first().filter(|v| v.fract() == 0.0).map_or(0, |v| v.to_bits());
-    (c.effect.facts().name, c.numbers(), kind)
+/// What tells two forms of one law apart: how many numbers they have, and which of several things they are.
+fn form(c: &Chosen) -> (&'static str, usize, usize) {
+    (c.setting.facts().name, c.numbers(), c.setting.law.member())
 }
 
 /// Laws that may stand in the place of effect `at`, simpler forms of its own first: those that came near it in its own step, and where
@@ -85,15 +84,15 @@ fn form(c: &Chosen) -> (&'static str, usize, u64) {
 fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, iterations: usize) -> Vec<Chosen> {
     let near = if bench.levels.from_repeats { RIVAL_TRIED } else { RIVAL_TRIED_WITHOUT_REPEATS };
     let own = &model.chosen[at];
-    let facts = own.effect.facts();
+    let facts = own.setting.facts();
     let in_place = |c: &Chosen| Chosen { step: own.step, ..c.clone() };
     let close = step.tried.iter().filter(|(_, tried)| step.before - tried.evidence >= near * gain);
     let mut all: Vec<Chosen> = close.filter_map(|(_, tried)| tried.chosen.last()).map(in_place).collect();
-    let mut company = model.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| c.effect.facts().name);
+    let mut company = model.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| c.setting.facts().name);
     let before = step.tried.first().and_then(|(_, t)| t.chosen.split_last()).map_or(&[][..], |(_, rest)| rest);
     // Whether the step in which it was taken had the same others beside it.
     let known =
-        before.len() + 1 == model.chosen.len() && company.all(|n| before.iter().any(|c| c.effect.facts().name == n));
+        before.len() + 1 == model.chosen.len() && company.all(|n| before.iter().any(|c| c.setting.facts().name == n));
     if !known {
         let alike = |e: &&'static dyn Effect| {
             let f = e.facts();
@@ -105,22 +104,22 @@ fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, itera
         let without = fitted(bench, chosen, &model.refitted.p, iterations);
         let seen = scan_at(bench, &alike, &without, &without.refitted.p);
         let close = seen.iter().filter(|c| c.gain >= near * (without.cost - model.cost));
-        let possible = close.filter(|c| c.effect.is_possible(&c.setting, &[]));
+        let possible = close.filter(|c| c.setting.is_possible(&[]));
         let mut afresh: Vec<(f64, Chosen)> = possible.map(|c| (c.gain, c.chosen(own.step))).collect();
         afresh.sort_by(|a, b| b.0.total_cmp(&a.0));
         for (_, c) in afresh {
-            let forms = all.iter().filter(|o| o.effect.facts().name == c.effect.facts().name).count();
+            let forms = all.iter().filter(|o| o.setting.facts().name == c.setting.facts().name).count();
             if forms < FORMS && all.iter().all(|o| form(o) != form(&c)) {
                 all.push(c);
             }
         }
     }
-    let stays = |c: &Chosen| match c.effect.facts().name {
+    let stays = |c: &Chosen| match c.setting.facts().name {
         name if name == facts.name => form(c) != form(own),
-        name => model.chosen.iter().all(|m| m.effect.facts().name != name),
+        name => model.chosen.iter().all(|m| m.setting.facts().name != name),
     };
     all.retain(stays);
-    all.sort_by_key(|c| c.effect.facts().name != facts.name);
+    all.sort_by_key(|c| c.setting.facts().name != facts.name);
     all
 }
 
@@ -132,8 +131,8 @@ pub(super) fn exchange(bench: &Bench, model: &mut Model, steps: &[Step], iterati
         let gain = gain_of(steps, &model.chosen[at]);
         let mut found: Vec<Rival> = Vec::new();
         for law in others(bench, model, at, step, gain, iterations) {
-            let (facts, own) = (law.effect.facts(), model.chosen[at].effect.facts().name);
-            let each = facts.per_record || begun(bench, &law.setting.inner, law.effect) > 0;
+            let (facts, own) = (law.setting.facts(), model.chosen[at].setting.facts().name);
+            let each = facts.per_record || begun(bench, &law.setting.law) > 0;
             let mut chosen = model.chosen.clone();
             chosen[at] = law;
             let other = fitted_from_both(bench, &chosen, &model.refitted.p, iterations);

@@ -96,7 +96,7 @@ fn descended(bench: &Bench, model: &Model) -> Option<Model> {
     }
     let x = best;
     let (p, chosen) = problem.unpack(&x);
-    if !chosen.iter().all(|c| c.effect.is_possible(&c.setting, &[])) {
+    if !chosen.iter().all(|c| c.setting.is_possible(&[])) {
         return None;
     }
     // The errors of what was not moved stay those of the search.
@@ -113,14 +113,14 @@ fn descended(bench: &Bench, model: &Model) -> Option<Model> {
     Some(Model { chosen, refitted, cost, ..model.clone() })
 }
 
-/// The model with those inner numbers free that the search takes in steps; they err in no direction yet.
+/// The model with those numbers free that the search takes in steps; they err in no direction yet.
 fn with_late_numbers(model: &Model) -> Model {
     let mut open = model.clone();
-    let strengths = model.chosen.iter().filter(|c| !c.effect.facts().fixed).map(|c| c.setting.strengths.len());
+    let strengths = model.chosen.iter().filter(|c| !c.setting.facts().fixed).map(|c| c.setting.strengths.len());
     let mut at = model.refitted.p.len() + strengths.sum::<usize>();
     for c in &mut open.chosen {
-        let late = c.effect.measured_in_last_fit(&c.setting.inner);
-        for i in 0..c.setting.inner.len() {
+        let late = c.setting.law.measured_in_last_fit();
+        for i in 0..c.continuous.len() {
             if let Some((_, range)) = late.iter().find(|(place, _)| *place == i && !c.continuous[i]) {
                 (c.continuous[i], c.range[i]) = (true, *range);
                 open.refitted.directions.iter_mut().for_each(|d| d.insert(at, 0.0));

@@ -15,22 +15,21 @@ use super::run::Run;
 use super::stack::{Basis, Segment};
 use crate::controller::Law;
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
-use crate::physics::Effect;
 use rayon::prelude::*;
 
 /// Rounds in which a start is found.
 const ROUNDS: usize = 2;
 /// Step in a linear parameter.
 const STEP: f64 = 1e-4;
-/// Relative steps in strengths and inner parameters: laws have kinks, and smaller steps see only them.
+/// Relative steps in strengths and numbers: laws have kinks, and smaller steps see only them.
 const STRENGTH_STEP: f64 = 2e-3;
-const INNER_STEP: f64 = 5e-3;
+const NUMBER_STEP: f64 = 5e-3;
 
-/// What is moved: places in the linear parameters, then strengths and inner parameters by effect and place.
+/// What is moved: places in the linear parameters, then strengths and numbers by effect and place.
 pub(super) struct Free {
     pub knobs: Vec<usize>,
     pub strengths: Vec<[usize; 2]>,
-    pub inner: Vec<[usize; 2]>,
+    pub numbers: Vec<[usize; 2]>,
 }
 
 /// The error that is made small.
@@ -75,20 +74,24 @@ impl Problem<'_> {
         let m = self.model;
         let knobs = self.free.knobs.iter().map(|&i| m.refitted.p[i]);
         let strengths = self.free.strengths.iter().map(|&[e, i]| m.chosen[e].setting.strengths[i]);
-        let inner = self.free.inner.iter().map(|&[e, i]| m.chosen[e].setting.inner[i].abs().ln());
-        knobs.chain(strengths).chain(inner).collect()
+        let numbers = self
+            .free
+            .numbers
+            .iter()
+            .map(|&[e, i]| m.chosen[e].setting.law.number(i).map_or(f64::NAN, |n| n.abs().ln()));
+        knobs.chain(strengths).chain(numbers).collect()
     }
 
     /// Linear parameters and effects of these numbers.
     pub fn unpack(&self, x: &[f64]) -> (Vec<f64>, Vec<Chosen>) {
         let (mut p, mut chosen) = (self.model.refitted.p.clone(), self.model.chosen.clone());
         let (knobs, rest) = x.split_at(self.free.knobs.len());
-        let (strengths, inner) = rest.split_at(self.free.strengths.len());
+        let (strengths, numbers) = rest.split_at(self.free.strengths.len());
         self.free.knobs.iter().zip(knobs).for_each(|(&i, v)| p[i] = *v);
         self.free.strengths.iter().zip(strengths).for_each(|(&[e, i], v)| chosen[e].setting.strengths[i] = *v);
-        for (&[e, i], v) in self.free.inner.iter().zip(inner) {
-            let slot = &mut chosen[e].setting.inner[i];
-            *slot = v.exp().copysign(*slot);
+        for (&[e, i], v) in self.free.numbers.iter().zip(numbers) {
+            let law = &mut chosen[e].setting.law;
+            *law = law.with_number(i, v.exp().copysign(law.number(i).unwrap_or(1.0)));
         }
         (p, chosen)
     }
@@ -117,11 +120,11 @@ impl Problem<'_> {
         let bench = self.bench;
         let (p, chosen) = self.unpack(x);
         let made = corrected(&bench.form, &p, &chosen, &bench.scene);
-        let own = chosen.iter().filter(|c| c.effect.facts().per_record);
+        let own = chosen.iter().filter(|c| c.setting.facts().per_record);
         let judged = Judged {
             plant: &made.plant,
-            effects: made.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect(),
-            own: own.map(|c| (c.effect as &dyn Effect, &c.setting.inner[..])).collect(),
+            effects: made.effects.iter().collect(),
+            own: own.map(|c| &c.setting.law).collect(),
             lines: self.lines(),
             fit: None,
             scene: &bench.scene,
@@ -194,7 +197,7 @@ impl Problem<'_> {
         match i {
             i if i < knobs => STEP,
             i if i < knobs + strengths => STRENGTH_STEP * x.abs().max(1e-12),
-            _ => INNER_STEP,
+            _ => NUMBER_STEP,
         }
     }
 }
@@ -205,7 +208,7 @@ impl Residuals for Problem<'_> {
     }
 
     fn cols(&self) -> usize {
-        self.free.knobs.len() + self.free.strengths.len() + self.free.inner.len()
+        self.free.knobs.len() + self.free.strengths.len() + self.free.numbers.len()
     }
 
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) {
@@ -235,11 +238,11 @@ impl Residuals for Problem<'_> {
             let step = if i < knobs { 0.3 } else { f64::INFINITY };
             return Limit { low: f64::NEG_INFINITY, high: f64::INFINITY, step };
         }
-        let [e, k] = self.free.inner[i - knobs - strengths];
+        let [e, k] = self.free.numbers[i - knobs - strengths];
         let c = &self.model.chosen[e];
         let [low, high] = c.range[k];
         // Along a noisy motion a dry drag needs a length that the noise does not cover; simulated it may be as dry as it is.
-        let (low, step) = c.effect.finer_simulated(k).map_or((low, 0.3), |share| (share * low, 0.8));
+        let (low, step) = c.effect().finer_simulated(k).map_or((low, 0.3), |share| (share * low, 0.8));
         Limit { low: low.ln(), high: high.ln(), step }
     }
 }
@@ -299,37 +302,42 @@ impl<'a> Record<'a> {
 impl Free {
     fn of(bench: &Bench, model: &Model, moves: impl Fn(&Knob) -> bool) -> Free {
         let knobs: Vec<usize> = (0..bench.form.knobs.len()).filter(|&i| moves(&bench.form.knobs[i])).collect();
-        let (mut strengths, mut inner) = (Vec::new(), Vec::new());
+        let (mut strengths, mut numbers) = (Vec::new(), Vec::new());
         for (e, c) in model.chosen.iter().enumerate() {
-            let facts = c.effect.facts();
+            let facts = c.setting.facts();
             if !facts.fixed && !facts.per_record {
                 // A strength of exactly 0 belongs to a term that this form of the law has not.
                 let there = (0..c.setting.strengths.len()).filter(|&i| c.setting.strengths[i] != 0.0);
                 strengths.extend(there.map(|i| [e, i]));
             }
             if !facts.per_record {
-                inner.extend((0..c.setting.inner.len()).filter(|&i| c.continuous[i]).map(|i| [e, i]));
+                numbers.extend((0..c.continuous.len()).filter(|&i| c.continuous[i]).map(|i| [e, i]));
             }
         }
-        Free { knobs, strengths, inner }
+        Free { knobs, strengths, numbers }
     }
 }
 
-/// Where each number that was moved stands among all numbers of a fit: linear parameters, strengths, inner parameters.
+/// Where each number that was moved stands among all numbers of a fit: linear parameters, strengths, numbers parameters.
 pub(super) fn places(free: &Free, model: &Model) -> Vec<usize> {
     let strengths = |e: usize| {
         let c = &model.chosen[e];
-        if c.effect.facts().fixed { 0 } else { c.setting.strengths.len() }
+        if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() }
     };
     let knobs = model.refitted.p.len();
     let all: usize = (0..model.chosen.len()).map(strengths).sum();
     let strength = |&[e, i]: &[usize; 2]| knobs + (0..e).map(strengths).sum::<usize>() + i;
     let moving = |e: usize, to: usize| model.chosen[e].continuous[..to].iter().filter(|c| **c).count();
-    let inner = |&[e, i]: &[usize; 2]| {
+    let numbers = |&[e, i]: &[usize; 2]| {
         let before: usize = (0..e).map(|e| moving(e, model.chosen[e].continuous.len())).sum();
         knobs + all + before + moving(e, i)
     };
-    free.knobs.iter().copied().chain(free.strengths.iter().map(strength)).chain(free.inner.iter().map(inner)).collect()
+    free.knobs
+        .iter()
+        .copied()
+        .chain(free.strengths.iter().map(strength))
+        .chain(free.numbers.iter().map(numbers))
+        .collect()
 }
 
 /// Jacobians of a fit by the plain error, and the relative fall at which it ends.
@@ -348,7 +356,7 @@ pub(super) fn descended(bench: &Bench, model: &Model, law: Option<&Law>, runs: &
     minimise(&mut problem, &mut x, &settings, &mut Workspace::default());
     let after = size(&problem.settle(&x));
     let (p, chosen) = problem.unpack(&x);
-    let possible = after < before && chosen.iter().all(|c| c.effect.is_possible(&c.setting, &[]));
+    let possible = after < before && chosen.iter().all(|c| c.setting.is_possible(&[]));
     let mut moved = model.clone();
     if possible {
         (moved.refitted.plant, moved.refitted.p, moved.chosen) = (bench.form.plant(&p), p, chosen);

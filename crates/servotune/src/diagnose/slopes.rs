@@ -129,7 +129,10 @@ mod tests {
     use crate::diagnose::columns::drive;
     use crate::diagnose::run::Run;
     use crate::numeric::random::Random;
-    use crate::physics::{Setting, effect};
+    use crate::physics::dead_band::DeadBand;
+    use crate::physics::offset_drift::OffsetDrift;
+    use crate::physics::pivot_friction::{Loading, PivotFriction};
+    use crate::physics::{AnyLaw, Setting};
     use crate::recording::Role;
     use crate::twin::recording::{multisine, record, scene, stroke};
     use crate::twin::{MachineClass, nominal_controller, paper_machine};
@@ -187,14 +190,10 @@ mod tests {
         assert!(errors[0].iter().all(|e| *e == f64::INFINITY), "{:?}", &errors[0][..3]);
     }
 
-    fn chosen(name: &str, inner: &[f64], strengths: &[f64]) -> Chosen {
-        Chosen {
-            effect: effect(name).unwrap(),
-            setting: Setting { inner: inner.to_vec(), strengths: strengths.to_vec() },
-            continuous: vec![false; inner.len()],
-            range: vec![[0.1, 10.0]; inner.len()],
-            step: 0,
-        }
+    fn chosen(law: impl Into<AnyLaw>, strengths: &[f64]) -> Chosen {
+        let setting = Setting::new(law, strengths.to_vec());
+        let count = setting.law.numbers().len();
+        Chosen { setting, continuous: vec![false; count], range: vec![[0.1, 10.0]; count], step: 0 }
     }
 
     /// Against central differences of the simulation error, which is made without any of this.
@@ -206,16 +205,15 @@ mod tests {
         let bench = Bench::new(&plant, runs, t, None).unwrap();
         let laws = || {
             vec![
-                chosen("pivot_friction", &[2.5, 0.0], &[0.012]),
-                chosen("dead_band", &[0.01], &[1.0]),
-                chosen("offset_drift", &[], &[1e-4, 2e-4]),
+                chosen(PivotFriction { sliding_length: 2.5, loading: Loading::Dahl }, &[0.012]),
+                chosen(DeadBand { half_width: 0.01 }, &[1.0]),
+                chosen(OffsetDrift, &[1e-4, 2e-4]),
             ]
         };
         let mut random = Random::new(9);
         let p: Vec<f64> = bench.form.knobs.iter().map(|_| 0.01 * random.normal()).collect();
         let fit = bench.fit(laws());
-        let made: Vec<_> =
-            laws().iter().map(|c| drive(c.effect, &c.setting.inner, fit.scene, fit.trajectories)).collect();
+        let made: Vec<_> = laws().iter().map(|c| drive(&c.setting.law, fit.scene, fit.trajectories)).collect();
         let settings = laws();
         let drives: Vec<_> = made.iter().zip(&settings).map(|(d, c)| (d, &c.setting.strengths[..])).collect();
         let slopes = Slopes::at(&fit, &p, &drives).unwrap();

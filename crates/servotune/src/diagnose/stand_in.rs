@@ -15,14 +15,14 @@ use super::free_form_said::FreeForm;
 use super::free_form_shape::{Shape, lag};
 use super::free_form_stretches::Stretches;
 use super::judge::{Judged, errors, rms};
-use super::name::{everywhere, text_of};
+use super::name::everywhere;
 use super::rules::{CURVE_CLEARLY, CURVE_NEAR, CURVE_NO_WORSE};
 use super::run::Run;
 use super::selection::Selection;
 use crate::controller::Law;
 use crate::lti::{CurveKnot, PhysicsEntry, Plant};
-use crate::physics::sensor_curve::SensorCurve;
-use crate::physics::{CurvePort, Effect, Setting};
+use crate::physics::sensor_curve::{self, SensorCurve};
+use crate::physics::{CurvePort, Facts, Setting};
 use crate::recording::Role;
 
 /// A model with a curve.
@@ -113,16 +113,16 @@ fn shown(
         return best.trial.clone().over(&all).shown();
     }
     let every: Vec<&Run> = bench.runs.iter().collect();
-    let effects = model.effects.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect();
+    let effects = model.effects.iter().collect();
     let scene = &bench.scene;
     let judged = Judged { plant: &model.plant, effects, own: vec![], lines: &bench.lines, fit: None, scene };
     errors(&judged, &every, closed)
 }
 
 /// The entry of an effect with named parameters.
-fn entry(bench: &Bench, effect: &dyn Effect, setting: &Setting) -> PhysicsEntry {
-    let parameters = effect.parameters(setting, &bench.scene).into_iter().map(|q| (q.name.to_owned(), q.value));
-    PhysicsEntry { effect: effect.facts().name.into(), parameters: parameters.collect(), curve: None }
+fn entry(bench: &Bench, setting: &Setting) -> PhysicsEntry {
+    let parameters = setting.parameters(&bench.scene).into_iter().map(|q| (q.name.to_owned(), q.value));
+    PhysicsEntry { effect: setting.facts().name.into(), parameters: parameters.collect(), curve: None }
 }
 
 fn knots(c: &Plain) -> Vec<CurveKnot> {
@@ -144,18 +144,17 @@ fn model(bench: &Bench, best: &Foretelling, c: &Plain) -> Corrected {
     let mut plant: Plant = bench.form.plant(if curved { &c.p } else { &trial.p });
     let (position, command) = (plant.position_unit.clone(), plant.command_unit.clone());
     let behind = trial.lag_s.filter(|_| curved && c.port == CurvePort::AmplifierOverCommand);
-    let mut effects: Vec<(&'static dyn Effect, Setting)> =
-        trial.lag_s.filter(|_| behind.is_none()).map(lag).into_iter().collect();
-    plant.physics = effects.iter().map(|(e, s)| entry(bench, *e, s)).collect();
+    let mut effects: Vec<Setting> = trial.lag_s.filter(|_| behind.is_none()).map(lag).into_iter().collect();
+    plant.physics = effects.iter().map(|s| entry(bench, s)).collect();
     if curved {
-        let setting = c.port.setting(&c.at, &c.value);
-        let setting = behind.map_or_else(|| setting.clone(), |lag| CurvePort::lagged(setting.clone(), lag));
+        let mut curve = c.port.curve(&c.at, &c.value);
+        curve.lag_s = behind;
         plant.physics.push(c.port.entry(knots(c), behind, &position, &command));
-        effects.push((c.port.effect(), setting));
+        effects.push(Setting::fixed(curve));
     }
-    if let Some((e, s)) = trial.reading.effect() {
-        plant.physics.push(entry(bench, e, &s));
-        effects.push((e, s));
+    if let Some(s) = trial.reading.effect() {
+        plant.physics.push(entry(bench, &s));
+        effects.push(s);
     }
     Corrected { plant, effects }
 }
@@ -200,11 +199,12 @@ fn described(bench: &Bench, found: &Estimated, explained_share: f64) -> FreeForm
 
 /// The finding of a reading that folds or ends at limits.
 fn reading_finding(bench: &Bench, best: &Foretelling, found: &Estimated) -> Finding {
-    let (says, port) = text_of("sensor_curve");
-    let setting = best.trial.reading.effect().map(|e| e.1).unwrap_or(SensorCurve::folded(0.0, 0.0));
+    let &Facts { name: effect, says, port, .. } = &sensor_curve::FACTS;
+    let none = || Setting::fixed(SensorCurve::Folded { lowest: 0.0, at: 0.0 });
+    let setting = best.trial.reading.effect().unwrap_or_else(none);
     let from = best.trial.reading_from();
     let unit = &bench.form.given.position_unit;
-    let parameters = SensorCurve.parameters(&setting, &bench.scene).into_iter().enumerate().map(|(i, q)| {
+    let parameters = setting.parameters(&bench.scene).into_iter().enumerate().map(|(i, q)| {
         let off = 1.96 * best.spread(from + i);
         let e = Estimate { value: q.value, low: q.value - off, high: q.value + off, unit: unit.clone() };
         (q.name.to_owned(), e)
@@ -215,8 +215,8 @@ fn reading_finding(bench: &Bench, best: &Foretelling, found: &Estimated) -> Find
     let log_p = -0.5 * samples * (found.linear.left_out / best.left_out).ln();
     let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
     Finding {
-        effect: "sensor_curve".into(),
-        family: vec!["sensor_curve".into()],
+        effect: effect.into(),
+        family: vec![effect.into()],
         port,
         p_value: log_p.min(0.0).exp().max(1e-300),
         says: format!("{form}: {says}."),

@@ -9,13 +9,14 @@ use super::finding::{Estimate, Finding};
 use super::line_finding::left;
 use super::linear::{Sampled, free_motions};
 use super::lines::peak;
-use super::name::{everywhere, text_of};
+use super::name::everywhere;
 use super::rules::{SWING_ALIKE, SWING_CHANCE, SWING_PERIODS};
 use super::run::Run;
 use super::selection::Selection;
 use super::stack::{Basis, Normal};
 use super::trajectory::acting;
 use crate::numeric::golden::golden_section;
+use crate::physics::{Facts, parametric_gain};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -105,15 +106,15 @@ pub(super) fn swing(bench: &Bench, selection: &Selection) -> Option<Finding> {
     if log_p > SWING_CHANCE.ln() || depth < SWING_ALIKE * spread {
         return None;
     }
-    let (says, port) = text_of("parametric_gain");
+    let &Facts { name: effect, says, port, .. } = &parametric_gain::FACTS;
     let off = 1.96 * f64::max(weight.recip().sqrt(), spread / (runs.len() as f64).sqrt());
     let apart = 1.96 * (12.0 / gain(&all)).sqrt() / (TAU * longest as f64 * t);
     let estimate =
         |value: f64, off: f64, unit: &str| Estimate { value, low: value - off, high: value + off, unit: unit.into() };
     let fitted: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
     Some(Finding {
-        effect: "parametric_gain".into(),
-        family: vec!["parametric_gain".into()],
+        effect: effect.into(),
+        family: vec![effect.into()],
         port,
         p_value: log_p.exp().max(1e-300),
         says: format!("At {hz:.3} Hz {says}; its phase differs from record to record."),

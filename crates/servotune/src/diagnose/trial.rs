@@ -87,7 +87,7 @@ impl Trial<'_> {
         progress("simulating all records");
         let last = selection.last();
         // Where commands bend, repeats differ by more than a linear arm answers: no sign of a push.
-        let unrest = unrest.filter(|_| !last.chosen.iter().any(|c| c.effect.is_hard_nonlinearity()));
+        let unrest = unrest.filter(|_| !last.chosen.iter().any(|c| c.effect().is_hard_nonlinearity()));
         remarks.extend(unrest.as_ref().map(|u| u.says(&self.given.command_unit)));
         // What the search found, whether or not it is offered.
         let fixed = corrected(&bench.form, &last.refitted.p, &last.chosen, &bench.scene);
@@ -141,7 +141,7 @@ fn search(selection: &Selection) -> Vec<Tried> {
         for (j, c) in step.candidates.iter().enumerate().take(12) {
             let tried = step.tried.iter().position(|t| t.0 == j);
             all.push(Tried {
-                effect: c.effect.facts().name.into(),
+                effect: c.setting.facts().name.into(),
                 step: i + 1,
                 screened: c.gain,
                 concealed: c.concealed,

@@ -18,7 +18,7 @@ use super::rules::{
 use super::selection::Selection;
 use super::swing::swing;
 use crate::lti::Plant;
-use crate::physics::{Port, library};
+use crate::physics::{AnyLaw, Port, library};
 
 /// Findings that the search has no part in.
 pub(super) struct ByOthers {
@@ -98,7 +98,7 @@ impl<'a> Evidence<'a> {
         }
         let mixture = self.bench.levels.from_repeats && selection.mixture();
         if mixture {
-            let laws: Vec<&str> = model.chosen.iter().map(|c| c.effect.facts().name).collect();
+            let laws: Vec<&str> = model.chosen.iter().map(|c| c.setting.facts().name).collect();
             d.remarks.push(format!(
                 "it takes {} together to explain the records and none leads: likelier one thing that the library lacks; the corrected plant carries the mixture as a stand-in",
                 laws.join(", ")
@@ -150,7 +150,7 @@ impl<'a> Evidence<'a> {
     /// There, without a name: unless it is a gain that swings in a phase of its own.
     fn unnamed(&self, d: &mut Diagnosis, explained: f64) {
         // A swing in one phase for all records may have taken the first step of one that has a phase in each.
-        let of_the_gain = self.model.chosen.iter().all(|c| c.effect.facts().name == "parametric_gain");
+        let of_the_gain = self.model.chosen.iter().all(|c| matches!(c.setting.law, AnyLaw::ParametricGain(_)));
         match of_the_gain.then(|| swing(self.bench, self.selection)).flatten() {
             Some(f) => {
                 d.verdict = Verdict::Named;
@@ -290,7 +290,7 @@ fn rival_share(selection: &Selection) -> f64 {
     let Some((step, taken)) = selection.steps.first().and_then(|s| s.taken.map(|t| (s, &s.tried[t]))) else {
         return 1.0;
     };
-    let name = |i: usize| step.candidates[i].effect.facts().name;
+    let name = |i: usize| step.candidates[i].setting.facts().name;
     let gain = step.before - taken.1.evidence;
     let others = step.tried.iter().filter(|t| name(t.0) != name(taken.0) && !same_drag(name(t.0), name(taken.0)));
     others.map(|t| (step.before - t.1.evidence) / gain).fold(0.0, f64::max)

@@ -11,7 +11,7 @@ use super::rules::{CONFOUNDED, CONFOUNDED_NEAR_NOISE, FAR_FROM_NOISE, GAIN_WITHO
 use super::select_settings::SelectSettings;
 use super::selection::Step;
 use super::step_scan::scan;
-use crate::physics::{Effect, Setting};
+use crate::physics::{AnyLaw, Effect, Setting};
 
 /// What the candidates of one step are judged by.
 pub(super) struct Worth<'a> {
@@ -43,19 +43,19 @@ impl Worth<'_> {
     /// Whether a machine may have it beside the model, these records tell it, and chance does not make it.
     fn sound(&self, c: &Candidate) -> bool {
         let concealed = if self.model.excess_sigma() < NEAR_NOISE { CONFOUNDED_NEAR_NOISE } else { CONFOUNDED };
-        self.is_new(c) && c.effect.is_possible(&c.setting, &[]) && self.beyond_chance(c) && c.concealed < concealed
+        self.is_new(c) && c.setting.is_possible(&[]) && self.beyond_chance(c) && c.concealed < concealed
     }
 
     /// Whether it is another thing than the effects of the model.
     fn is_new(&self, c: &Candidate) -> bool {
-        let name = c.effect.facts().name;
+        let name = c.setting.facts().name;
         let other = self.model.chosen.iter().all(|m| {
-            let known = m.effect.facts().name;
+            let known = m.setting.facts().name;
             !same_drag(name, known) && (known != name || again(c, &m.setting))
         });
         // A push falls into one record; what every repeat shows at the same time is none.
         other
-            && (!c.effect.is_single_event()
+            && (!c.effect().is_single_event()
                 || self.bench.stack.segments.iter().any(|s| s.runs.len() == 1)
                 || c.together())
     }
@@ -68,8 +68,8 @@ impl Worth<'_> {
 
     /// Whether its law has not had its turns, one for each law and two for the leading one, and whether there is room.
     fn turn(&self, step: &Step, c: &Candidate, worth: &[usize]) -> bool {
-        let name = |i: usize| step.candidates[i].effect.facts().name;
-        let own = c.effect.facts().name;
+        let name = |i: usize| step.candidates[i].setting.facts().name;
+        let own = c.setting.facts().name;
         let seen = worth.iter().filter(|&&j| name(j) == own).count();
         let leads = worth.first().is_none_or(|&j| name(j) == own);
         let turn = match (leads, seen) {
@@ -79,48 +79,49 @@ impl Worth<'_> {
             _ => false,
         };
         turn && (worth.len() < self.settings.refits
-            || c.effect.is_drag() && seen == 0 && self.model.excess_sigma() > FAR_FROM_NOISE)
+            || c.effect().is_drag() && seen == 0 && self.model.excess_sigma() > FAR_FROM_NOISE)
     }
 
     /// Of two forms of one law, the one that is worth its numbers most: each number is paid for (Schwarz 1978).
     fn best_form(&self, step: &Step, c: &Candidate) -> bool {
         let price = (self.bench.stack.total as f64).ln();
         let net = |c: &Candidate| c.gain - price * c.chosen(0).numbers() as f64;
-        let forms = step.candidates.iter().filter(|o| o.effect.facts().name == c.effect.facts().name);
+        let forms = step.candidates.iter().filter(|o| o.setting.facts().name == c.setting.facts().name);
         forms.map(net).fold(f64::NEG_INFINITY, f64::max) <= net(c)
     }
 }
 
 /// Numbers of each record's own that an effect brings with it: motions that a record may begin in.
-pub(super) fn begun(bench: &Bench, inner: &[f64], effect: &dyn Effect) -> usize {
-    effect.free_motions(inner, &bench.scene, 1).len() * bench.stack.segments.len()
+pub(super) fn begun(bench: &Bench, law: &AnyLaw) -> usize {
+    law.free_motions(&bench.scene, 1).len() * bench.stack.segments.len()
 }
 
 /// Free numbers of a candidate.
 pub(super) fn numbers(c: &Candidate) -> f64 {
-    let strengths = if c.effect.facts().fixed { 0 } else { c.setting.strengths.iter().filter(|s| **s != 0.0).count() };
-    (strengths + c.setting.inner.iter().filter(|v| **v != 0.0).count()) as f64
+    let strengths = if c.setting.facts().fixed { 0 } else { c.setting.strengths.iter().filter(|s| **s != 0.0).count() };
+    (strengths + c.setting.law.told()) as f64
 }
 
 /// Logarithm of the chance of a hum's gain where the noise itself is stronger near its frequency, a narrow band of it being no hum;
 /// -infinity for all other effects.
 pub(super) fn hums(bench: &Bench, c: &Candidate, gain: f64, effects: usize) -> f64 {
-    if !c.effect.is_tone() {
+    if !c.effect().is_tone() {
         return f64::NEG_INFINITY;
     }
-    let fair = Candidate { gain: gain / bench.noise_near(c.setting.inner[0]), ..c.clone() };
+    let fair = Candidate { gain: gain / bench.noise_near(c.setting.law.first_number()), ..c.clone() };
     fair.log_p_value(effects)
 }
 
 /// Whether a second one of the same effect can be another thing: another line, another mode.
 fn again(c: &Candidate, first: &Setting) -> bool {
-    c.effect.may_occur_several_times() && (first.inner[0] - c.setting.inner[0]).abs() > 0.02 * first.inner[0].abs()
+    c.effect().may_occur_several_times()
+        && (first.law.first_number() - c.setting.law.first_number()).abs() > 0.02 * first.law.first_number().abs()
 }
 
 /// Logarithm of the closed-form bound of the strongest candidate beside a model.
 pub(super) fn strongest(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> f64 {
     let step = scan(bench, library, model);
-    let possible = step.candidates.iter().filter(|c| c.effect.is_possible(&c.setting, &[]) && c.concealed < CONFOUNDED);
+    let possible = step.candidates.iter().filter(|c| c.setting.is_possible(&[]) && c.concealed < CONFOUNDED);
     possible.map(|c| c.log_p_value(library.len())).fold(0.0, f64::min)
 }
 

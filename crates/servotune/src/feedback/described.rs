@@ -9,7 +9,7 @@
 use super::open_loop::{angle_from_rest, section_poles};
 use super::{FeedbackError, OpenLoop, Trace, frequency_grid, nyquist_count};
 use crate::lti::{DiscretePlant, FrequencyResponse, LtiError, ModalForm, Plant, Sections};
-use crate::physics::{Cycle, Effect, Entry, Motion, Restored, Scene, Setting, Share};
+use crate::physics::{Cycle, Entry, Motion, Restored, Scene, Setting, Share};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
@@ -29,7 +29,6 @@ pub struct DescribedPlant<'a> {
 }
 
 struct Part<'a> {
-    effect: &'a dyn Effect,
     setting: &'a Setting,
     entry: Entry,
     /// Whether the law is linear ([`Share::Ratio`]).
@@ -43,8 +42,8 @@ impl<'a> DescribedPlant<'a> {
         let scene = &physics.scene;
         let mut plant = scene.plant.clone();
         let (mut parts, mut terms) = (Vec::new(), Vec::new());
-        for (effect, setting) in &physics.parts {
-            let linear = match effect.response_share(setting, scene, 1.0) {
+        for setting in &physics.parts {
+            let linear = match setting.response_share(scene, 1.0) {
                 Share::Outside => continue,
                 Share::Delay(late) => {
                     plant.delay_s += late;
@@ -57,7 +56,7 @@ impl<'a> DescribedPlant<'a> {
                 Share::Ratio(_) => true,
                 Share::Cycle | Share::Blind => false,
             };
-            parts.push(Part { effect: *effect, setting, entry: effect.facts().entry, linear });
+            parts.push(Part { setting, entry: setting.facts().entry, linear });
         }
         let t = scene.sample_time_s;
         let delayed = DiscretePlant::of(&plant, t)?;
@@ -104,7 +103,7 @@ impl<'a> DescribedPlant<'a> {
         let added = |w_rad_s: f64, acting: f64| {
             let acting = Complex::new(acting, 0.0);
             let motion = Motion { w_rad_s, position: amplitude, acting, command };
-            self.cycle.added(p.effect, p.setting, self.scene, &motion)
+            self.cycle.added(p.setting, self.scene, &motion)
         };
         let first = added(PROBES[0], 0.0);
         let same = |other: Complex<f64>| (other - first).norm() <= SAME * first.norm();
@@ -157,9 +156,9 @@ impl<'a> Described<'a> {
     fn sum(&self, entry: Entry, w: f64, motion: &Motion, input: Complex<f64>) -> Complex<f64> {
         let p = self.plant;
         let each = |(part, steady): (&Part<'_>, &Option<Complex<f64>>)| {
-            steady.unwrap_or_else(|| match part.effect.response_share(part.setting, p.scene, w) {
+            steady.unwrap_or_else(|| match part.setting.response_share(p.scene, w) {
                 Share::Ratio(r) => r * input,
-                _ => p.cycle.added(part.effect, part.setting, p.scene, motion),
+                _ => p.cycle.added(part.setting, p.scene, motion),
             })
         };
         p.parts.iter().zip(&self.steady).filter(|(part, _)| part.entry == entry).map(each).sum()

@@ -2,14 +2,16 @@
 //!
 //! tau = -c v |v|; the mean over an interval by Simpson's rule, velocity taken as straight.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
-/// Strength: the drag coefficient.
+/// Its strength is the drag coefficient.
+#[derive(Clone, Debug, PartialEq)]
 pub struct AerodynamicDrag;
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "aerodynamic_drag",
     port: Port::Torque,
     entry: Entry::Torque,
@@ -32,32 +34,36 @@ impl Law for Drag {
     }
 }
 
-impl Effect for AerodynamicDrag {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for AerodynamicDrag {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn acts_on_body() -> bool {
+        true
+    }
+
+    fn shown_over() -> ShownOver {
         ShownOver::Velocity
     }
 
-    fn scan_points(&self, _scene: &Scene) -> Vec<Vec<f64>> {
-        vec![vec![]]
+    fn grid(_scene: &Scene) -> Vec<AerodynamicDrag> {
+        vec![AerodynamicDrag]
     }
 
-    fn law(&self, _inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
         Box::new(Drag)
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        vec![Parameter::new("coefficient", setting.strengths[0], Unit::CommandSecondSquaredPerPositionSquared)]
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        vec![Parameter::new("coefficient", strengths[0], Unit::CommandSecondSquaredPerPositionSquared)]
     }
 
-    fn is_possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
-        setting.strengths.first().is_some_and(|s| *s > 0.0)
+    fn is_possible(&self, strengths: &[f64], _errors: &[f64]) -> bool {
+        strengths.first().is_some_and(|s| *s > 0.0)
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        Ok(Setting { inner: vec![], strengths: vec![given.need("coefficient")?] })
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(AerodynamicDrag, Vec<f64>), PhysicsError> {
+        Ok((AerodynamicDrag, vec![given.need("coefficient")?]))
     }
 }

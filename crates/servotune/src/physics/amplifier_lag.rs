@@ -2,17 +2,22 @@
 //!
 //! tau i' = u - i with u held between samples; i(t) = u + (i0 - u) exp(-t/tau), and what acts is its mean over the interval.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use super::share::Share;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
-/// Inner: the time constant.
-pub struct AmplifierLag;
+/// The lag of the current.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AmplifierLag {
+    /// Time constant (s), above 0.
+    pub time_constant_s: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "amplifier_lag",
     port: Port::Amplifier,
     entry: Entry::Command,
@@ -51,42 +56,46 @@ impl Law for Lag {
     }
 }
 
-impl Effect for AmplifierLag {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for AmplifierLag {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<AmplifierLag> {
         let t = scene.sample_time_s;
-        logarithmic(0.1 * t, 20.0 * t, 14).into_iter().map(|tau| vec![tau]).collect()
+        logarithmic(0.1 * t, 20.0 * t, 14).into_iter().map(|time_constant_s| AmplifierLag { time_constant_s }).collect()
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        let ratio = scene.sample_time_s / inner[0];
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.time_constant_s)]
+    }
+
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        let ratio = scene.sample_time_s / self.time_constant_s;
         Box::new(Lag { keep: (-ratio).exp(), mean: -(-ratio).exp_m1() / ratio, current: None })
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("time_constant_s", setting.inner[0], Unit::Second),
-            Parameter::new("bandwidth_hz", 1.0 / (TAU * setting.inner[0]), Unit::Hertz),
+            Parameter::new("time_constant_s", self.time_constant_s, Unit::Second),
+            Parameter::new("bandwidth_hz", 1.0 / (TAU * self.time_constant_s), Unit::Hertz),
         ]
     }
 
-    fn response_share(&self, setting: &Setting, scene: &Scene, w_rad_s: f64) -> Share {
-        let ratio = scene.sample_time_s / setting.inner[0];
+    fn response_share(&self, _strengths: &[f64], scene: &Scene, w_rad_s: f64) -> Share {
+        let ratio = scene.sample_time_s / self.time_constant_s;
         let keep = (-ratio).exp();
         // Current over command at the samples, then the mean over the interval.
         let arrived = (1.0 - keep) / (Complex::from_polar(1.0, w_rad_s * scene.sample_time_s) - keep);
         Share::Ratio((arrived - 1.0) * -(-ratio).exp_m1() / ratio)
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        let tau = if given.has("time_constant_s") {
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(AmplifierLag, Vec<f64>), PhysicsError> {
+        let time_constant_s = if given.has("time_constant_s") {
             given.positive("time_constant_s")?
         } else {
             1.0 / (TAU * given.positive("bandwidth_hz")?)
         };
-        Ok(Setting { inner: vec![tau], strengths: vec![1.0] })
+        Ok((AmplifierLag { time_constant_s }, vec![1.0]))
     }
 }

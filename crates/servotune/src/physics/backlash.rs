@@ -3,14 +3,19 @@
 //! The pushed part rests until the arm has crossed the gap: p = clip(p, x - g/2, x + g/2), the play operator (Krasnoselskii,
 //! Pokrovskii 1989); what is recorded is p. Contact is taken as rigid and the part as held by its own friction.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
-/// Inner: the gap.
-pub struct Backlash;
+/// The play.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Backlash {
+    /// Gap between the two contacts (position_unit), above 0.
+    pub gap: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "backlash",
     port: Port::Structure,
     entry: Entry::Position,
@@ -46,35 +51,39 @@ impl Law for Play {
     }
 }
 
-impl Effect for Backlash {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for Backlash {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn shown_over() -> ShownOver {
         ShownOver::Loop
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<Backlash> {
         // A gap below the sensor's noise still shows: thousands of reversals tell of it.
         let low = (0.1 * scene.noise).max(1e-5 * scene.travel);
-        logarithmic(low, scene.travel, 24).into_iter().map(|g| vec![g]).collect()
+        logarithmic(low, scene.travel, 24).into_iter().map(|gap| Backlash { gap }).collect()
     }
 
-    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Play { half: 0.5 * inner[0].abs(), part: None })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.gap)]
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        vec![Parameter::new("gap", setting.inner[0], Unit::Position)]
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Play { half: 0.5 * self.gap.abs(), part: None })
+    }
+
+    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        vec![Parameter::new("gap", self.gap, Unit::Position)]
     }
 
     /// A machine holds to this law to about a hundredth.
-    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        Ok(Setting { inner: vec![given.positive("gap")?], strengths: vec![1.0] })
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(Backlash, Vec<f64>), PhysicsError> {
+        Ok((Backlash { gap: given.positive("gap")? }, vec![1.0]))
     }
 }

@@ -2,17 +2,24 @@
 //!
 //! Base: x_b'' + 2 z w x_b' + w² x_b = -R i; m = x - x_b, so m = x + g w²/(s² + 2 z w s + w²) i with g = R/w².
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::{Parameter, Unit};
 use super::sample::Scene;
 use super::share::Share;
 use super::unmodelled_resonance::{Ringing, scan, term};
 use std::f64::consts::TAU;
 
-/// Inner: frequency (Hz), damping ratio. Strength: the base's displacement per constant command.
-pub struct BaseMode;
+/// The mode of the base. Its strength is the base's displacement per constant command.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BaseMode {
+    /// Natural frequency (Hz), above 0.
+    pub frequency_hz: f64,
+    /// Damping ratio, between 0 and 1.
+    pub damping_ratio: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "base_mode",
     port: Port::Structure,
     entry: Entry::Position,
@@ -29,26 +36,36 @@ static FACTS: Facts = Facts {
 /// Damping ratio of a machine on soft feet, and more than any has: beyond it the law is no mode but a curve.
 const HEAVIEST: f64 = 0.3;
 
-impl Effect for BaseMode {
-    fn facts(&self) -> &'static Facts {
+impl BaseMode {
+    fn at([frequency_hz, damping_ratio]: [f64; 2]) -> BaseMode {
+        BaseMode { frequency_hz, damping_ratio }
+    }
+}
+
+impl Parametric for BaseMode {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<BaseMode> {
         let high = 80f64.min(0.2 / scene.sample_time_s);
-        [0.01, 0.05, 0.15].iter().flat_map(|&z| scan(3.0, high, z, scene)).collect()
+        [0.01, 0.05, 0.15].iter().flat_map(|&z| scan(3.0, high, z, scene)).map(BaseMode::at).collect()
     }
 
-    fn is_possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
-        setting.inner[1] < HEAVIEST
+    fn is_possible(&self, _strengths: &[f64], _errors: &[f64]) -> bool {
+        self.damping_ratio < HEAVIEST
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        Box::new(Ringing::at_rest(inner[0], inner[1], scene.sample_time_s, 1))
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.frequency_hz), Some(&mut self.damping_ratio)]
     }
 
-    fn free_motions(&self, inner: &[f64], scene: &Scene, n: usize) -> Vec<Vec<f64>> {
-        let (w, z) = (TAU * inner[0], inner[1].clamp(0.0, 1.0));
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        Box::new(Ringing::at_rest(self.frequency_hz, self.damping_ratio, scene.sample_time_s, 1))
+    }
+
+    fn free_motions(&self, scene: &Scene, n: usize) -> Vec<Vec<f64>> {
+        let (w, z) = (TAU * self.frequency_hz, self.damping_ratio.clamp(0.0, 1.0));
         let turning = w * ((1.0 - z) * (1.0 + z)).sqrt();
         let over = |of: fn(f64) -> f64| {
             let at = |k: usize| k as f64 * scene.sample_time_s;
@@ -57,21 +74,21 @@ impl Effect for BaseMode {
         vec![over(f64::cos), over(f64::sin)]
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("frequency_hz", setting.inner[0], Unit::Hertz),
-            Parameter::new("damping_ratio", setting.inner[1], Unit::Ratio),
-            Parameter::new("static_gain", setting.strengths[0], Unit::PositionPerCommand),
+            Parameter::new("frequency_hz", self.frequency_hz, Unit::Hertz),
+            Parameter::new("damping_ratio", self.damping_ratio, Unit::Ratio),
+            Parameter::new("static_gain", strengths[0], Unit::PositionPerCommand),
         ]
     }
 
-    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
-        Share::Terms(vec![term(setting.inner[0], setting.inner[1], setting.strengths[0], 0.0)])
+    fn response_share(&self, strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Terms(vec![term(self.frequency_hz, self.damping_ratio, strengths[0], 0.0)])
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(BaseMode, Vec<f64>), PhysicsError> {
         let damping = given.between("damping_ratio", 0.0, 1.0, "above 0 and below 1")?;
         let strengths = vec![given.need("static_gain")?];
-        Ok(Setting { inner: vec![given.positive("frequency_hz")?, damping], strengths })
+        Ok((BaseMode::at([given.positive("frequency_hz")?, damping]), strengths))
     }
 }

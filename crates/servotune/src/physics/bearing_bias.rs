@@ -4,14 +4,23 @@
 //! who saw the torque after a seek grow with the seek's length up to a critical one); tau = -b. A way back shorter than a
 //! smallest one is no new move.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
-/// Inner: critical length, relaxation time, shortest way back that begins a new move. Strength: the largest bias B.
-pub struct BearingBias;
+/// The bearing's memory. Its strength is the largest bias B.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BearingBias {
+    /// Length of a move beyond which its bias grows no further (position_unit), above 0.
+    pub critical_length: f64,
+    /// Time constant of the bias (s), above 0.
+    pub relaxation_time_s: f64,
+    /// Shortest way back that begins a new move (position_unit).
+    pub shortest_move: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "bearing_bias",
     port: Port::Torque,
     entry: Entry::Torque,
@@ -81,47 +90,63 @@ impl Law for Memory {
     }
 }
 
-impl Effect for BearingBias {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for BearingBias {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn shown_over() -> ShownOver {
         ShownOver::Loop
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<BearingBias> {
         let times = logarithmic(0.01 * scene.duration_s, 3.0 * scene.duration_s, 6);
         let shortest = (6.0 * scene.noise).max(1e-4 * scene.travel);
         let ways = [shortest, 5.0 * shortest, 25.0 * shortest].map(|w| w.min(0.1 * scene.travel));
         let lengths = [0.15, 0.5, 1.5].map(|share| share * scene.travel);
-        let at = |tau: f64| lengths.iter().flat_map(move |&l| ways.map(|w| vec![l, tau, w]));
+        let at = |tau: f64| {
+            lengths.iter().flat_map(move |&l| {
+                ways.map(|w| BearingBias { critical_length: l, relaxation_time_s: tau, shortest_move: w })
+            })
+        };
         times.iter().flat_map(|&tau| at(tau)).collect()
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        let ratio = scene.sample_time_s / inner[1];
-        let mean = -(-ratio).exp_m1() / ratio;
-        Box::new(Memory { critical: inner[0], smallest: inner[2], keep: (-ratio).exp(), mean, now: None })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.critical_length), Some(&mut self.relaxation_time_s), Some(&mut self.shortest_move)]
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        let ratio = scene.sample_time_s / self.relaxation_time_s;
+        let mean = -(-ratio).exp_m1() / ratio;
+        Box::new(Memory {
+            critical: self.critical_length,
+            smallest: self.shortest_move,
+            keep: (-ratio).exp(),
+            mean,
+            now: None,
+        })
+    }
+
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("bias_command", setting.strengths[0], Unit::Command),
-            Parameter::new("critical_length", setting.inner[0], Unit::Position),
-            Parameter::new("relaxation_time_s", setting.inner[1], Unit::Second),
-            Parameter::new("shortest_move", setting.inner[2], Unit::Position),
+            Parameter::new("bias_command", strengths[0], Unit::Command),
+            Parameter::new("critical_length", self.critical_length, Unit::Position),
+            Parameter::new("relaxation_time_s", self.relaxation_time_s, Unit::Second),
+            Parameter::new("shortest_move", self.shortest_move, Unit::Position),
         ]
     }
 
     /// Bearings and cables hold to their laws to about a hundredth.
-    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
-        let shortest = given.or("shortest_move", (6.0 * scene.noise).max(1e-4 * scene.travel));
-        let inner = vec![given.positive("critical_length")?, given.positive("relaxation_time_s")?, shortest];
-        Ok(Setting { inner, strengths: vec![given.need("bias_command")?] })
+    fn setting_of(given: &Given, scene: &Scene) -> Result<(BearingBias, Vec<f64>), PhysicsError> {
+        let shortest_move = given.or("shortest_move", (6.0 * scene.noise).max(1e-4 * scene.travel));
+        let (critical_length, relaxation_time_s) =
+            (given.positive("critical_length")?, given.positive("relaxation_time_s")?);
+        let law = BearingBias { critical_length, relaxation_time_s, shortest_move };
+        Ok((law, vec![given.need("bias_command")?]))
     }
 }

@@ -4,15 +4,22 @@
 //! spring in parallel with a second-order body is a new natural frequency: a linear refit absorbs it. What it cannot absorb
 //! is the creep and the curvature. A free inertia has no spring of its own, so there creep time 0 stands for the plain one.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use crate::lti::Body;
 
-/// Inner: creep time (0: a plain spring), centre. Strengths: stiffness and curvature.
-pub struct CableSpring;
+/// The cable. Its strengths are stiffness and curvature.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CableSpring {
+    /// Time constant of the creep (s), above 0; none for a plain spring.
+    pub creep_time_s: Option<f64>,
+    /// Position at which it does not pull (position_unit).
+    pub centre: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "cable_spring",
     port: Port::Torque,
     entry: Entry::Torque,
@@ -54,47 +61,62 @@ impl Law for Cable {
     }
 }
 
-impl Effect for CableSpring {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for CableSpring {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn acts_on_body() -> bool {
+        true
+    }
+
+    fn shown_over() -> ShownOver {
         ShownOver::Position
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<CableSpring> {
         let times = logarithmic(20.0 * scene.sample_time_s, 2.0 * scene.duration_s, 10);
-        let mut all: Vec<Vec<f64>> = times.into_iter().map(|tau| vec![tau, scene.centre]).collect();
+        let at = |creep_time_s| CableSpring { creep_time_s, centre: scene.centre };
+        let mut all: Vec<CableSpring> = times.into_iter().map(|tau| at(Some(tau))).collect();
         if matches!(scene.plant.body, Body::FreeInertia { .. }) {
-            all.insert(0, vec![0.0, scene.centre]);
+            all.insert(0, at(None));
         }
         all
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        let creeps = inner[0] > 0.0;
-        let ratio = if creeps { scene.sample_time_s / inner[0] } else { 1.0 };
-        let mean = -(-ratio).exp_m1() / ratio;
-        Box::new(Cable { keep: (-ratio).exp(), mean, creeps, centre: inner[1], stretch: 0.0 })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![self.creep_time_s.as_mut(), Some(&mut self.centre)]
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        let ratio = self.creep_time_s.map_or(1.0, |tau| scene.sample_time_s / tau);
+        let mean = -(-ratio).exp_m1() / ratio;
+        Box::new(Cable {
+            keep: (-ratio).exp(),
+            mean,
+            creeps: self.creep_time_s.is_some(),
+            centre: self.centre,
+            stretch: 0.0,
+        })
+    }
+
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("stiffness", setting.strengths[0], Unit::CommandPerPosition),
-            Parameter::new("quadratic", setting.strengths[1], Unit::CommandPerPositionSquared),
-            Parameter::new("creep_time_s", setting.inner[0], Unit::Second),
-            Parameter::new("centre", setting.inner[1], Unit::Position),
+            Parameter::new("stiffness", strengths[0], Unit::CommandPerPosition),
+            Parameter::new("quadratic", strengths[1], Unit::CommandPerPositionSquared),
+            Parameter::new("creep_time_s", self.creep_time_s.unwrap_or(0.0), Unit::Second),
+            Parameter::new("centre", self.centre, Unit::Position),
         ]
     }
 
     /// Bearings and cables hold to their laws to about a hundredth.
-    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
-        let inner = vec![given.or("creep_time_s", 0.0), given.or("centre", scene.centre)];
-        Ok(Setting { inner, strengths: vec![given.need("stiffness")?, given.or("quadratic", 0.0)] })
+    fn setting_of(given: &Given, scene: &Scene) -> Result<(CableSpring, Vec<f64>), PhysicsError> {
+        let creep_time_s = Some(given.or("creep_time_s", 0.0)).filter(|tau| *tau > 0.0);
+        let law = CableSpring { creep_time_s, centre: given.or("centre", scene.centre) };
+        Ok((law, vec![given.need("stiffness")?, given.or("quadratic", 0.0)]))
     }
 }

@@ -5,16 +5,46 @@
 //! shears instead of sticking lets the arm creep: the drag then turns round over a speed, not over a length, tanh(v/v_c). The
 //! viscous part belongs to the linear plant; a mean offset belongs to the torque offset.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::pivot_friction::{SLID, dahl, shortest_loop};
 use super::sample::{Sample, Scene, logarithmic};
 
-/// Inner: pre-sliding length, or the speed of a creep with a minus; Stribeck speed (0 for none), Stribeck rise. Strength: the level at
-/// speed.
-pub struct CoulombFriction;
+/// Dry friction. Its strength is the level at speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoulombFriction {
+    /// Over what the drag turns round with the motion.
+    pub turning: Turning,
+    /// The rise at low speed, where there is one.
+    pub stribeck: Option<Stribeck>,
+}
 
-static FACTS: Facts = Facts {
+/// Over what a dry drag turns round.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Turning {
+    /// Over a length: the arm sticks.
+    Length {
+        /// Pre-sliding length (position_unit), above 0.
+        sliding_length: f64,
+    },
+    /// Over a speed: the arm creeps.
+    Creep {
+        /// Speed at which tanh(1) of the level is reached (position_unit/s), above 0.
+        speed: f64,
+    },
+}
+
+/// Stribeck's rise of a drag towards low speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stribeck {
+    /// Speed over which it falls off (position_unit/s), above 0.
+    pub speed: f64,
+    /// Rise at rest over the level at speed.
+    pub rise: f64,
+}
+
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "coulomb_friction",
     port: Port::Torque,
     entry: Entry::Torque,
@@ -37,10 +67,10 @@ const OCTAVE: f64 = 1.34;
 /// Shortest length that a simulation is fitted with, over the shortest of the grid.
 const DRIER: f64 = 0.02;
 
+/// What sticks: Dahl's law with a short length.
 struct Slider {
     length: f64,
-    speed: f64,
-    rise: f64,
+    stribeck: Option<Stribeck>,
     z: f64,
 }
 
@@ -48,10 +78,11 @@ impl Slider {
     fn moved(&self, from: &Sample, to: &Sample) -> f64 {
         dahl(self.z, to.x - from.x, self.length)
     }
+}
 
-    fn level(&self, v: f64) -> f64 {
-        if self.speed > 0.0 { 1.0 + self.rise * (-(v / self.speed).powi(2)).exp() } else { 1.0 }
-    }
+/// Drag at a speed over its level at high speed.
+fn level(stribeck: Option<Stribeck>, v: f64) -> f64 {
+    stribeck.map_or(1.0, |s| 1.0 + s.rise * (-(v / s.speed).powi(2)).exp())
 }
 
 impl Law for Slider {
@@ -60,109 +91,147 @@ impl Law for Slider {
         // The mean over a straight path: s - (s - z0) (1 - exp(-r))/r with r the path in lengths.
         let (path, s) = ((to.x - from.x).abs() / self.length, (to.x - from.x).signum());
         let mean = match path {
-            // Simpson's rule; the sign turns round over more than one sample.
-            _ if self.length < 0.0 => {
-                let at = |v: f64| (v / -self.length).tanh();
-                (at(from.v) + 4.0 * at(0.5 * (from.v + to.v)) + at(to.v)) / 6.0
-            }
             p if p < 1e-6 => 0.5 * (self.z + z),
             p if p > SLID => s - (s - self.z) / p,
             p => s + (s - self.z) * (-p).exp_m1() / p,
         };
-        out[0] = -mean * self.level(0.5 * (from.v + to.v));
+        out[0] = -mean * level(self.stribeck, 0.5 * (from.v + to.v));
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
-        if self.length > 0.0 {
-            self.z = self.moved(from, to);
-        }
+        self.z = self.moved(from, to);
     }
 }
 
-impl Effect for CoulombFriction {
-    fn facts(&self) -> &'static Facts {
+/// What creeps: a film that shears.
+struct Film {
+    speed: f64,
+    stribeck: Option<Stribeck>,
+}
+
+impl Law for Film {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        // Simpson's rule; the sign turns round over more than one sample.
+        let at = |v: f64| (v / self.speed).tanh();
+        let mean = (at(from.v) + 4.0 * at(0.5 * (from.v + to.v)) + at(to.v)) / 6.0;
+        out[0] = -mean * level(self.stribeck, 0.5 * (from.v + to.v));
+    }
+}
+
+impl CoulombFriction {
+    /// A drag that sticks over a length (position_unit), with a rise at low speed or without.
+    pub fn sticking(sliding_length: f64, stribeck: Option<Stribeck>) -> CoulombFriction {
+        CoulombFriction { turning: Turning::Length { sliding_length }, stribeck }
+    }
+
+    /// A drag that creeps over a speed (position_unit/s).
+    pub fn creeping(speed: f64) -> CoulombFriction {
+        CoulombFriction { turning: Turning::Creep { speed }, stribeck: None }
+    }
+}
+
+impl Parametric for CoulombFriction {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn acts_on_body() -> bool {
+        true
+    }
+
+    fn shown_over() -> ShownOver {
         ShownOver::Loop
     }
 
-    fn finer_simulated(&self, place: usize) -> Option<f64> {
+    fn finer_simulated(place: usize) -> Option<f64> {
         (place == 0).then_some(DRIER)
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<CoulombFriction> {
         // Up to the length from which on pre-sliding friction is told by its loop.
         let (short, long) = ((1.5 * scene.noise).max(3e-6 * scene.travel), shortest_loop(scene));
         let count = 1 + (OCTAVE * (long / short).log2()).ceil().max(4.0) as usize;
-        let mut all: Vec<Vec<f64>> = logarithmic(short, long, count).into_iter().map(|l| vec![l, 0.0, 0.0]).collect();
+        let plain = |length| CoulombFriction::sticking(length, None);
+        let mut all: Vec<CoulombFriction> = logarithmic(short, long, count).into_iter().map(plain).collect();
         // A rise that reaches up to the highest speed is no rise but the level.
         let rises = logarithmic(0.015, 0.2, 4);
-        all.extend([0.25, 0.5].iter().flat_map(|l| rises.iter().map(move |v| vec![l * long, v * scene.speed, 0.5])));
-        all.extend(
-            logarithmic(CREEP[0] * scene.speed, CREEP[1] * scene.speed, 8).into_iter().map(|v| vec![-v, 0.0, 0.0]),
-        );
+        let rising =
+            |l: f64, v: f64| CoulombFriction::sticking(l * long, Some(Stribeck { speed: v * scene.speed, rise: 0.5 }));
+        all.extend([0.25, 0.5].iter().flat_map(|l| rises.iter().map(move |v| rising(*l, *v))));
+        let creeps = logarithmic(CREEP[0] * scene.speed, CREEP[1] * scene.speed, 8);
+        all.extend(creeps.into_iter().map(CoulombFriction::creeping));
         all
     }
 
-    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Slider { length: inner[0], speed: inner[1], rise: inner[2], z: 0.0 })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        let (Turning::Length { sliding_length: over } | Turning::Creep { speed: over }) = &mut self.turning;
+        let (speed, rise) = self.stribeck.as_mut().map(|s| (&mut s.speed, &mut s.rise)).unzip();
+        vec![Some(over), speed, rise]
     }
 
-    fn is_drag(&self) -> bool {
+    fn class(&self) -> Vec<usize> {
+        vec![usize::from(matches!(self.turning, Turning::Creep { .. }))]
+    }
+
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        let stribeck = self.stribeck;
+        match self.turning {
+            Turning::Length { sliding_length: length } => Box::new(Slider { length, stribeck, z: 0.0 }),
+            Turning::Creep { speed } => Box::new(Film { speed, stribeck }),
+        }
+    }
+
+    fn is_drag() -> bool {
         true
     }
 
-    fn is_hard_nonlinearity(&self) -> bool {
+    fn is_hard_nonlinearity() -> bool {
         true
     }
 
-    fn stiffness(&self, setting: &Setting) -> f64 {
+    fn stiffness(&self, strengths: &[f64]) -> f64 {
         // A creeping drag holds by its speed, and is no spring.
-        let held = setting.inner.first().copied().filter(|l| *l > 0.0);
-        let rise = 1.0 + setting.inner.get(2).copied().unwrap_or(0.0);
-        held.map_or(0.0, |l| rise * setting.strengths.first().copied().unwrap_or(0.0).abs() / l)
+        let Turning::Length { sliding_length } = self.turning else { return 0.0 };
+        let rise = 1.0 + self.stribeck.map_or(0.0, |s| s.rise);
+        rise * strengths.first().copied().unwrap_or(0.0).abs() / sliding_length
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         let mut all = vec![
-            Parameter::new("level_command", setting.strengths[0], Unit::Command),
-            if setting.inner[0] > 0.0 {
-                Parameter::new("sliding_length", setting.inner[0], Unit::Position)
-            } else {
-                Parameter::new("creep_speed", -setting.inner[0], Unit::PositionPerSecond)
+            Parameter::new("level_command", strengths[0], Unit::Command),
+            match self.turning {
+                Turning::Length { sliding_length } => Parameter::new("sliding_length", sliding_length, Unit::Position),
+                Turning::Creep { speed } => Parameter::new("creep_speed", speed, Unit::PositionPerSecond),
             },
         ];
-        if setting.inner[1] > 0.0 {
-            all.push(Parameter::new("stribeck_speed", setting.inner[1], Unit::PositionPerSecond));
-            all.push(Parameter::new("stribeck_rise", setting.inner[2], Unit::Ratio));
+        if let Some(Stribeck { speed, rise }) = self.stribeck {
+            all.push(Parameter::new("stribeck_speed", speed, Unit::PositionPerSecond));
+            all.push(Parameter::new("stribeck_rise", rise, Unit::Ratio));
         }
         all
     }
 
-    fn is_possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
-        setting.strengths.first().is_some_and(|s| *s > 0.0)
+    fn is_possible(&self, strengths: &[f64], _errors: &[f64]) -> bool {
+        strengths.first().is_some_and(|s| *s > 0.0)
     }
 
     /// Bearings and cables hold to their laws to about a hundredth.
-    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
-        let length = if given.has("creep_speed") {
-            -given.positive("creep_speed")?
+    fn setting_of(given: &Given, scene: &Scene) -> Result<(CoulombFriction, Vec<f64>), PhysicsError> {
+        let turning = if given.has("creep_speed") {
+            Turning::Creep { speed: given.positive("creep_speed")? }
         } else if given.has("sliding_length") {
-            given.positive("sliding_length")?
+            Turning::Length { sliding_length: given.positive("sliding_length")? }
         } else {
-            (6.0 * scene.noise).max(1e-5 * scene.travel)
+            Turning::Length { sliding_length: (6.0 * scene.noise).max(1e-5 * scene.travel) }
         };
-        let (speed, rise) = if given.has("stribeck_speed") {
-            (given.positive("stribeck_speed")?, given.need("stribeck_rise")?)
-        } else {
-            (0.0, 0.0)
-        };
-        Ok(Setting { inner: vec![length, speed, rise], strengths: vec![given.need("level_command")?] })
+        let rising = given
+            .has("stribeck_speed")
+            .then(|| Ok(Stribeck { speed: given.positive("stribeck_speed")?, rise: given.need("stribeck_rise")? }));
+        let law = CoulombFriction { turning, stribeck: rising.transpose()? };
+        Ok((law, vec![given.need("level_command")?]))
     }
 }

@@ -1,13 +1,18 @@
 //! The amplifier's current is limited: i = sat(u, limit).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
-/// Inner: the limit.
-pub struct CurrentSaturation;
+/// The amplifier's limit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CurrentSaturation {
+    /// Largest current, as a command (command_unit), above 0.
+    pub limit: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "current_saturation",
     port: Port::Amplifier,
     entry: Entry::Command,
@@ -31,35 +36,39 @@ impl Law for Clip {
     }
 }
 
-impl Effect for CurrentSaturation {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for CurrentSaturation {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn shown_over() -> ShownOver {
         ShownOver::Input
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<CurrentSaturation> {
         // Dense towards the largest command: there few samples are touched, and each point touches others.
         let near = (0..8).map(|i| 1.0 - 0.12 * 0.7f64.powi(i));
         let far = (3..23).map(|i| f64::from(i) / 26.0);
-        far.chain(near).map(|s| vec![scene.command * s]).collect()
+        far.chain(near).map(|s| CurrentSaturation { limit: scene.command * s }).collect()
     }
 
-    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Clip { limit: inner[0] })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.limit)]
     }
 
-    fn is_hard_nonlinearity(&self) -> bool {
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Clip { limit: self.limit })
+    }
+
+    fn is_hard_nonlinearity() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        vec![Parameter::new("limit", setting.inner[0], Unit::Command)]
+    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        vec![Parameter::new("limit", self.limit, Unit::Command)]
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        Ok(Setting { inner: vec![given.positive("limit")?], strengths: vec![1.0] })
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(CurrentSaturation, Vec<f64>), PhysicsError> {
+        Ok((CurrentSaturation { limit: given.positive("limit")? }, vec![1.0]))
     }
 }

@@ -4,7 +4,8 @@
 //! what the effect adds, against the same sine. Where [`super::describing`] knows the position alone, this one also drives
 //! laws that look at the acting command. Time and spindle stand still: a disturbance adds nothing.
 
-use super::effect::{COLUMNS, Effect, Entry, Setting};
+use super::effect::{COLUMNS, Entry};
+use super::library::Setting;
 use super::sample::{Sample, Scene};
 use nalgebra::Complex;
 use std::f64::consts::TAU;
@@ -60,11 +61,11 @@ impl Cycle {
         Sample { x: m.position * sin, v: m.position * m.w_rad_s * cos, u: i, i, ..Sample::default() }
     }
 
-    /// The phasor that `effect` adds (command_unit, or position_unit at [`Entry::Position`]) against the input's sine.
-    pub fn added(&self, effect: &dyn Effect, setting: &Setting, scene: &Scene, m: &Motion) -> Complex<f64> {
-        let (entry, columns) = (effect.facts().entry, effect.facts().columns);
+    /// The phasor that an effect adds (command_unit, or position_unit at [`Entry::Position`]) against the input's sine.
+    pub fn added(&self, setting: &Setting, scene: &Scene, m: &Motion) -> Complex<f64> {
+        let (entry, columns) = (setting.facts().entry, setting.facts().columns);
         let fine = Scene { sample_time_s: TAU / m.w_rad_s / STEPS as f64, ..scene.clone() };
-        let mut law = effect.law(&setting.inner, &fine);
+        let mut law = setting.law.in_motion(&fine);
         let mut out = [0.0; COLUMNS];
         let mut last = Complex::new(f64::NAN, 0.0);
         for _ in 0..CYCLES {

@@ -2,14 +2,19 @@
 //!
 //! i = u - clip(u, -D, D), the dead zone of textbooks (Gelb, Vander Velde 1968).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
-/// Inner: half of the band's width.
-pub struct DeadBand;
+/// The band without an answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeadBand {
+    /// Half of its width (command_unit), above 0.
+    pub half_width: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "dead_band",
     port: Port::Amplifier,
     entry: Entry::Command,
@@ -33,42 +38,49 @@ impl Law for Zone {
     }
 }
 
-impl Effect for DeadBand {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for DeadBand {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn shown_over() -> ShownOver {
         ShownOver::Input
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        logarithmic(2e-5 * scene.command, 0.5 * scene.command, 20).into_iter().map(|d| vec![d]).collect()
+    fn grid(scene: &Scene) -> Vec<DeadBand> {
+        logarithmic(2e-5 * scene.command, 0.5 * scene.command, 20)
+            .into_iter()
+            .map(|half_width| DeadBand { half_width })
+            .collect()
     }
 
-    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Zone { half: inner[0].abs() })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.half_width)]
     }
 
-    fn is_hard_nonlinearity(&self) -> bool {
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Zone { half: self.half_width.abs() })
+    }
+
+    fn is_hard_nonlinearity() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("half_width", setting.inner[0], Unit::Command),
-            Parameter::new("width", 2.0 * setting.inner[0], Unit::Command),
+            Parameter::new("half_width", self.half_width, Unit::Command),
+            Parameter::new("width", 2.0 * self.half_width, Unit::Command),
         ]
     }
 
     /// A machine holds to this law to about a hundredth.
-    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        let half =
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(DeadBand, Vec<f64>), PhysicsError> {
+        let half_width =
             if given.has("half_width") { given.positive("half_width")? } else { 0.5 * given.positive("width")? };
-        Ok(Setting { inner: vec![half], strengths: vec![1.0] })
+        Ok((DeadBand { half_width }, vec![1.0]))
     }
 }

@@ -1,7 +1,7 @@
 //! What every effect beyond the linear plant says of itself, and how it acts.
 //!
-//! An effect is a law with a few strengths (linear) and a few inner parameters (a sliding length, a period, a limit). Its
-//! law turns the motion into columns; strengths times columns, summed, enter the loop at one place ([`Entry`]).
+//! An effect is a law with a few strengths (linear) and numbers of its own (a sliding length, a period, a limit; [`Parametric`]). In motion
+//! the law gives columns; strengths times columns, summed, enter the loop at one place ([`Entry`]).
 
 use super::parameter::Parameter;
 use super::sample::{Sample, Scene};
@@ -51,7 +51,7 @@ pub struct Facts {
     pub entry: Entry,
     /// Number of columns, each with one strength; at most [`COLUMNS`].
     pub columns: usize,
-    /// Whether the strengths are 1 by definition (a saturation is there or not; its limit is an inner parameter).
+    /// Whether the strengths are 1 by definition (a saturation is there or not; its limit is a number of its law).
     pub fixed: bool,
     /// Whether the strengths differ from record to record (a mains line starts at another phase each time).
     pub per_record: bool,
@@ -69,15 +69,6 @@ pub struct Facts {
 
 /// Most columns of one effect.
 pub const COLUMNS: usize = 6;
-
-/// Numbers that fix an effect: inner parameters and strengths, in the effect's own order.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Setting {
-    /// Inner parameters.
-    pub inner: Vec<f64>,
-    /// Strengths, one a column.
-    pub strengths: Vec<f64>,
-}
 
 /// Why a physics entry of a plant file cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -196,118 +187,159 @@ pub enum ShownOver {
     Spindle,
 }
 
-/// One effect of the library.
-pub trait Effect: Sync {
+/// A law with numbers of its own: what its file gives. `library` makes one type of all of them.
+pub trait Parametric: Clone + PartialEq + std::fmt::Debug + Sized {
     /// What is known beforehand.
-    fn facts(&self) -> &'static Facts;
+    fn known() -> &'static Facts;
 
-    /// Points of the inner parameters to scan; one empty point where there are none, no point where these records leave
-    /// the effect without meaning (no spindle, for instance).
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>>;
+    /// The same of this one, where it differs from one to the other: a curve at one port.
+    fn facts(&self) -> &'static Facts {
+        Self::known()
+    }
 
-    /// The law for these inner parameters, at rest.
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law>;
+    /// Points of the search; one where there is nothing to search, none where these records leave the law without meaning (no spindle, for
+    /// instance).
+    fn grid(scene: &Scene) -> Vec<Self>;
+
+    /// Its numbers that are measures (lengths, times, frequencies), in an order of its own; none at the place of one that this form of the law
+    /// has not. A law has as many places in every form.
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        Vec::new()
+    }
+
+    /// What is chosen and not measured: a form, a mode, a harmonic; 0 for the plainest.
+    fn choices(&self) -> Vec<usize> {
+        Vec::new()
+    }
+
+    /// What two laws must share for the search to go from one to the other by their numbers.
+    fn class(&self) -> Vec<usize> {
+        self.choices()
+    }
+
+    /// Which of several things of one kind it is, that may stand in the place of another: a mode of several, a shape of a field.
+    fn member(&self) -> usize {
+        0
+    }
+
+    /// Numbers and choices that this form is told by.
+    fn told(&self) -> usize {
+        let numbers = self.clone().numbers_mut().into_iter().flatten().filter(|n| **n != 0.0).count();
+        numbers + self.choices().iter().filter(|c| **c != 0).count()
+    }
+
+    /// The law at rest.
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law>;
 
     /// The parameters as reports name them.
-    fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter>;
+    fn parameters(&self, strengths: &[f64], scene: &Scene) -> Vec<Parameter>;
+
+    /// The law and its strengths from named parameters; the inverse of [`Parametric::parameters`].
+    fn setting_of(given: &Given, scene: &Scene) -> Result<(Self, Vec<f64>), PhysicsError>;
 
     /// Whether a machine can be so: a drag takes energy, it gives none. `errors` are the standard errors of the strengths, empty
     /// where they are not known yet.
-    fn is_possible(&self, _setting: &Setting, _errors: &[f64]) -> bool {
+    fn is_possible(&self, _strengths: &[f64], _errors: &[f64]) -> bool {
         true
     }
 
     /// Whether it is a drag. Any two of them are ends of one law, told apart by a length alone.
-    fn is_drag(&self) -> bool {
+    fn is_drag() -> bool {
         false
     }
 
     /// Whether it goes by a clock of its own, so that records which were not fitted may find it elsewhere.
-    fn has_own_clock(&self) -> bool {
+    fn has_own_clock() -> bool {
         false
     }
 
     /// What it is drawn over.
-    fn shown_over(&self) -> ShownOver {
+    fn shown_over() -> ShownOver {
         ShownOver::Time
     }
 
-    /// Share of the least value of inner number `place` on the grid down to which a simulation still tells it, where it tells more than the
+    /// Share of the least value of number `place` on the grid down to which a simulation still tells it, where it tells more than the
     /// recorded motion does: noise of the sensor hides how dry a drag is, and a simulation has none.
-    fn finer_simulated(&self, _place: usize) -> Option<f64> {
+    fn finer_simulated(_place: usize) -> Option<f64> {
         None
     }
 
     /// Whether it falls into a single record at a time of its own: a push.
-    fn is_single_event(&self) -> bool {
+    fn is_single_event() -> bool {
         false
     }
 
     /// Whether it is a tone of one frequency, which a narrow band of noise looks like.
-    fn is_tone(&self) -> bool {
+    fn is_tone() -> bool {
         false
     }
 
     /// Whether strengths of each record's own must not follow the motion: what comes anew with every repeat of one move is made by the move.
-    fn independent_of_motion(&self) -> bool {
+    fn independent_of_motion() -> bool {
         false
     }
 
     /// Whether every machine of this kind has it to some degree: a coil in a magnet gap, an arm on a bearing.
-    fn is_on_every_machine(&self) -> bool {
+    fn is_on_every_machine() -> bool {
         false
     }
 
-    /// Whether a machine may have several that differ in their first inner number: lines, modes, pushes.
-    fn may_occur_several_times(&self) -> bool {
+    /// Whether a machine may have several that differ in their first number: lines, modes, pushes.
+    fn may_occur_several_times() -> bool {
         false
     }
 
     /// Whether it answers small differences of a command or a motion out of proportion, by a limit or a turn: repeats then differ by more than
     /// the linear answer to their commands, and their mean is not what it does to their mean.
-    fn is_hard_nonlinearity(&self) -> bool {
+    fn is_hard_nonlinearity() -> bool {
         false
+    }
+
+    /// Whether stiffness or damping of the body change with the amplitude of the motion under it, or stand beside what does so: friction, springs.
+    fn acts_on_body() -> bool {
+        false
+    }
+
+    /// Length over which a drag turns round (position_unit), where it is a spring before it slides.
+    fn presliding_length(&self) -> Option<f64> {
+        None
     }
 
     /// Steepest torque over position of a law that the motion meets (command_unit per position_unit); 0 where it is no stiffer than a machine.
     /// It decides how finely a simulation steps.
-    fn stiffness(&self, _setting: &Setting) -> f64 {
+    fn stiffness(&self, _strengths: &[f64]) -> f64 {
         0.0
     }
 
     /// Share by which a number may be off because no machine follows a law to the letter; long records make intervals narrower than that.
-    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _parameter: &str) -> f64 {
         FORM
     }
 
-    /// Inner numbers that the search takes in steps and the last fit as measures: place and range. They are above 0.
-    fn measured_in_last_fit(&self, _inner: &[f64]) -> Vec<(usize, [f64; 2])> {
+    /// Numbers that the search takes in steps and the last fit as measures: place and range. They are above 0.
+    fn measured_in_last_fit(&self) -> Vec<(usize, [f64; 2])> {
         Vec::new()
     }
 
-    /// Inner numbers under which the same thing is possible, where `setting` is not: a wave of twice its period carried by its second
-    /// harmonic.
-    fn equivalent(&self, _setting: &Setting) -> Option<Vec<f64>> {
+    /// The law that does the same thing and is possible, where this one is not: a wave of twice its period carried by its second harmonic.
+    fn equivalent(&self) -> Option<Self> {
         None
     }
 
     /// Motions of its own over `n` samples that a record may begin in, in the recorded position: what still rings from the move before.
-    fn free_motions(&self, _inner: &[f64], _scene: &Scene, _n: usize) -> Vec<Vec<f64>> {
+    fn free_motions(&self, _scene: &Scene, _n: usize) -> Vec<Vec<f64>> {
         Vec::new()
     }
 
     /// Time constant (s) of what a command before the record has left in it, where that is no motion of the body.
-    fn memory_time_s(&self, _inner: &[f64]) -> Option<f64> {
+    fn memory_time_s(&self) -> Option<f64> {
         None
     }
 
     /// Its part in the loop's response at `w_rad_s`, sampled as the law samples it.
-    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Cycle
     }
-
-    /// The setting from named parameters; the inverse of [`Effect::parameters`].
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError>;
 }
 
 /// A law in motion. Columns are per unit of strength.

@@ -3,15 +3,31 @@
 //! m = x + sum over h = 1, 2 of a_h cos(2 pi h x/P + phi_h): offsets of the two photocurrents give the first harmonic, unequal
 //! amplitudes and a phase that is not 90 degrees the second (Heydemann 1981).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use std::f64::consts::TAU;
 
-/// Inner: the period, the number of harmonics (1 or 2). Strengths: cosine and sine of each.
-pub struct EncoderCyclicError;
+/// The wave of the grating. Its strengths are cosine and sine of each harmonic.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EncoderCyclicError {
+    /// Period of the grating (position_unit), above 0.
+    pub period: f64,
+    /// Which harmonics it has.
+    pub harmonics: Harmonics,
+}
 
-static FACTS: Facts = Facts {
+/// The harmonics of a wave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Harmonics {
+    /// The first alone.
+    First,
+    /// The first and the second.
+    FirstAndSecond,
+}
+
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "encoder_cyclic_error",
     port: Port::Sensor,
     entry: Entry::Position,
@@ -42,16 +58,22 @@ impl Law for Wave {
 /// Second harmonic over the first from which the wave is one of half the period.
 const CARRIES: f64 = 2.0;
 
-impl Effect for EncoderCyclicError {
-    fn facts(&self) -> &'static Facts {
+impl EncoderCyclicError {
+    fn second(&self) -> bool {
+        self.harmonics == Harmonics::FirstAndSecond
+    }
+}
+
+impl Parametric for EncoderCyclicError {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn shown_over() -> ShownOver {
         ShownOver::Position
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<EncoderCyclicError> {
         // Evenly in 1/P, seven tenths of a wave over twice the travel apart: the nearest point still sees more than half of any
         // wave, and refinement finds the rest.
         let finest = (8.0 * scene.noise).max(scene.travel / 100.0);
@@ -60,44 +82,53 @@ impl Effect for EncoderCyclicError {
         let step = 0.35 / scene.travel;
         let count = (((1.0 / finest - 1.0 / coarse) / step).ceil() as usize).clamp(1, 700);
         let periods = (0..count).map(|i| 1.0 / (1.0 / coarse + step * i as f64));
-        periods.flat_map(|p| [vec![p, 1.0], vec![p, 2.0]]).collect()
+        let both = [Harmonics::First, Harmonics::FirstAndSecond];
+        periods.flat_map(|period| both.map(|harmonics| EncoderCyclicError { period, harmonics })).collect()
     }
 
-    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Wave { period: inner[0], second: inner[1] > 1.5 })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.period)]
     }
 
-    fn is_possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
+    fn choices(&self) -> Vec<usize> {
+        vec![if self.second() { 2 } else { 1 }]
+    }
+
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Wave { period: self.period, second: self.second() })
+    }
+
+    fn is_possible(&self, strengths: &[f64], _errors: &[f64]) -> bool {
         // A wave whose second harmonic carries it is one of half the period.
-        let size = |i: usize| setting.strengths[i].hypot(setting.strengths[i + 1]);
-        setting.inner[1] < 1.5 || size(2) < CARRIES * size(0)
+        let size = |i: usize| strengths[i].hypot(strengths[i + 1]);
+        !self.second() || size(2) < CARRIES * size(0)
     }
 
-    fn equivalent(&self, setting: &Setting) -> Option<Vec<f64>> {
-        Some(vec![0.5 * setting.inner[0], setting.inner[1]])
+    fn equivalent(&self) -> Option<EncoderCyclicError> {
+        Some(EncoderCyclicError { period: 0.5 * self.period, ..self.clone() })
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        let at = |i: usize| setting.strengths.get(i).copied().unwrap_or(0.0);
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        let at = |i: usize| strengths.get(i).copied().unwrap_or(0.0);
         let pair = |i: usize| (at(i).hypot(at(i + 1)), (-at(i + 1)).atan2(at(i)).to_degrees());
         let (first, second) = (pair(0), pair(2));
         let mut all = vec![
             Parameter::new("amplitude", first.0, Unit::Position),
-            Parameter::new("period", setting.inner[0], Unit::Position),
+            Parameter::new("period", self.period, Unit::Position),
             Parameter::new("phase_deg", first.1, Unit::Degree),
         ];
-        if setting.inner[1] > 1.5 {
+        if self.second() {
             all.push(Parameter::new("amplitude_2", second.0, Unit::Position));
             all.push(Parameter::new("phase_2_deg", second.1, Unit::Degree));
         }
         all
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(EncoderCyclicError, Vec<f64>), PhysicsError> {
         let pair = |amplitude: f64, phase: f64| [amplitude * phase.cos(), -amplitude * phase.sin()];
         let first = pair(given.need("amplitude")?, given.or("phase_deg", 0.0).to_radians());
         let second = pair(given.or("amplitude_2", 0.0), given.or("phase_2_deg", 0.0).to_radians());
-        let harmonics = if given.has("amplitude_2") { 2.0 } else { 1.0 };
-        Ok(Setting { inner: vec![given.positive("period")?, harmonics], strengths: [first, second].concat() })
+        let harmonics = if given.has("amplitude_2") { Harmonics::FirstAndSecond } else { Harmonics::First };
+        Ok((EncoderCyclicError { period: given.positive("period")?, harmonics }, [first, second].concat()))
     }
 }

@@ -3,14 +3,19 @@
 //! m = x + e2 (x - x0)² + e3 (x - x0)³: the first terms of an eccentric scale's e cos(x + phi) over a part of a turn. The
 //! constant and the slope are offset and gain of the plant.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
-/// Inner: centre. Strengths: e2, e3.
-pub struct EncoderScaleError;
+/// The uneven scale. Its strengths are e2 and e3.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EncoderScaleError {
+    /// Position at which it reads right (position_unit).
+    pub centre: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "encoder_scale_error",
     port: Port::Sensor,
     entry: Entry::Position,
@@ -35,36 +40,40 @@ impl Law for Scale {
     }
 }
 
-impl Effect for EncoderScaleError {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for EncoderScaleError {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn shown_over() -> ShownOver {
         ShownOver::Position
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        vec![vec![scene.centre]]
+    fn grid(scene: &Scene) -> Vec<EncoderScaleError> {
+        vec![EncoderScaleError { centre: scene.centre }]
     }
 
-    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Scale { centre: inner[0] })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.centre)]
     }
 
-    fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {
-        let [e2, e3] = [setting.strengths[0], setting.strengths[1]];
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Scale { centre: self.centre })
+    }
+
+    fn parameters(&self, strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
+        let [e2, e3] = [strengths[0], strengths[1]];
         let travel = scene.travel;
         vec![
             Parameter::new("quadratic", e2, Unit::PerPosition),
             Parameter::new("cubic", e3, Unit::PerPositionSquared),
-            Parameter::new("centre", setting.inner[0], Unit::Position),
+            Parameter::new("centre", self.centre, Unit::Position),
             Parameter::new("error_at_travel", travel * travel * (e2 + e3 * travel), Unit::Position),
         ]
     }
 
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
-        let inner = vec![given.or("centre", scene.centre)];
-        Ok(Setting { inner, strengths: vec![given.need("quadratic")?, given.or("cubic", 0.0)] })
+    fn setting_of(given: &Given, scene: &Scene) -> Result<(EncoderScaleError, Vec<f64>), PhysicsError> {
+        let law = EncoderScaleError { centre: given.or("centre", scene.centre) };
+        Ok((law, vec![given.need("quadratic")?, given.or("cubic", 0.0)]))
     }
 }

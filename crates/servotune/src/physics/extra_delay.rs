@@ -2,18 +2,23 @@
 //!
 //! m(t) = x(t - d). Between samples the trajectory is the cubic through positions and velocities (Hermite).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 
-/// Inner: the delay.
-pub struct ExtraDelay;
+/// The delay.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExtraDelay {
+    /// Delay (s), above 0 and at most 16 samples.
+    pub delay_s: f64,
+}
 
 /// Longest delay (samples).
 const LONGEST: usize = 16;
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "extra_delay",
     port: Port::Time,
     entry: Entry::Position,
@@ -74,32 +79,39 @@ impl Law for Late {
     }
 }
 
-impl Effect for ExtraDelay {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for ExtraDelay {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        [0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0].iter().map(|n| vec![n * scene.sample_time_s]).collect()
+    fn grid(scene: &Scene) -> Vec<ExtraDelay> {
+        [0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0]
+            .iter()
+            .map(|n| ExtraDelay { delay_s: n * scene.sample_time_s })
+            .collect()
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.delay_s)]
+    }
+
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
         let step = scene.sample_time_s;
-        let samples = (inner[0] / step).clamp(0.0, LONGEST as f64);
+        let samples = (self.delay_s / step).clamp(0.0, LONGEST as f64);
         Box::new(Late { samples, step, past: [(0.0, 0.0); LONGEST + 2], newest: 0, started: false })
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        vec![Parameter::new("delay_s", setting.inner[0], Unit::Second)]
+    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        vec![Parameter::new("delay_s", self.delay_s, Unit::Second)]
     }
 
-    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
-        Share::Delay(setting.inner[0])
+    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Delay(self.delay_s)
     }
 
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(given: &Given, scene: &Scene) -> Result<(ExtraDelay, Vec<f64>), PhysicsError> {
         let longest = (LONGEST as f64 + 1e-9) * scene.sample_time_s;
-        let delay = given.between("delay_s", 0.0, longest, "above 0 and at most 16 samples")?;
-        Ok(Setting { inner: vec![delay], strengths: vec![1.0] })
+        let delay_s = given.between("delay_s", 0.0, longest, "above 0 and at most 16 samples")?;
+        Ok((ExtraDelay { delay_s }, vec![1.0]))
     }
 }

@@ -1,9 +1,9 @@
 //! A curve without a name: what no law of the library holds, as it was estimated at one port of the machine.
 //!
 //! A natural cubic spline through knots, straight beyond the first and the last with the slope that it has there; at the amplifier a
-//! first-order lag may follow it. One effect for each port, all under the name `free_form`; the search of the library leaves them out (`specs/mismatch.md`, "Curves without a name").
+//! first-order lag may follow it. One curve for each port, all under the name `free_form`; the search of the library leaves them out (`specs/mismatch.md`, "Curves without a name").
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::Parameter;
 use super::sample::{Sample, Scene};
 use super::share::Share;
@@ -25,41 +25,40 @@ pub enum CurvePort {
     SensorOverPosition,
 }
 
-/// The effect at one port. Inner: positions of the knots, then the values there, then the time constant of the lag (s) where there is one.
+/// A curve at one port.
+#[derive(Clone, Debug, PartialEq)]
 pub struct FreeForm {
-    port: CurvePort,
-    facts: Facts,
+    /// Where it acts and what it goes over.
+    pub port: CurvePort,
+    /// Positions of the knots, strictly ascending, in the unit of the argument.
+    pub at: Vec<f64>,
+    /// Values there, one a knot, in the unit of the port.
+    pub value: Vec<f64>,
+    /// Time constant of the lag that follows an amplifier's curve (s), above 0; none without one.
+    pub lag_s: Option<f64>,
 }
 
-const fn made(port: CurvePort, part: Port, entry: Entry, equation: &'static str) -> FreeForm {
-    FreeForm {
-        port,
-        facts: Facts {
-            name: "free_form",
-            port: part,
-            entry,
-            columns: 1,
-            fixed: true,
-            per_record: false,
-            equation,
-            says: "something acts along a curve that has no name in the library",
-            confused_with: &[],
-            experiment: "the same moves at three sizes, and slow ramps over the whole range in both directions",
-            band_hz: [0.1, 3000.0],
-        },
+const fn made(part: Port, entry: Entry, equation: &'static str) -> Facts {
+    Facts {
+        name: "free_form",
+        port: part,
+        entry,
+        columns: 1,
+        fixed: true,
+        per_record: false,
+        equation,
+        says: "something acts along a curve that has no name in the library",
+        confused_with: &[],
+        experiment: "the same moves at three sizes, and slow ramps over the whole range in both directions",
+        band_hz: [0.1, 3000.0],
     }
 }
 
-static TORQUE_OVER_POSITION: FreeForm =
-    made(CurvePort::TorqueOverPosition, Port::Torque, Entry::Torque, "tau = u + f(x), f a natural cubic spline");
-static TORQUE_OVER_VELOCITY: FreeForm =
-    made(CurvePort::TorqueOverVelocity, Port::Torque, Entry::Torque, "tau = u + f(x'), f a natural cubic spline");
-static AMPLIFIER_OVER_COMMAND: FreeForm =
-    made(CurvePort::AmplifierOverCommand, Port::Amplifier, Entry::Command, "i = f(u), f a natural cubic spline");
-static GAIN_OVER_POSITION: FreeForm =
-    made(CurvePort::GainOverPosition, Port::Torque, Entry::Torque, "tau = f(x) u, f a natural cubic spline");
-static SENSOR_OVER_POSITION: FreeForm =
-    made(CurvePort::SensorOverPosition, Port::Sensor, Entry::Position, "m = f(x), f a natural cubic spline");
+static TORQUE_OVER_POSITION: Facts = made(Port::Torque, Entry::Torque, "tau = u + f(x), f a natural cubic spline");
+static TORQUE_OVER_VELOCITY: Facts = made(Port::Torque, Entry::Torque, "tau = u + f(x'), f a natural cubic spline");
+static AMPLIFIER_OVER_COMMAND: Facts = made(Port::Amplifier, Entry::Command, "i = f(u), f a natural cubic spline");
+static GAIN_OVER_POSITION: Facts = made(Port::Torque, Entry::Torque, "tau = f(x) u, f a natural cubic spline");
+static SENSOR_OVER_POSITION: Facts = made(Port::Sensor, Entry::Position, "m = f(x), f a natural cubic spline");
 
 impl CurvePort {
     /// All of them.
@@ -71,12 +70,8 @@ impl CurvePort {
         CurvePort::SensorOverPosition,
     ];
 
-    /// The effect at this port.
-    pub fn effect(self) -> &'static dyn Effect {
-        self.form()
-    }
-
-    fn form(self) -> &'static FreeForm {
+    /// What is known of a curve at this port.
+    fn known(self) -> &'static Facts {
         match self {
             CurvePort::TorqueOverPosition => &TORQUE_OVER_POSITION,
             CurvePort::TorqueOverVelocity => &TORQUE_OVER_VELOCITY,
@@ -127,9 +122,9 @@ impl CurvePort {
         }
     }
 
-    /// The setting of a curve through these points, `at` strictly ascending.
-    pub fn setting(self, at: &[f64], value: &[f64]) -> Setting {
-        Setting { inner: at.iter().chain(value).copied().collect(), strengths: vec![1.0] }
+    /// The curve through these points, `at` strictly ascending.
+    pub fn curve(self, at: &[f64], value: &[f64]) -> FreeForm {
+        FreeForm { port: self, at: at.to_vec(), value: value.to_vec(), lag_s: None }
     }
 
     /// The entry of a plant file.
@@ -138,36 +133,27 @@ impl CurvePort {
         let [_, unit] = self.units(position, command);
         let curve = Some(CurveEntry { port, argument, unit, knots });
         let parameters = lag_s.map(|lag| (LAG.to_owned(), lag)).into_iter().collect();
-        PhysicsEntry { effect: "free_form".into(), parameters, curve }
-    }
-
-    /// A setting whose output follows its curve with a lag.
-    pub fn lagged(mut setting: Setting, lag_s: f64) -> Setting {
-        setting.inner.push(lag_s);
-        setting
+        PhysicsEntry { effect: FACTS.name.into(), parameters, curve }
     }
 }
 
-/// The curve of a setting.
-pub fn spline(setting: &Setting) -> Spline {
-    of(&setting.inner)
-}
+impl FreeForm {
+    /// The spline through the knots.
+    pub fn spline(&self) -> Spline {
+        Spline::new(self.at.clone(), self.value.clone())
+    }
 
-fn of(inner: &[f64]) -> Spline {
-    let n = inner.len() / 2;
-    Spline::new(inner[..n].to_vec(), inner[n..2 * n].to_vec())
-}
-
-/// The lag behind the curve (s).
-fn lag(inner: &[f64]) -> Option<f64> {
-    inner.last().copied().filter(|_| inner.len() % 2 == 1)
+    /// The same curve, its output following it with a lag (s).
+    pub fn lagged(self, lag_s: f64) -> FreeForm {
+        FreeForm { lag_s: Some(lag_s), ..self }
+    }
 }
 
 /// Name of the lag behind an amplifier's curve.
 const LAG: &str = "lag_s";
 
-/// The effect and the setting of a plant file's curve; refused by name where its keys make none.
-pub(super) fn restored(entry: &PhysicsEntry) -> Result<(&'static dyn Effect, Setting), PhysicsError> {
+/// A plant file's curve; refused by name where its keys make none.
+pub(super) fn restored(entry: &PhysicsEntry) -> Result<FreeForm, PhysicsError> {
     let wrong = |what: String| PhysicsError::Curve { effect: entry.effect.clone(), what };
     let curve =
         entry.curve.as_ref().ok_or_else(|| wrong("found no knots; expected port, argument, unit and knots".into()))?;
@@ -197,8 +183,7 @@ pub(super) fn restored(entry: &PhysicsEntry) -> Result<(&'static dyn Effect, Set
     }
     let at: Vec<f64> = knots.iter().map(|k| k.at).collect();
     let value: Vec<f64> = knots.iter().map(|k| k.value).collect();
-    let setting = port.setting(&at, &value);
-    Ok((port.effect(), lag_s.map_or_else(|| setting.clone(), |lag| CurvePort::lagged(setting.clone(), lag))))
+    Ok(FreeForm { port, at, value, lag_s })
 }
 
 struct Curve {
@@ -254,56 +239,58 @@ impl Law for Curve {
     }
 }
 
-impl Effect for FreeForm {
+impl Parametric for FreeForm {
+    fn known() -> &'static Facts {
+        &FACTS
+    }
+
     fn facts(&self) -> &'static Facts {
-        &self.port.form().facts
+        self.port.known()
     }
 
     /// None: the search of the library does not look for it.
-    fn scan_points(&self, _scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(_scene: &Scene) -> Vec<FreeForm> {
         Vec::new()
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
         let made = |tau: f64| {
             let ratio = scene.sample_time_s / tau;
             Lag { keep: (-ratio).exp(), mean: -(-ratio).exp_m1() / ratio, current: None }
         };
-        Box::new(Curve { port: self.port, spline: of(inner), lag: lag(inner).map(made) })
+        Box::new(Curve { port: self.port, spline: self.spline(), lag: self.lag_s.map(made) })
     }
 
-    fn memory_time_s(&self, inner: &[f64]) -> Option<f64> {
-        lag(inner)
+    fn memory_time_s(&self) -> Option<f64> {
+        self.lag_s
     }
 
     /// None: its numbers are knots.
-    fn parameters(&self, _setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         Vec::new()
     }
 
-    fn is_hard_nonlinearity(&self) -> bool {
+    fn is_hard_nonlinearity() -> bool {
         true
     }
 
     /// A reading that turns round does not tell where the arm is.
-    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
-        let spline = of(&setting.inner);
+    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+        let spline = self.spline();
         let rises = |k: &[f64]| spline.slope(k[0]) > 0.0 && spline.slope(0.5 * (k[0] + k[1])) > 0.0;
         let monotone = self.port != CurvePort::SensorOverPosition || spline.at().windows(2).all(rises);
         if monotone { Share::Cycle } else { Share::Blind }
     }
 
     /// Curves are restored from their knots (`restored`), not from named numbers.
-    fn setting_of(&self, _given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        Err(PhysicsError::Missing { effect: "free_form", parameter: "knots" })
+    fn setting_of(_given: &Given, _scene: &Scene) -> Result<(FreeForm, Vec<f64>), PhysicsError> {
+        Err(PhysicsError::Missing { effect: FACTS.name, parameter: "knots" })
     }
 }
 
 /// What is known beforehand of a curve at any port.
 pub static FACTS: Facts = made(
-    CurvePort::TorqueOverPosition,
     Port::Torque,
     Entry::Torque,
     "a natural cubic spline at one port: torque over position or velocity, amplifier over command, gain over position, sensor over position",
-)
-.facts;
+);

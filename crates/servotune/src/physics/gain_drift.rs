@@ -4,16 +4,37 @@
 //! another as the case lists them (each then has a gain of its own, which a refit of all records together cannot imitate); or, where
 //! a temperature was recorded, tau = i (1 + c (T - T0)): copper's resistance rises by 0.39 %/K, a magnet's field falls by about 0.1 %/K.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use super::share::Share;
 use nalgebra::Complex;
 
-/// Inner: thermal time constant (0: by the recorded temperature), clock (0: the record's, 1: the session's). Strength: final change, or change per degree.
-pub struct GainDrift;
+/// What the gain goes by. Its strength is the final change, or the change per degree.
+#[derive(Clone, Debug, PartialEq)]
+pub enum GainDrift {
+    /// The recorded temperature.
+    ByTemperature,
+    /// A first-order warming.
+    Warming {
+        /// Thermal time constant (s), above 0.
+        time_constant_s: f64,
+        /// What it counts from.
+        from: Start,
+    },
+}
 
-static FACTS: Facts = Facts {
+/// What a warming counts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// The start of each record.
+    Record,
+    /// The start of the session, whose records follow one another.
+    Session,
+}
+
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "gain_drift",
     port: Port::Amplifier,
     entry: Entry::Torque,
@@ -39,69 +60,86 @@ struct Warming {
 }
 
 impl Law for Warming {
-    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        out[0] = if self.tau > 0.0 {
-            let t = if self.session { from.session } else { from.t };
-            from.i * (1.0 - (-t / self.tau).exp() * self.mean)
-        } else {
-            from.i * 0.5 * (from.temperature + to.temperature)
-        };
+    fn columns(&self, from: &Sample, _to: &Sample, out: &mut [f64]) {
+        let t = if self.session { from.session } else { from.t };
+        out[0] = from.i * (1.0 - (-t / self.tau).exp() * self.mean);
     }
 }
 
-impl Effect for GainDrift {
-    fn facts(&self) -> &'static Facts {
+struct ByTemperature;
+
+impl Law for ByTemperature {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        out[0] = from.i * 0.5 * (from.temperature + to.temperature);
+    }
+}
+
+impl Parametric for GainDrift {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn shown_over() -> ShownOver {
         ShownOver::FactorOverTime
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        let mut all: Vec<Vec<f64>> = if scene.warm { vec![vec![0.0, 0.0]] } else { Vec::new() };
+    fn grid(scene: &Scene) -> Vec<GainDrift> {
+        let mut all = if scene.warm { vec![GainDrift::ByTemperature] } else { Vec::new() };
         // A time constant much above record or session is a straight line in time already.
         let record = logarithmic(0.03 * scene.duration_s, 3.0 * scene.duration_s, 7);
-        all.extend(record.into_iter().map(|tau| vec![tau, 0.0]));
+        let warming = |from| move |time_constant_s| GainDrift::Warming { time_constant_s, from };
+        all.extend(record.into_iter().map(warming(Start::Record)));
         if scene.session_s > ONE * scene.duration_s {
             let session = logarithmic(0.03 * scene.session_s, 3.0 * scene.session_s, 7);
-            all.extend(session.into_iter().map(|tau| vec![tau, 1.0]));
+            all.extend(session.into_iter().map(warming(Start::Session)));
         }
         all
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        let ratio = if inner[0] > 0.0 { scene.sample_time_s / inner[0] } else { 1.0 };
-        Box::new(Warming { tau: inner[0], session: inner[1] != 0.0, mean: -(-ratio).exp_m1() / ratio })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        match self {
+            GainDrift::ByTemperature => vec![None],
+            GainDrift::Warming { time_constant_s, .. } => vec![Some(time_constant_s)],
+        }
     }
 
-    fn has_own_clock(&self) -> bool {
+    fn choices(&self) -> Vec<usize> {
+        vec![usize::from(matches!(self, GainDrift::Warming { from: Start::Session, .. }))]
+    }
+
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        let &GainDrift::Warming { time_constant_s: tau, from } = self else { return Box::new(ByTemperature) };
+        let ratio = scene.sample_time_s / tau;
+        Box::new(Warming { tau, session: from == Start::Session, mean: -(-ratio).exp_m1() / ratio })
+    }
+
+    fn has_own_clock() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        if setting.inner[0] > 0.0 {
-            vec![
-                Parameter::new("gain_change", setting.strengths[0], Unit::Ratio),
-                Parameter::new("time_constant_s", setting.inner[0], Unit::Second),
-                Parameter::new("from_session_start", setting.inner[1], Unit::Ratio),
-            ]
-        } else {
-            vec![Parameter::new("gain_per_degree", setting.strengths[0], Unit::PerDegreeCelsius)]
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        match *self {
+            GainDrift::ByTemperature => vec![Parameter::new("gain_per_degree", strengths[0], Unit::PerDegreeCelsius)],
+            GainDrift::Warming { time_constant_s, from } => vec![
+                Parameter::new("gain_change", strengths[0], Unit::Ratio),
+                Parameter::new("time_constant_s", time_constant_s, Unit::Second),
+                Parameter::new("from_session_start", f64::from(from == Start::Session), Unit::Ratio),
+            ],
         }
     }
 
-    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
         // Fully warm: the machine after a long session. With a recorded temperature the cold machine.
-        Share::Ratio(Complex::new(if setting.inner[0] > 0.0 { setting.strengths[0] } else { 0.0 }, 0.0))
+        let warm = matches!(self, GainDrift::Warming { .. });
+        Share::Ratio(Complex::new(if warm { strengths[0] } else { 0.0 }, 0.0))
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(GainDrift, Vec<f64>), PhysicsError> {
         if given.has("gain_per_degree") {
-            return Ok(Setting { inner: vec![0.0, 0.0], strengths: vec![given.need("gain_per_degree")?] });
+            return Ok((GainDrift::ByTemperature, vec![given.need("gain_per_degree")?]));
         }
         let strengths = vec![given.need("gain_change")?];
-        let session = f64::from(given.or("from_session_start", 0.0) != 0.0);
-        Ok(Setting { inner: vec![given.positive("time_constant_s")?, session], strengths })
+        let from = if given.or("from_session_start", 0.0) != 0.0 { Start::Session } else { Start::Record };
+        Ok((GainDrift::Warming { time_constant_s: given.positive("time_constant_s")?, from }, strengths))
     }
 }

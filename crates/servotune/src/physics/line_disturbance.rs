@@ -2,16 +2,21 @@
 //!
 //! tau = a cos(2 pi f t) + b sin(2 pi f t); the mean over an interval is the value at its middle times sin(y)/y, y = pi f T.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 use std::f64::consts::{PI, TAU};
 
-/// Inner: frequency (Hz). Strengths: cosine and sine, per record.
-pub struct LineDisturbance;
+/// The hum. Its strengths are cosine and sine, per record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LineDisturbance {
+    /// Frequency (Hz), above 0.
+    pub frequency_hz: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "line_disturbance",
     port: Port::Torque,
     entry: Entry::Torque,
@@ -43,44 +48,48 @@ impl Law for Line {
     }
 }
 
-impl Effect for LineDisturbance {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for LineDisturbance {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<LineDisturbance> {
         let high = 1000f64.min(0.45 / scene.sample_time_s);
         // Mains of 50 and 60 Hz with harmonics, and rectified, first; then everything that the longest record resolves.
-        let mut all: Vec<Vec<f64>> = Vec::new();
+        let mut all: Vec<f64> = Vec::new();
         for base in [50.0, 60.0] {
-            all.extend((1..=6).map(|h| base * f64::from(h)).filter(|&f| f < high).map(|f| vec![f]));
+            all.extend((1..=6).map(|h| base * f64::from(h)).filter(|&f| f < high));
         }
         if scene.duration_s > 0.0 {
             let step = 0.8 / scene.duration_s;
             // A line shows at least three times in a record; what is slower is a drift.
             let first = 3.0 / scene.duration_s;
-            all.extend((0..POINTS).map(|i| first + step * i as f64).take_while(|&f| f < high).map(|f| vec![f]));
+            all.extend((0..POINTS).map(|i| first + step * i as f64).take_while(|&f| f < high));
         }
-        all
+        all.into_iter().map(|frequency_hz| LineDisturbance { frequency_hz }).collect()
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        let y = PI * inner[0] * scene.sample_time_s;
-        Box::new(Line { w: TAU * inner[0], mean: if y == 0.0 { 1.0 } else { y.sin() / y } })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.frequency_hz)]
     }
 
-    fn may_occur_several_times(&self) -> bool {
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        let y = PI * self.frequency_hz * scene.sample_time_s;
+        Box::new(Line { w: TAU * self.frequency_hz, mean: if y == 0.0 { 1.0 } else { y.sin() / y } })
+    }
+
+    fn may_occur_several_times() -> bool {
         true
     }
 
-    fn is_tone(&self) -> bool {
+    fn is_tone() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        let [a, b] = [setting.strengths[0], setting.strengths[1]];
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        let [a, b] = [strengths[0], strengths[1]];
         vec![
-            Parameter::new("frequency_hz", setting.inner[0], Unit::Hertz),
+            Parameter::new("frequency_hz", self.frequency_hz, Unit::Hertz),
             Parameter::new("amplitude_command", a.hypot(b), Unit::Command),
             Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
         ]
@@ -88,9 +97,9 @@ impl Effect for LineDisturbance {
 
     /// A hum does not heed what the machine does: it is as strong in every record. What excites itself from record to record is
     /// another thing.
-    fn is_possible(&self, setting: &Setting, errors: &[f64]) -> bool {
-        let amplitudes: Vec<f64> = setting.strengths.chunks_exact(2).map(|s| s[0].hypot(s[1])).collect();
-        if amplitudes.len() < 2 || errors.len() != setting.strengths.len() {
+    fn is_possible(&self, strengths: &[f64], errors: &[f64]) -> bool {
+        let amplitudes: Vec<f64> = strengths.chunks_exact(2).map(|s| s[0].hypot(s[1])).collect();
+        if amplitudes.len() < 2 || errors.len() != strengths.len() {
             return true;
         }
         let mean = amplitudes.iter().sum::<f64>() / amplitudes.len() as f64;
@@ -102,13 +111,13 @@ impl Effect for LineDisturbance {
         chi < free + 3.0 * (2.0 * free).sqrt()
     }
 
-    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(LineDisturbance, Vec<f64>), PhysicsError> {
         let (amplitude, phase) = (given.need("amplitude_command")?, given.or("phase_deg", 0.0).to_radians());
         let strengths = vec![amplitude * phase.cos(), -amplitude * phase.sin()];
-        Ok(Setting { inner: vec![given.positive("frequency_hz")?], strengths })
+        Ok((LineDisturbance { frequency_hz: given.positive("frequency_hz")? }, strengths))
     }
 }

@@ -4,7 +4,8 @@
 //! fixed-point steps and, where a stiff contact makes those crawl, by a bracketed secant. Second order in the step; where a law is so stiff that
 //! arm and law swing within few samples (a dry drag that holds), a sample is made in several steps.
 
-use super::effect::{COLUMNS, Effect, Entry, Law, Port, Setting};
+use super::effect::{COLUMNS, Entry, Law, Port};
+use super::library::Setting;
 use super::sample::{Sample, Scene};
 use crate::lti::{DiscretePlant, Intersample, LtiError, Plant, PlantState};
 
@@ -84,8 +85,8 @@ pub struct Reading {
 }
 
 /// Steps of a sample that a plant needs with these effects; a power of two, so that few changes of their numbers change it.
-fn steps(plant: &Plant, effects: &[(&dyn Effect, &Setting)], t: f64) -> Result<usize, LtiError> {
-    let stiffest = effects.iter().map(|(e, s)| e.stiffness(s)).fold(0.0f64, f64::max);
+fn steps(plant: &Plant, effects: &[&Setting], t: f64) -> Result<usize, LtiError> {
+    let stiffest = effects.iter().map(|s| s.stiffness()).fold(0.0f64, f64::max);
     if stiffest <= 0.0 {
         return Ok(1);
     }
@@ -157,20 +158,21 @@ impl Machine {
     }
 
     /// A machine with these effects; `scene` says what the laws need to know of it.
-    pub fn new(plant: &Plant, effects: &[(&dyn Effect, &Setting)], scene: &Scene) -> Result<Machine, LtiError> {
+    pub fn new(plant: &Plant, effects: &[&Setting], scene: &Scene) -> Result<Machine, LtiError> {
         let t = scene.sample_time_s;
         let steps = steps(plant, effects, t)?;
         let delayed = DiscretePlant::of(plant, t)?;
         let direct = DiscretePlant::of(&Plant { delay_s: 0.0, ..plant.clone() }, t / steps as f64)?;
         let (pushed, torqued) = (PlantState::at_rest(&delayed), PlantState::at_rest(&direct));
         let (mut command, mut torque, mut position) = (Vec::new(), Vec::new(), Vec::new());
-        for (effect, setting) in effects {
+        for setting in effects {
+            let facts = setting.facts();
             let part = Part {
-                law: effect.law(&setting.inner, scene),
+                law: setting.law.in_motion(scene),
                 strengths: setting.strengths.clone(),
-                head: effect.facts().port != Port::Sensor,
+                head: facts.port != Port::Sensor,
             };
-            match effect.facts().entry {
+            match facts.entry {
                 Entry::Command => command.push(part),
                 Entry::Torque => torque.push(part),
                 Entry::Position => position.push(part),

@@ -59,9 +59,9 @@ pub mod unmodelled_resonance;
 
 pub use cycle::{Cycle, Motion};
 pub use describing::describing;
-pub use effect::{COLUMNS, Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+pub use effect::{COLUMNS, Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 pub use free_form::CurvePort;
-pub use library::{curves, data_facts, effect, facts, library};
+pub use library::{AnyLaw, Effect, Setting, curves, data_facts, effect, facts, library};
 pub use machine::{Machine, Reading};
 pub use parameter::{Parameter, Unit};
 pub use restored::{Context, Restored};

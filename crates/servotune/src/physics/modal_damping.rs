@@ -7,8 +7,8 @@
 //! Or, where the resonance is a stage of a chain and its damper feels the stage's rate: zeta_j (1 + g |q1|), q1 the rate of the
 //! stage's deflection over w_j (`physics::stage`).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
-use super::mode_shift::mode;
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::mode_shift::{ModeForm, mode};
 use super::pair::{Pair, Turn};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
@@ -16,10 +16,19 @@ use super::stage::{Next, Stage};
 use nalgebra::Complex;
 use std::cell::Cell;
 
-/// Inner: number of the mode, growth of its damping per amplitude, form (0: modal, 1: stage of a chain).
-pub struct ModalDamping;
+/// The mode whose damping grows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModalDamping {
+    /// Its number in `plant.modes`, counted from 0.
+    pub mode: usize,
+    /// Share by which its damping grows over its amplitude (1/position_unit); below 0 where it falls.
+    pub growth: f64,
+    /// How its part of the motion is formed.
+    pub form: ModeForm,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "modal_damping",
     port: Port::Structure,
     entry: Entry::Position,
@@ -113,54 +122,67 @@ impl Law for Damper {
     }
 }
 
-impl Effect for ModalDamping {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for ModalDamping {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<ModalDamping> {
         let mut all = Vec::new();
+        let at = |mode, growth, form| ModalDamping { mode, growth, form };
         for (j, pair) in Pair::all(scene) {
             // The amplitude that the largest command as a tone at the mode would reach; real excitation stays below it.
             let reach = scene.command * pair.residue.norm() / pair.pole.re.abs();
             if reach > 0.0 && reach.is_finite() {
-                all.extend(logarithmic(0.3, 1000.0, 10).into_iter().map(|g| vec![j, g / reach, 0.0]));
-                all.extend(logarithmic(0.3, 100.0, 6).into_iter().map(|g| vec![j, -g / reach, 0.0]));
+                all.extend(logarithmic(0.3, 1000.0, 10).into_iter().map(|g| at(j, g / reach, ModeForm::Modal)));
+                all.extend(logarithmic(0.3, 100.0, 6).into_iter().map(|g| at(j, -g / reach, ModeForm::Modal)));
             }
             // The same of a stage: the body's answer at the mode, raised by it.
-            let Some(m) = scene.plant.modes.get(j as usize) else { continue };
+            let Some(m) = scene.plant.modes.get(j) else { continue };
             let reach = scene.command * scene.acceleration_gain().abs()
                 / (2.0 * m.pole_damping_ratio * m.pole_rad_s * m.pole_rad_s);
             if reach > 0.0 && reach.is_finite() {
-                all.extend(logarithmic(0.3, 300.0, 7).into_iter().map(|g| vec![j, g / reach, 1.0]));
+                all.extend(logarithmic(0.3, 300.0, 7).into_iter().map(|g| at(j, g / reach, ModeForm::Stage)));
             }
         }
         all
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        if inner[2] != 0.0
-            && let Some(stage) = Stage::of(scene, inner[0])
-        {
-            return Box::new(Damper { stage, growth: inner[1] });
-        }
-        Box::new(Joint::of(Pair::of(scene, inner[0]), inner[1], scene.sample_time_s))
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.growth)]
     }
 
-    fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {
+    fn choices(&self) -> Vec<usize> {
+        vec![self.mode, usize::from(self.form == ModeForm::Stage)]
+    }
+
+    fn member(&self) -> usize {
+        self.mode
+    }
+
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        if self.form == ModeForm::Stage
+            && let Some(stage) = Stage::of(scene, self.mode)
+        {
+            return Box::new(Damper { stage, growth: self.growth });
+        }
+        Box::new(Joint::of(Pair::of(scene, self.mode), self.growth, scene.sample_time_s))
+    }
+
+    fn parameters(&self, _strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
         let mut all = vec![
-            Parameter::new("mode", setting.inner[0], Unit::Ratio),
-            Parameter::new("growth", setting.inner[1], Unit::PerPosition),
-            Parameter::new("stage", setting.inner[2], Unit::Ratio),
+            Parameter::new("mode", self.mode as f64, Unit::Ratio),
+            Parameter::new("growth", self.growth, Unit::PerPosition),
+            Parameter::new("stage", f64::from(self.form == ModeForm::Stage), Unit::Ratio),
         ];
-        if let Some(pair) = Pair::of(scene, setting.inner[0]) {
+        if let Some(pair) = Pair::of(scene, self.mode) {
             all.push(Parameter::new("mode_hz", pair.pole.norm() / std::f64::consts::TAU, Unit::Hertz));
         }
         all
     }
 
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
-        let stage = f64::from(given.or("stage", 0.0) != 0.0);
-        Ok(Setting { inner: vec![mode(FACTS.name, given, scene)?, given.need("growth")?, stage], strengths: vec![1.0] })
+    fn setting_of(given: &Given, scene: &Scene) -> Result<(ModalDamping, Vec<f64>), PhysicsError> {
+        let form = ModeForm::of(given.or("stage", 0.0));
+        Ok((ModalDamping { mode: mode(FACTS.name, given, scene)?, growth: given.need("growth")?, form }, vec![1.0]))
     }
 }

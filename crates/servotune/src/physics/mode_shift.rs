@@ -6,7 +6,7 @@
 //!
 //! Or, where the resonance is a stage of a chain, its pole and zero move together (`physics::stage`).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::pair::{Pair, Turn};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
@@ -14,10 +14,37 @@ use super::stage::{Next, Stage};
 use nalgebra::Complex;
 use std::cell::Cell;
 
-/// Inner: number of the mode, shift per position, centre, form (0: modal, 1: stage of a chain).
-pub struct ModeShift;
+/// The mode that moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModeShift {
+    /// Its number in `plant.modes`, counted from 0.
+    pub mode: usize,
+    /// Share by which its frequency grows over the position (1/position_unit).
+    pub shift_per_position: f64,
+    /// Position at which it has the plant's frequency (position_unit).
+    pub centre: f64,
+    /// How its part of the motion is formed.
+    pub form: ModeForm,
+}
 
-static FACTS: Facts = Facts {
+/// How a mode's part of the motion is formed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ModeForm {
+    /// A term of the modal form: the sum of modes.
+    Modal,
+    /// A stage of a chain: the product of stages.
+    Stage,
+}
+
+impl ModeForm {
+    /// The form that files name by this number: 0 is modal.
+    pub(super) fn of(stage: f64) -> ModeForm {
+        if stage == 0.0 { ModeForm::Modal } else { ModeForm::Stage }
+    }
+}
+
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "mode_shift",
     port: Port::Structure,
     entry: Entry::Position,
@@ -107,61 +134,74 @@ impl Law for Sliding {
     }
 }
 
-impl Effect for ModeShift {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for ModeShift {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<ModeShift> {
         if scene.travel <= 0.0 {
             return Vec::new();
         }
         let shifts = logarithmic(1e-3, 0.1, 6);
-        let both = |s: f64| [[s, 0.0], [-s, 0.0], [s, 1.0], [-s, 1.0]];
-        let each = |j: f64| {
+        let both = |s: f64| [ModeForm::Modal, ModeForm::Stage].into_iter().flat_map(move |f| [(s, f), (-s, f)]);
+        let each = |mode: usize| {
             let all = shifts.iter().flat_map(move |&s| both(s));
-            all.map(move |[s, form]| vec![j, s / scene.travel, scene.centre, form])
+            let centre = scene.centre;
+            all.map(move |(s, form)| ModeShift { mode, shift_per_position: s / scene.travel, centre, form })
         };
         Pair::all(scene).into_iter().flat_map(|(j, _)| each(j)).collect()
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        if inner[3] != 0.0
-            && let Some(stage) = Stage::of(scene, inner[0])
-        {
-            return Box::new(Sliding { stage, slope: inner[1], centre: inner[2] });
-        }
-        let pair = Pair::of(scene, inner[0]);
-        Box::new(Shifted::of(pair, inner[1], inner[2], scene.sample_time_s))
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.shift_per_position), Some(&mut self.centre)]
     }
 
-    fn parameters(&self, setting: &Setting, scene: &Scene) -> Vec<Parameter> {
+    fn choices(&self) -> Vec<usize> {
+        vec![self.mode, usize::from(self.form == ModeForm::Stage)]
+    }
+
+    fn member(&self) -> usize {
+        self.mode
+    }
+
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        let (slope, centre) = (self.shift_per_position, self.centre);
+        if self.form == ModeForm::Stage
+            && let Some(stage) = Stage::of(scene, self.mode)
+        {
+            return Box::new(Sliding { stage, slope, centre });
+        }
+        Box::new(Shifted::of(Pair::of(scene, self.mode), slope, centre, scene.sample_time_s))
+    }
+
+    fn parameters(&self, _strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
         let mut all = vec![
-            Parameter::new("mode", setting.inner[0], Unit::Ratio),
-            Parameter::new("shift_per_position", setting.inner[1], Unit::PerPosition),
-            Parameter::new("centre", setting.inner[2], Unit::Position),
-            Parameter::new("shift_at_travel", setting.inner[1] * scene.travel, Unit::Ratio),
-            Parameter::new("stage", setting.inner[3], Unit::Ratio),
+            Parameter::new("mode", self.mode as f64, Unit::Ratio),
+            Parameter::new("shift_per_position", self.shift_per_position, Unit::PerPosition),
+            Parameter::new("centre", self.centre, Unit::Position),
+            Parameter::new("shift_at_travel", self.shift_per_position * scene.travel, Unit::Ratio),
+            Parameter::new("stage", f64::from(self.form == ModeForm::Stage), Unit::Ratio),
         ];
-        if let Some(pair) = Pair::of(scene, setting.inner[0]) {
+        if let Some(pair) = Pair::of(scene, self.mode) {
             all.push(Parameter::new("mode_hz", pair.pole.norm() / std::f64::consts::TAU, Unit::Hertz));
         }
         all
     }
 
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(given: &Given, scene: &Scene) -> Result<(ModeShift, Vec<f64>), PhysicsError> {
         let mode = mode(FACTS.name, given, scene)?;
-        let stage = f64::from(given.or("stage", 0.0) != 0.0);
-        let inner = vec![mode, given.need("shift_per_position")?, given.or("centre", scene.centre), stage];
-        Ok(Setting { inner, strengths: vec![1.0] })
+        let form = ModeForm::of(given.or("stage", 0.0));
+        let (shift_per_position, centre) = (given.need("shift_per_position")?, given.or("centre", scene.centre));
+        Ok((ModeShift { mode, shift_per_position, centre, form }, vec![1.0]))
     }
 }
 
 /// The number of a mode that the plant has, counted from 0 as in `plant.modes`.
-pub(super) fn mode(effect: &'static str, given: &Given, scene: &Scene) -> Result<f64, PhysicsError> {
+pub(super) fn mode(effect: &'static str, given: &Given, scene: &Scene) -> Result<usize, PhysicsError> {
     let found = given.need("mode")?;
-    if found.fract() == 0.0 && found >= 0.0 && Pair::of(scene, found).is_some() {
-        return Ok(found);
+    if found.fract() == 0.0 && found >= 0.0 && Pair::of(scene, found as usize).is_some() {
+        return Ok(found as usize);
     }
     let expected = "the number of one of plant.modes, counted from 0, with a damping ratio below 1";
     Err(PhysicsError::Range { effect, parameter: "mode", found, expected })

@@ -3,14 +3,33 @@
 //! tau = -k3 (x - x0)³ (Duffing), or tau = -k max(0, x - x_e) beyond an upper stop, mirrored for a lower one. Means over an
 //! interval are exact for a straight path (Simpson's rule for the cubic).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
-/// Inner: centre, distance of the stop from it (0: cubic spring; negative: lower stop). Strength: k3 or the stop's stiffness.
-pub struct NonlinearSpring;
+/// The spring. Its strength is k3 or the stop's stiffness.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NonlinearSpring {
+    /// Position that it pushes back to (position_unit).
+    pub centre: f64,
+    /// How it stiffens.
+    pub stiffening: Stiffening,
+}
 
-static FACTS: Facts = Facts {
+/// How a spring stiffens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stiffening {
+    /// With the cube of the distance.
+    Cubic,
+    /// At a stop.
+    Stop {
+        /// Position of the stop less the centre (position_unit); an upper stop lies above 0, a lower one below.
+        offset: f64,
+    },
+}
+
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "nonlinear_spring",
     port: Port::Torque,
     entry: Entry::Torque,
@@ -26,19 +45,21 @@ static FACTS: Facts = Facts {
 
 struct Spring {
     centre: f64,
-    edge: f64,
+    stiffening: Stiffening,
 }
 
 impl Law for Spring {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
         let (a, b) = (from.x - self.centre, to.x - self.centre);
-        out[0] = if self.edge == 0.0 {
+        let Stiffening::Stop { offset } = self.stiffening else {
             let middle = 0.5 * (a + b);
-            -(a.powi(3) + 4.0 * middle.powi(3) + b.powi(3)) / 6.0
-        } else {
+            out[0] = -(a.powi(3) + 4.0 * middle.powi(3) + b.powi(3)) / 6.0;
+            return;
+        };
+        out[0] = {
             // Depth into the stop; its mean over a path that crosses the edge is the triangle's area.
-            let side = self.edge.signum();
-            let (p, q) = (side * a - self.edge.abs(), side * b - self.edge.abs());
+            let side = offset.signum();
+            let (p, q) = (side * a - offset.abs(), side * b - offset.abs());
             let mean = if p >= 0.0 && q >= 0.0 {
                 0.5 * (p + q)
             } else if p.max(q) <= 0.0 {
@@ -51,52 +72,64 @@ impl Law for Spring {
     }
 }
 
-impl Effect for NonlinearSpring {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for NonlinearSpring {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn acts_on_body() -> bool {
+        true
+    }
+
+    fn shown_over() -> ShownOver {
         ShownOver::Position
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        let mut all = vec![vec![scene.centre, 0.0]];
+    fn grid(scene: &Scene) -> Vec<NonlinearSpring> {
+        let at = |stiffening| NonlinearSpring { centre: scene.centre, stiffening };
+        let mut all = vec![at(Stiffening::Cubic)];
         for share in [0.3, 0.5, 0.65, 0.8, 0.9] {
-            all.extend([share, -share].map(|s| vec![scene.centre, s * scene.travel]));
+            all.extend([share, -share].map(|s| at(Stiffening::Stop { offset: s * scene.travel })));
         }
         all
     }
 
-    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Spring { centre: inner[0], edge: inner[1] })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        let offset = match &mut self.stiffening {
+            Stiffening::Cubic => None,
+            Stiffening::Stop { offset } => Some(offset),
+        };
+        vec![Some(&mut self.centre), offset]
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        let [centre, edge] = [setting.inner[0], setting.inner[1]];
-        let centre_parameter = Parameter::new("centre", centre, Unit::Position);
-        if edge == 0.0 {
-            vec![Parameter::new("cubic", setting.strengths[0], Unit::CommandPerPositionCubed), centre_parameter]
-        } else {
-            vec![
-                Parameter::new("stop_stiffness", setting.strengths[0], Unit::CommandPerPosition),
-                Parameter::new("stop_position", centre + edge, Unit::Position),
-                centre_parameter,
-            ]
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Spring { centre: self.centre, stiffening: self.stiffening })
+    }
+
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        let centre = Parameter::new("centre", self.centre, Unit::Position);
+        match self.stiffening {
+            Stiffening::Cubic => vec![Parameter::new("cubic", strengths[0], Unit::CommandPerPositionCubed), centre],
+            Stiffening::Stop { offset } => vec![
+                Parameter::new("stop_stiffness", strengths[0], Unit::CommandPerPosition),
+                Parameter::new("stop_position", self.centre + offset, Unit::Position),
+                centre,
+            ],
         }
     }
 
     /// A machine holds to this law to about a hundredth.
-    fn form_uncertainty(&self, _setting: &Setting, _parameter: &str) -> f64 {
+    fn form_uncertainty(&self, _parameter: &str) -> f64 {
         0.01
     }
 
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(given: &Given, scene: &Scene) -> Result<(NonlinearSpring, Vec<f64>), PhysicsError> {
         let centre = given.or("centre", scene.centre);
         if given.has("stop_stiffness") {
-            let edge = given.need("stop_position")? - centre;
-            return Ok(Setting { inner: vec![centre, edge], strengths: vec![given.need("stop_stiffness")?] });
+            let offset = given.need("stop_position")? - centre;
+            let law = NonlinearSpring { centre, stiffening: Stiffening::Stop { offset } };
+            return Ok((law, vec![given.need("stop_stiffness")?]));
         }
-        Ok(Setting { inner: vec![centre, 0.0], strengths: vec![given.need("cubic")?] })
+        Ok((NonlinearSpring { centre, stiffening: Stiffening::Cubic }, vec![given.need("cubic")?]))
     }
 }

@@ -2,15 +2,17 @@
 //!
 //! tau = a t + b t², t from the start of the record: the first terms of any slow change. The constant is the torque offset.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 
-/// Strengths: slope and curvature, per record.
+/// Its strengths are slope and curvature, per record.
+#[derive(Clone, Debug, PartialEq)]
 pub struct OffsetDrift;
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "offset_drift",
     port: Port::Torque,
     entry: Entry::Torque,
@@ -33,35 +35,35 @@ impl Law for Drift {
     }
 }
 
-impl Effect for OffsetDrift {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for OffsetDrift {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn scan_points(&self, _scene: &Scene) -> Vec<Vec<f64>> {
-        vec![vec![]]
+    fn grid(_scene: &Scene) -> Vec<OffsetDrift> {
+        vec![OffsetDrift]
     }
 
-    fn law(&self, _inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
         Box::new(Drift)
     }
 
-    fn independent_of_motion(&self) -> bool {
+    fn independent_of_motion() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("slope", setting.strengths[0], Unit::CommandPerSecond),
-            Parameter::new("curvature", setting.strengths[1], Unit::CommandPerSecondSquared),
+            Parameter::new("slope", strengths[0], Unit::CommandPerSecond),
+            Parameter::new("curvature", strengths[1], Unit::CommandPerSecondSquared),
         ]
     }
 
-    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        Ok(Setting { inner: vec![], strengths: vec![given.need("slope")?, given.or("curvature", 0.0)] })
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(OffsetDrift, Vec<f64>), PhysicsError> {
+        Ok((OffsetDrift, vec![given.need("slope")?, given.or("curvature", 0.0)]))
     }
 }

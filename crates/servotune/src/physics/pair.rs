@@ -16,8 +16,8 @@ pub(super) struct Pair {
 
 impl Pair {
     /// The pair of `plant.modes[mode]`; none where there is no such mode or it does not ring.
-    pub(super) fn of(scene: &Scene, mode: f64) -> Option<Pair> {
-        let found = scene.plant.modes.get(mode.round().max(0.0) as usize)?;
+    pub(super) fn of(scene: &Scene, mode: usize) -> Option<Pair> {
+        let found = scene.plant.modes.get(mode)?;
         let (w, z) = (found.pole_rad_s, found.pole_damping_ratio);
         if z >= 1.0 {
             return None;
@@ -30,8 +30,8 @@ impl Pair {
     }
 
     /// Numbers of the modes that have a pair.
-    pub(super) fn all(scene: &Scene) -> Vec<(f64, Pair)> {
-        (0..scene.plant.modes.len()).map(|j| j as f64).filter_map(|j| Some((j, Pair::of(scene, j)?))).collect()
+    pub(super) fn all(scene: &Scene) -> Vec<(usize, Pair)> {
+        (0..scene.plant.modes.len()).filter_map(|j| Some((j, Pair::of(scene, j)?))).collect()
     }
 }
 

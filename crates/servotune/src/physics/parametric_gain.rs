@@ -2,16 +2,32 @@
 //!
 //! tau = i (1 + e cos(angle + phi)), the angle being a whole order of the spindle or 2 pi f t (a time-periodic gain; Floquet).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 use std::f64::consts::{PI, TAU};
 
-/// Inner: frequency (Hz), order of the spindle (0: time). Strengths: of i cos and i sin.
-pub struct ParametricGain;
+/// The swing. Its strengths are those of i cos and i sin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParametricGain {
+    /// Frequency (Hz), above 0.
+    pub frequency_hz: f64,
+    /// What counts its turns.
+    pub clock: Clock,
+}
 
-static FACTS: Facts = Facts {
+/// What counts the turns of a swing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clock {
+    /// Time, at the frequency.
+    Time,
+    /// The spindle's angle, this many turns to one of the spindle; at least 1.
+    Spindle(usize),
+}
+
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "parametric_gain",
     port: Port::Amplifier,
     entry: Entry::Torque,
@@ -47,57 +63,82 @@ impl Law for Swing {
     }
 }
 
-impl Effect for ParametricGain {
-    fn facts(&self) -> &'static Facts {
+impl ParametricGain {
+    /// Turns to one of the spindle; 0 where time counts them.
+    fn order(&self) -> usize {
+        match self.clock {
+            Clock::Time => 0,
+            Clock::Spindle(order) => order,
+        }
+    }
+}
+
+impl Parametric for ParametricGain {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn shown_over() -> ShownOver {
         ShownOver::FactorOverTime
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        let mut all: Vec<Vec<f64>> = Vec::new();
+    fn grid(scene: &Scene) -> Vec<ParametricGain> {
+        let mut all: Vec<ParametricGain> = Vec::new();
         if let Some(spindle) = scene.spindle_hz {
-            all.extend((1..=6).map(|n| vec![f64::from(n) * spindle, f64::from(n)]));
+            let order = |n: usize| ParametricGain { frequency_hz: n as f64 * spindle, clock: Clock::Spindle(n) };
+            all.extend((1..=6).map(order));
         }
         if scene.duration_s > 0.0 {
             let high = 0.2 * scene.nyquist_hz();
             // A swing shows at least three times in a record; what is slower is a drift.
             let (first, step) = (3.0 / scene.duration_s, 0.8 / scene.duration_s);
-            all.extend((0..POINTS).map(|i| first + step * i as f64).take_while(|&f| f < high).map(|f| vec![f, 0.0]));
+            let timed = |frequency_hz| ParametricGain { frequency_hz, clock: Clock::Time };
+            all.extend((0..POINTS).map(|i| first + step * i as f64).take_while(|&f| f < high).map(timed));
         }
         all
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        let order = inner[1].round().max(0.0);
-        let hz = if order > 0.0 { scene.spindle_hz.map_or(inner[0], |s| order * s) } else { inner[0] };
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.frequency_hz)]
+    }
+
+    fn choices(&self) -> Vec<usize> {
+        vec![self.order()]
+    }
+
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        let order = self.order() as f64;
+        let hz =
+            if order > 0.0 { scene.spindle_hz.map_or(self.frequency_hz, |s| order * s) } else { self.frequency_hz };
         let y = PI * hz * scene.sample_time_s;
         Box::new(Swing { w: TAU * hz, order, mean: if y == 0.0 { 1.0 } else { y.sin() / y } })
     }
 
-    fn has_own_clock(&self) -> bool {
+    fn has_own_clock() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        let [a, b] = [setting.strengths[0], setting.strengths[1]];
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        let [a, b] = [strengths[0], strengths[1]];
         vec![
             Parameter::new("depth", a.hypot(b), Unit::Ratio),
-            Parameter::new("frequency_hz", setting.inner[0], Unit::Hertz),
-            Parameter::new("spindle_order", setting.inner[1], Unit::Ratio),
+            Parameter::new("frequency_hz", self.frequency_hz, Unit::Hertz),
+            Parameter::new("spindle_order", self.order() as f64, Unit::Ratio),
             Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
         ]
     }
 
-    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(ParametricGain, Vec<f64>), PhysicsError> {
         let (depth, phase) = (given.need("depth")?, given.or("phase_deg", 0.0).to_radians());
-        let inner = vec![given.positive("frequency_hz")?, given.or("spindle_order", 0.0)];
-        Ok(Setting { inner, strengths: vec![depth * phase.cos(), -depth * phase.sin()] })
+        let clock = match given.or("spindle_order", 0.0).round().max(0.0) as usize {
+            0 => Clock::Time,
+            order => Clock::Spindle(order),
+        };
+        let law = ParametricGain { frequency_hz: given.positive("frequency_hz")?, clock };
+        Ok((law, vec![depth * phase.cos(), -depth * phase.sin()]))
     }
 }

@@ -3,19 +3,38 @@
 //! Dahl's law (P. Dahl, Aerospace Corp. TOR-0158, 1968): dz/dx = (1 - sgn(dx) z)/x_s with z = friction torque over its sliding
 //! level; exact over a step: z1 = s - (s - z0) exp(-|dx|/x_s), s = sgn(dx). Maxwell-slip form (Al-Bender, Lampaert, Swevers
 //! 2005): a row of spring-slider elements with evenly spread yield lengths up to 2 x_s, whose first loading is the parabola
-//! z = d/x_s - (d/x_s)²/4. In every shape x_s is the sliding level over the first stiffness. The inner parameter `shape`
+//! z = d/x_s - (d/x_s)²/4. In every shape x_s is the sliding level over the first stiffness. In files `shape`
 //! chooses: 0 is Dahl's law; above 0 it is Maxwell slip with the first loading z = 1 - (1 + m d/x_s)^(-1/m), m = shape/2 - 1
 //! (survival of a generalised Pareto law of yield lengths, Pickands 1975): 1 the parabola, 2 Dahl's 1 - exp(-d/x_s), towards 0 one
 //! spring that slips at once, above 2 elements that yield ever later.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
-/// Inner: sliding length, shape. Strength: the sliding level.
-pub struct PivotFriction;
+/// The bearing. Its strength is the sliding level.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PivotFriction {
+    /// Sliding level over the first stiffness (position_unit), above 0.
+    pub sliding_length: f64,
+    /// The form of the first loading.
+    pub loading: Loading,
+}
 
-static FACTS: Facts = Facts {
+/// The first loading of a bearing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Loading {
+    /// Dahl's law.
+    Dahl,
+    /// A row of Maxwell-slip elements.
+    MaxwellSlip {
+        /// 1 for the parabola, 2 for 1 - exp(-d/x_s), between 0.1 and 3.5.
+        shape: f64,
+    },
+}
+
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "pivot_friction",
     port: Port::Torque,
     entry: Entry::Torque,
@@ -133,67 +152,105 @@ pub(super) fn shortest_loop(scene: &Scene) -> f64 {
     (12.0 * scene.noise).max(2e-3 * scene.travel)
 }
 
-impl Effect for PivotFriction {
-    fn facts(&self) -> &'static Facts {
+impl Loading {
+    /// The loading that files name by this shape.
+    fn of(shape: f64) -> Loading {
+        if shape < 0.5 * SHAPES[0] { Loading::Dahl } else { Loading::MaxwellSlip { shape } }
+    }
+
+    /// The shape by which files name it.
+    fn shape(self) -> f64 {
+        match self {
+            Loading::Dahl => 0.0,
+            Loading::MaxwellSlip { shape } => shape,
+        }
+    }
+}
+
+impl Parametric for PivotFriction {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn acts_on_body() -> bool {
+        true
+    }
+
+    fn shown_over() -> ShownOver {
         ShownOver::Loop
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<PivotFriction> {
         let lengths = logarithmic(shortest_loop(scene), 4.0 * scene.travel, 14);
-        lengths.iter().flat_map(|&l| [0.0, 1.0, 2.0].map(|shape| vec![l, shape])).collect()
+        let loadings = [0.0, 1.0, 2.0].map(Loading::of);
+        let each = |sliding_length| loadings.map(|loading| PivotFriction { sliding_length, loading });
+        lengths.into_iter().flat_map(each).collect()
     }
 
-    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        if inner[1] < 0.5 * SHAPES[0] {
-            Box::new(Dahl { length: inner[0], z: 0.0 })
-        } else {
-            Box::new(MaxwellSlip::of(inner[1].clamp(SHAPES[0], SHAPES[1]), inner[0]))
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        let shape = match &mut self.loading {
+            Loading::Dahl => None,
+            Loading::MaxwellSlip { shape } => Some(shape),
+        };
+        vec![Some(&mut self.sliding_length), shape]
+    }
+
+    fn presliding_length(&self) -> Option<f64> {
+        Some(self.sliding_length)
+    }
+
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        match self.loading {
+            Loading::Dahl => Box::new(Dahl { length: self.sliding_length, z: 0.0 }),
+            Loading::MaxwellSlip { shape } => {
+                Box::new(MaxwellSlip::of(shape.clamp(SHAPES[0], SHAPES[1]), self.sliding_length))
+            }
         }
     }
 
-    fn is_drag(&self) -> bool {
+    fn is_drag() -> bool {
         true
     }
 
-    fn is_hard_nonlinearity(&self) -> bool {
+    fn is_hard_nonlinearity() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("sliding_length", setting.inner[0], Unit::Position),
-            Parameter::new("level_command", setting.strengths[0], Unit::Command),
-            Parameter::new("shape", setting.inner[1], Unit::Ratio),
+            Parameter::new("sliding_length", self.sliding_length, Unit::Position),
+            Parameter::new("level_command", strengths[0], Unit::Command),
+            Parameter::new("shape", self.loading.shape(), Unit::Ratio),
         ]
     }
 
-    fn measured_in_last_fit(&self, inner: &[f64]) -> Vec<(usize, [f64; 2])> {
-        if inner[1] < 0.5 * SHAPES[0] { Vec::new() } else { vec![(1, SHAPES)] }
+    fn measured_in_last_fit(&self) -> Vec<(usize, [f64; 2])> {
+        match self.loading {
+            Loading::Dahl => Vec::new(),
+            Loading::MaxwellSlip { .. } => vec![(1, SHAPES)],
+        }
     }
 
-    fn is_on_every_machine(&self) -> bool {
+    fn is_on_every_machine() -> bool {
         true
     }
 
-    fn is_possible(&self, setting: &Setting, _errors: &[f64]) -> bool {
-        setting.strengths.first().is_some_and(|s| *s > 0.0)
+    fn is_possible(&self, strengths: &[f64], _errors: &[f64]) -> bool {
+        strengths.first().is_some_and(|s| *s > 0.0)
     }
 
     /// The first stiffness lies below the smallest strokes: curves that agree above them differ by a tenth there. Dahl's law has one curve.
-    fn form_uncertainty(&self, setting: &Setting, parameter: &str) -> f64 {
+    fn form_uncertainty(&self, parameter: &str) -> f64 {
         match parameter {
-            "sliding_length" if setting.inner[1] >= 0.5 * SHAPES[0] => 0.1,
+            "sliding_length" if self.loading != Loading::Dahl => 0.1,
             "sliding_length" => 0.02,
             _ => 0.01,
         }
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        let inner = vec![given.positive("sliding_length")?, given.or("shape", 0.0)];
-        Ok(Setting { inner, strengths: vec![given.need("level_command")?] })
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(PivotFriction, Vec<f64>), PhysicsError> {
+        let sliding_length = given.positive("sliding_length")?;
+        let law = PivotFriction { sliding_length, loading: Loading::of(given.or("shape", 0.0)) };
+        Ok((law, vec![given.need("level_command")?]))
     }
 }

@@ -3,16 +3,21 @@
 //! m = x + sum over h = 1, 2, 3 of a_h cos(h n psi + phi_h), psi the spindle's angle, n the base order. Harmonics of orders,
 //! not of hertz: where the spindle's speed moves, the lines move with it.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 use std::f64::consts::TAU;
 
-/// Inner: the base frequency (Hz). Strengths: cosine and sine of three harmonics.
-pub struct RepeatableRunout;
+/// The run-out. Its strengths are cosine and sine of three harmonics.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RepeatableRunout {
+    /// Frequency of the base order (Hz), above 0.
+    pub base_hz: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "repeatable_runout",
     port: Port::Disk,
     entry: Entry::Position,
@@ -45,51 +50,59 @@ impl Law for Runout {
     }
 }
 
-impl Effect for RepeatableRunout {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for RepeatableRunout {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn shown_over() -> ShownOver {
         ShownOver::Spindle
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<RepeatableRunout> {
         let Some(spindle) = scene.spindle_hz else { return Vec::new() };
-        (1..=8).map(|n| f64::from(n) * spindle).filter(|f| 3.0 * f < scene.nyquist_hz()).map(|f| vec![f]).collect()
+        (1..=8)
+            .map(|n| f64::from(n) * spindle)
+            .filter(|f| 3.0 * f < scene.nyquist_hz())
+            .map(|base_hz| RepeatableRunout { base_hz })
+            .collect()
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.base_hz)]
+    }
+
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
         // A recorded angle may wrap at one turn: only whole orders may be taken from it.
-        let ratio = scene.spindle_hz.map(|s| inner[0] / s);
+        let ratio = scene.spindle_hz.map(|s| self.base_hz / s);
         let order = ratio.map(f64::round).filter(|n| *n >= 1.0 && ratio.is_some_and(|r| (r - n).abs() < 1e-2));
-        Box::new(Runout { order, hz: inner[0] })
+        Box::new(Runout { order, hz: self.base_hz })
     }
 
-    fn may_occur_several_times(&self) -> bool {
+    fn may_occur_several_times() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        let mut all = vec![Parameter::new("base_hz", setting.inner[0], Unit::Hertz)];
-        for (h, pair) in setting.strengths.chunks_exact(2).take(3).enumerate() {
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        let mut all = vec![Parameter::new("base_hz", self.base_hz, Unit::Hertz)];
+        for (h, pair) in strengths.chunks_exact(2).take(3).enumerate() {
             all.push(Parameter::new(AMPLITUDES[h], pair[0].hypot(pair[1]), Unit::Position));
             all.push(Parameter::new(PHASES[h], (-pair[1]).atan2(pair[0]).to_degrees(), Unit::Degree));
         }
         all
     }
 
-    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(RepeatableRunout, Vec<f64>), PhysicsError> {
         given.need(AMPLITUDES[0])?;
         let mut strengths = Vec::with_capacity(6);
         for h in 0..3 {
             let (amplitude, phase) = (given.or(AMPLITUDES[h], 0.0), given.or(PHASES[h], 0.0).to_radians());
             strengths.extend([amplitude * phase.cos(), -amplitude * phase.sin()]);
         }
-        Ok(Setting { inner: vec![given.positive("base_hz")?], strengths })
+        Ok((RepeatableRunout { base_hz: given.positive("base_hz")? }, strengths))
     }
 }

@@ -3,9 +3,9 @@
 //! In: a plant with `[[plant.physics]]` tables and what is known of the motion. Out: effects, settings, the scene they act
 //! in, and the entries that no simulation can carry, by name. Spec: `specs/mismatch.md`, "Use".
 
-use super::effect::{Effect, Given, PhysicsError, Setting};
+use super::effect::{Given, PhysicsError};
 use super::free_form;
-use super::library::{curves, data_facts, effect, library};
+use super::library::{Effect, Setting, curves, data_facts, effect, library};
 use super::sample::Scene;
 use super::share::Share;
 use crate::lti::{Body, PhysicsEntry, Plant};
@@ -43,7 +43,7 @@ impl Default for Context {
 #[derive(Clone)]
 pub struct Restored {
     /// Effects with their numbers, in the order of the file.
-    pub parts: Vec<(&'static dyn Effect, Setting)>,
+    pub parts: Vec<Setting>,
     /// The machine they act in: the linear plant, without physics entries.
     pub scene: Scene,
     /// Entries that belong to the records (statistics, clocks, logs): no law, left out.
@@ -70,9 +70,9 @@ impl Restored {
         };
         let mut restored = Restored { parts: Vec::new(), scene, left_out: Vec::new() };
         for entry in &plant.physics {
-            if entry.effect == "free_form" {
+            if entry.effect == free_form::FACTS.name {
                 bodied(entry, &restored.scene.plant)?;
-                restored.parts.push(free_form::restored(entry)?);
+                restored.parts.push(Setting::fixed(free_form::restored(entry)?));
                 continue;
             }
             if entry.curve.is_some() {
@@ -82,13 +82,13 @@ impl Restored {
             match effect(&entry.effect) {
                 Some(e) => {
                     bodied(entry, &restored.scene.plant)?;
-                    restored.parts.push((e, setting(e, entry, &restored.scene)?));
+                    restored.parts.push(setting(e, entry, &restored.scene)?);
                 }
                 None => match data_facts().iter().find(|f| f.name == entry.effect) {
                     Some(facts) => restored.left_out.push(facts.name),
                     None => {
                         let laws = library().iter().chain(curves()).map(|e| e.facts().name);
-                        let known: Vec<&str> = laws.chain(["free_form"]).collect();
+                        let known: Vec<&str> = laws.chain([free_form::FACTS.name]).collect();
                         return Err(PhysicsError::Unknown { effect: entry.effect.clone(), known: known.join(", ") });
                     }
                 },
@@ -99,18 +99,18 @@ impl Restored {
 
     /// Names of the effects that act, in the order of the file.
     pub fn names(&self) -> Vec<&'static str> {
-        self.parts.iter().map(|(e, _)| e.facts().name).collect()
+        self.parts.iter().map(|s| s.facts().name).collect()
     }
 
     /// Refuses a plant whose sensor does not tell where the arm is: margins and tuning close a loop on it.
     pub fn seen(&self) -> Result<(), PhysicsError> {
-        let blind = self.parts.iter().find(|(e, s)| e.response_share(s, &self.scene, 1.0) == Share::Blind);
-        blind.map_or(Ok(()), |(e, _)| Err(PhysicsError::Blind { effect: e.facts().name }))
+        let blind = self.parts.iter().find(|s| s.response_share(&self.scene, 1.0) == Share::Blind);
+        blind.map_or(Ok(()), |s| Err(PhysicsError::Blind { effect: s.facts().name }))
     }
 
-    /// Effects and settings as [`super::Machine::new`] takes them.
-    pub fn effects(&self) -> Vec<(&dyn Effect, &Setting)> {
-        self.parts.iter().map(|(e, s)| (*e as &dyn Effect, s)).collect()
+    /// Effects as [`super::Machine::new`] takes them.
+    pub fn effects(&self) -> Vec<&Setting> {
+        self.parts.iter().collect()
     }
 }
 
@@ -129,7 +129,7 @@ fn setting(e: &'static dyn Effect, entry: &PhysicsEntry, scene: &Scene) -> Resul
     }
     let setting = e.setting_of(&Given::new(name, &entry.parameters), scene)?;
     // What an effect reports of a setting is what it understands.
-    let known: Vec<&str> = e.parameters(&setting, scene).iter().map(|p| p.name).collect();
+    let known: Vec<&str> = setting.parameters(scene).iter().map(|p| p.name).collect();
     match entry.parameters.keys().find(|k| !known.contains(&k.as_str())) {
         Some(parameter) => {
             let (effect, parameter) = (name.to_owned(), parameter.clone());

@@ -4,20 +4,41 @@
 //! Bent: m = x + q (x - c)² + k (x - c)³. A fold hides which side the arm is on, so the library's search, which works along the recorded
 //! motion, cannot see it; the estimation of curves does.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 
-/// Inner: form, then fold (lowest reading, place), limits (low, high), or bend (centre, quadratic, cubic).
-pub struct SensorCurve;
+/// The curve that the sensor reads.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SensorCurve {
+    /// Never below a lowest reading, rising to both sides.
+    Folded {
+        /// Lowest reading (position_unit).
+        lowest: f64,
+        /// Position at which it is read (position_unit).
+        at: f64,
+    },
+    /// Between two limits.
+    Limited {
+        /// Lowest reading (position_unit).
+        low: f64,
+        /// Highest reading (position_unit), not below the lowest.
+        high: f64,
+    },
+    /// Bent.
+    Bent {
+        /// Position at which it reads right (position_unit).
+        centre: f64,
+        /// Coefficient of the square (1/position_unit).
+        quadratic: f64,
+        /// Coefficient of the cube (1/position_unit²).
+        cubic: f64,
+    },
+}
 
-/// Forms.
-const FOLDED: f64 = 0.0;
-const LIMITED: f64 = 1.0;
-const BENT: f64 = 2.0;
-
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "sensor_curve",
     port: Port::Sensor,
     entry: Entry::Position,
@@ -32,79 +53,72 @@ static FACTS: Facts = Facts {
 };
 
 impl SensorCurve {
-    /// A reading that is never below `lowest` and is there at `at`.
-    pub fn folded(lowest: f64, at: f64) -> Setting {
-        Setting { inner: vec![FOLDED, lowest, at], strengths: vec![1.0] }
-    }
-
-    /// A reading within two limits.
-    pub fn limited(low: f64, high: f64) -> Setting {
-        Setting { inner: vec![LIMITED, low, high], strengths: vec![1.0] }
-    }
-}
-
-/// What is read at `x`.
-fn reading(inner: &[f64], x: f64) -> f64 {
-    match *inner {
-        [form, lowest, at] if form == FOLDED => lowest + (x - at).abs(),
-        [_, low, high] => x.max(low).min(high),
-        [_, centre, quadratic, cubic] => x + (quadratic + cubic * (x - centre)) * (x - centre).powi(2),
-        _ => x,
+    /// What is read at `x` (position_unit).
+    fn reading(&self, x: f64) -> f64 {
+        match *self {
+            SensorCurve::Folded { lowest, at } => lowest + (x - at).abs(),
+            SensorCurve::Limited { low, high } => x.max(low).min(high),
+            SensorCurve::Bent { centre, quadratic, cubic } => {
+                x + (quadratic + cubic * (x - centre)) * (x - centre).powi(2)
+            }
+        }
     }
 }
 
 struct Reading {
-    inner: Vec<f64>,
+    curve: SensorCurve,
 }
 
 impl Law for Reading {
     fn columns(&self, _from: &Sample, to: &Sample, out: &mut [f64]) {
-        out[0] = reading(&self.inner, to.x) - to.x;
+        out[0] = self.curve.reading(to.x) - to.x;
     }
 }
 
-impl Effect for SensorCurve {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for SensorCurve {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
     /// None: along a folded or limited record nothing is seen of the motion behind it.
-    fn scan_points(&self, _scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(_scene: &Scene) -> Vec<SensorCurve> {
         Vec::new()
     }
 
-    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Reading { inner: inner.to_vec() })
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Reading { curve: self.clone() })
     }
 
-    fn is_hard_nonlinearity(&self) -> bool {
+    fn is_hard_nonlinearity() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        let named = |name, i: usize, unit| Parameter::new(name, setting.inner[i], unit);
-        match setting.inner[0] {
-            FOLDED => {
-                vec![named("lowest_reading", 1, Unit::Position), named("fold_position", 2, Unit::Position)]
+    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        let position = |name, value| Parameter::new(name, value, Unit::Position);
+        match *self {
+            SensorCurve::Folded { lowest, at } => {
+                vec![position("lowest_reading", lowest), position("fold_position", at)]
             }
-            LIMITED => vec![named("lowest_reading", 1, Unit::Position), named("highest_reading", 2, Unit::Position)],
-            _ => vec![
-                named("centre", 1, Unit::Position),
-                named("quadratic", 2, Unit::PerPosition),
-                named("cubic", 3, Unit::PerPositionSquared),
+            SensorCurve::Limited { low, high } => {
+                vec![position("lowest_reading", low), position("highest_reading", high)]
+            }
+            SensorCurve::Bent { centre, quadratic, cubic } => vec![
+                position("centre", centre),
+                Parameter::new("quadratic", quadratic, Unit::PerPosition),
+                Parameter::new("cubic", cubic, Unit::PerPositionSquared),
             ],
         }
     }
 
     /// A fold does not tell on which side the arm is.
-    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
-        if setting.inner[0] == FOLDED { Share::Blind } else { Share::Cycle }
+    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+        if matches!(self, SensorCurve::Folded { .. }) { Share::Blind } else { Share::Cycle }
     }
 
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(given: &Given, scene: &Scene) -> Result<(SensorCurve, Vec<f64>), PhysicsError> {
         if given.has("fold_position") {
             let at = given.need("fold_position")?;
-            return Ok(SensorCurve::folded(given.or("lowest_reading", at), at));
+            return Ok((SensorCurve::Folded { lowest: given.or("lowest_reading", at), at }, vec![1.0]));
         }
         if given.has("highest_reading") {
             let (low, high) = (given.need("lowest_reading")?, given.need("highest_reading")?);
@@ -113,10 +127,9 @@ impl Effect for SensorCurve {
                 let parameter = "highest_reading";
                 return Err(PhysicsError::Range { effect: "sensor_curve", parameter, found: high, expected });
             }
-            return Ok(SensorCurve::limited(low, high));
+            return Ok((SensorCurve::Limited { low, high }, vec![1.0]));
         }
-        let centre = given.or("centre", scene.centre);
-        let inner = vec![BENT, centre, given.need("quadratic")?, given.or("cubic", 0.0)];
-        Ok(Setting { inner, strengths: vec![1.0] })
+        let (quadratic, cubic) = (given.need("quadratic")?, given.or("cubic", 0.0));
+        Ok((SensorCurve::Bent { centre: given.or("centre", scene.centre), quadratic, cubic }, vec![1.0]))
     }
 }

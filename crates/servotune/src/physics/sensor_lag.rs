@@ -2,17 +2,22 @@
 //!
 //! tau y' = x - y; over an interval where x runs straight with slope s: y = x - s tau + (y0 - x0 + s tau) exp(-t/tau).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use super::share::Share;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
-/// Inner: the time constant.
-pub struct SensorLag;
+/// The lag of the reading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorLag {
+    /// Time constant (s), above 0.
+    pub time_constant_s: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "sensor_lag",
     port: Port::Sensor,
     entry: Entry::Position,
@@ -53,41 +58,45 @@ impl Law for Lag {
     }
 }
 
-impl Effect for SensorLag {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for SensorLag {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<SensorLag> {
         let t = scene.sample_time_s;
-        logarithmic(0.1 * t, 20.0 * t, 14).into_iter().map(|tau| vec![tau]).collect()
+        logarithmic(0.1 * t, 20.0 * t, 14).into_iter().map(|time_constant_s| SensorLag { time_constant_s }).collect()
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.time_constant_s)]
+    }
+
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
         let step = scene.sample_time_s;
-        Box::new(Lag { tau: inner[0], step, keep: (-step / inner[0]).exp(), behind: None })
+        Box::new(Lag { tau: self.time_constant_s, step, keep: (-step / self.time_constant_s).exp(), behind: None })
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("time_constant_s", setting.inner[0], Unit::Second),
-            Parameter::new("bandwidth_hz", 1.0 / (TAU * setting.inner[0]), Unit::Hertz),
+            Parameter::new("time_constant_s", self.time_constant_s, Unit::Second),
+            Parameter::new("bandwidth_hz", 1.0 / (TAU * self.time_constant_s), Unit::Hertz),
         ]
     }
 
-    fn response_share(&self, setting: &Setting, scene: &Scene, w_rad_s: f64) -> Share {
-        let (step, tau) = (scene.sample_time_s, setting.inner[0]);
+    fn response_share(&self, _strengths: &[f64], scene: &Scene, w_rad_s: f64) -> Share {
+        let (step, tau) = (scene.sample_time_s, self.time_constant_s);
         let keep = (-step / tau).exp();
         let z = Complex::from_polar(1.0, w_rad_s * step);
         Share::Ratio((z - 1.0) / (z - keep) * (keep - 1.0) * tau / step)
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        let tau = if given.has("time_constant_s") {
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(SensorLag, Vec<f64>), PhysicsError> {
+        let time_constant_s = if given.has("time_constant_s") {
             given.positive("time_constant_s")?
         } else {
             1.0 / (TAU * given.positive("bandwidth_hz")?)
         };
-        Ok(Setting { inner: vec![tau], strengths: vec![1.0] })
+        Ok((SensorLag { time_constant_s }, vec![1.0]))
     }
 }

@@ -2,16 +2,23 @@
 //!
 //! tau = B sin(pi (t - t0)/w) for t0 < t < t0 + w: the half-sine of shock tests (IEC 60068-2-27); its mean over an interval is exact.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use super::share::Share;
 use std::f64::consts::PI;
 
-/// Inner: start, width. Strength: the peak, per record.
-pub struct Shock;
+/// The bump. Its strength is the peak, per record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shock {
+    /// When it begins, from the start of the record (s).
+    pub time_s: f64,
+    /// How long it lasts (s), above 0.
+    pub width_s: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "shock",
     port: Port::Torque,
     entry: Entry::Torque,
@@ -45,49 +52,53 @@ impl Law for Pulse {
     }
 }
 
-impl Effect for Shock {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for Shock {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<Shock> {
         let shortest = (8.0 * scene.sample_time_s).max(scene.duration_s / 200.0);
         let mut all = Vec::new();
         for width in logarithmic(shortest, scene.duration_s / 8.0, 4) {
             // Half a width apart: the nearest pulse carries at least nine tenths of any other of this width. None begins at 0, so that
             // all may be refined.
             let count = (2.0 * scene.duration_s / width).floor() as usize;
-            all.extend((0..count).map(|i| vec![0.5 * width * (i as f64 + 0.5), width]));
+            all.extend((0..count).map(|i| Shock { time_s: 0.5 * width * (i as f64 + 0.5), width_s: width }));
         }
         all
     }
 
-    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Pulse { start: inner[0], width: inner[1].abs() })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.time_s), Some(&mut self.width_s)]
     }
 
-    fn may_occur_several_times(&self) -> bool {
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Pulse { start: self.time_s, width: self.width_s.abs() })
+    }
+
+    fn may_occur_several_times() -> bool {
         true
     }
 
-    fn is_single_event(&self) -> bool {
+    fn is_single_event() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("peak_command", setting.strengths[0], Unit::Command),
-            Parameter::new("time_s", setting.inner[0], Unit::Second),
-            Parameter::new("width_s", setting.inner[1], Unit::Second),
+            Parameter::new("peak_command", strengths[0], Unit::Command),
+            Parameter::new("time_s", self.time_s, Unit::Second),
+            Parameter::new("width_s", self.width_s, Unit::Second),
         ]
     }
 
-    fn response_share(&self, _setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        let inner = vec![given.need("time_s")?, given.positive("width_s")?];
-        Ok(Setting { inner, strengths: vec![given.need("peak_command")?] })
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(Shock, Vec<f64>), PhysicsError> {
+        let law = Shock { time_s: given.need("time_s")?, width_s: given.positive("width_s")? };
+        Ok((law, vec![given.need("peak_command")?]))
     }
 }

@@ -3,14 +3,21 @@
 //! di/dt = S sgn(u - i) until i = u: behind a converter that holds u over a sample the current ramps to every new value, however small
 //! the step. A digital limiter works at the samples instead: i_k = i_(k-1) + clip(u_k - i_(k-1), -S T, S T).
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
-/// Inner: the largest slope, whether the current ramps between the samples (1) or is limited at them (0).
-pub struct SlewLimit;
+/// The limit of the rate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SlewLimit {
+    /// Largest slope of the current (command_unit/s), above 0.
+    pub max_slope: f64,
+    /// Whether the current ramps between the samples; else it is limited at them.
+    pub between_samples: bool,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "slew_limit",
     port: Port::Amplifier,
     entry: Entry::Command,
@@ -57,40 +64,47 @@ impl Law for Limiter {
     }
 }
 
-impl Effect for SlewLimit {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for SlewLimit {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<SlewLimit> {
         // A limit above the largest step that occurs does nothing.
         let largest = scene.command_step / scene.sample_time_s;
+        let slope = |share: f64, between_samples| SlewLimit { max_slope: share * largest, between_samples };
         // Dense towards it: there few samples are touched, and each point touches others.
         let near = (0..9).map(|i| 1.0 - 0.4 * 0.7f64.powi(i));
-        let at = super::logarithmic(0.02, 0.55, 12).into_iter().chain(near).map(|s| vec![s * largest, 0.0]);
+        let at = super::logarithmic(0.02, 0.55, 12).into_iter().chain(near).map(|s| slope(s, false));
         // A ramp shortens every step a little, also where it ends within the sample.
-        at.chain(super::logarithmic(0.02, 60.0, 34).into_iter().map(|s| vec![s * largest, 1.0])).collect()
+        at.chain(super::logarithmic(0.02, 60.0, 34).into_iter().map(|s| slope(s, true))).collect()
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        Box::new(Limiter { step: inner[0] * scene.sample_time_s, ramps: inner[1] != 0.0, current: None })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.max_slope)]
     }
 
-    fn is_hard_nonlinearity(&self) -> bool {
+    fn choices(&self) -> Vec<usize> {
+        vec![usize::from(self.between_samples)]
+    }
+
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        Box::new(Limiter { step: self.max_slope * scene.sample_time_s, ramps: self.between_samples, current: None })
+    }
+
+    fn is_hard_nonlinearity() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("max_slope", setting.inner[0], Unit::CommandPerSecond),
-            Parameter::new("between_samples", setting.inner[1], Unit::Ratio),
+            Parameter::new("max_slope", self.max_slope, Unit::CommandPerSecond),
+            Parameter::new("between_samples", f64::from(self.between_samples), Unit::Ratio),
         ]
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        Ok(Setting {
-            inner: vec![given.positive("max_slope")?, given.or("between_samples", 0.0)],
-            strengths: vec![1.0],
-        })
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(SlewLimit, Vec<f64>), PhysicsError> {
+        let between_samples = given.or("between_samples", 0.0) != 0.0;
+        Ok((SlewLimit { max_slope: given.positive("max_slope")?, between_samples }, vec![1.0]))
     }
 }

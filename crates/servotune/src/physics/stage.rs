@@ -51,11 +51,10 @@ pub(super) struct Next {
 
 impl Stage {
     /// The stage of `plant.modes[mode]` at rest; none where there is no such mode or it does not ring.
-    pub(super) fn of(scene: &Scene, mode: f64) -> Option<Stage> {
-        let at = mode.round().max(0.0) as usize;
-        let m = *scene.plant.modes.get(at).filter(|m| m.pole_damping_ratio < 1.0)?;
+    pub(super) fn of(scene: &Scene, mode: usize) -> Option<Stage> {
+        let m = *scene.plant.modes.get(mode).filter(|m| m.pole_damping_ratio < 1.0)?;
         let mut modes = scene.plant.modes.clone();
-        modes.remove(at);
+        modes.remove(mode);
         let rest = ModalForm::of(&Plant { modes, physics: Vec::new(), delay_s: 0.0, ..scene.plant.clone() }).ok()?;
         let h = scene.sample_time_s;
         let terms = rest.terms.iter().map(|t| {

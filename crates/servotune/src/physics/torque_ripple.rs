@@ -2,17 +2,24 @@
 //!
 //! tau = a cos(2 pi x/P) + b sin(2 pi x/P), times the current where the torque factor waves; the mean over an interval by Simpson's rule along the straight path.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting, ShownOver};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::encoder_cyclic_error::EncoderCyclicError;
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use std::cell::Cell;
 use std::f64::consts::TAU;
 
-/// Inner: the period; 0 for a torque of its own, 1 for a factor of the current. Strengths: cosine and sine.
-pub struct TorqueRipple;
+/// The wave. Its strengths are cosine and sine.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TorqueRipple {
+    /// Period (position_unit), above 0.
+    pub period: f64,
+    /// Whether it waves the torque factor: a factor of the current; else it is a torque of its own.
+    pub of_factor: bool,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "torque_ripple",
     port: Port::Torque,
     entry: Entry::Torque,
@@ -48,43 +55,51 @@ impl Law for Ripple {
     }
 }
 
-impl Effect for TorqueRipple {
-    fn facts(&self) -> &'static Facts {
+impl Parametric for TorqueRipple {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn shown_over(&self) -> ShownOver {
+    fn shown_over() -> ShownOver {
         ShownOver::Position
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<TorqueRipple> {
         // The same question as for the encoder's wave: no period over the travel may fall between two points.
-        let periods = EncoderCyclicError.scan_points(scene).into_iter().map(|p| p[0]).step_by(2);
-        periods.flat_map(|p| [vec![p, 0.0], vec![p, 1.0]]).collect()
+        let periods = EncoderCyclicError::grid(scene).into_iter().map(|wave| wave.period).step_by(2);
+        periods.flat_map(|period| [false, true].map(|of_factor| TorqueRipple { period, of_factor })).collect()
     }
 
-    fn law(&self, inner: &[f64], _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Ripple { wave: TAU / inner[0], factor: inner[1] > 0.5, last: Cell::new([f64::NAN; 3]) })
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.period)]
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        let [a, b] = [setting.strengths[0], setting.strengths[1]];
-        let amplitude = match setting.inner[1] > 0.5 {
+    fn choices(&self) -> Vec<usize> {
+        vec![usize::from(self.of_factor)]
+    }
+
+    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        Box::new(Ripple { wave: TAU / self.period, factor: self.of_factor, last: Cell::new([f64::NAN; 3]) })
+    }
+
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        let [a, b] = [strengths[0], strengths[1]];
+        let amplitude = match self.of_factor {
             true => Parameter::new("amplitude_relative", a.hypot(b), Unit::Ratio),
             false => Parameter::new("amplitude_command", a.hypot(b), Unit::Command),
         };
         vec![
             amplitude,
-            Parameter::new("period", setting.inner[0], Unit::Position),
+            Parameter::new("period", self.period, Unit::Position),
             Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
         ]
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
-        let factor = given.has("amplitude_relative");
-        let amplitude = given.need(if factor { "amplitude_relative" } else { "amplitude_command" })?;
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(TorqueRipple, Vec<f64>), PhysicsError> {
+        let of_factor = given.has("amplitude_relative");
+        let amplitude = given.need(if of_factor { "amplitude_relative" } else { "amplitude_command" })?;
         let phase = given.or("phase_deg", 0.0).to_radians();
         let strengths = vec![amplitude * phase.cos(), -amplitude * phase.sin()];
-        Ok(Setting { inner: vec![given.positive("period")?, f64::from(factor)], strengths })
+        Ok((TorqueRipple { period: given.positive("period")?, of_factor }, strengths))
     }
 }

@@ -3,7 +3,7 @@
 //! m = x + (a w² + b w s)/(s² + 2 z w s + w²) i: one modal term of the partial fractions, with any sign and phase (eq. (2) in
 //! modal form). Exact for a command held between samples.
 
-use super::effect::{Effect, Entry, Facts, Given, Law, PhysicsError, Port, Setting};
+use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::oscillator::Oscillator;
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
@@ -12,10 +12,17 @@ use crate::lti::ModalTerm;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
-/// Inner: frequency (Hz), damping ratio. Strengths: gains at rest and of the rate.
-pub struct UnmodelledResonance;
+/// The vibration. Its strengths are the gains at rest and of the rate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnmodelledResonance {
+    /// Natural frequency (Hz), above 0.
+    pub frequency_hz: f64,
+    /// Damping ratio, between 0 and 1.
+    pub damping_ratio: f64,
+}
 
-static FACTS: Facts = Facts {
+/// What is known beforehand.
+pub static FACTS: Facts = Facts {
     name: "unmodelled_resonance",
     port: Port::Structure,
     entry: Entry::Position,
@@ -51,13 +58,13 @@ impl Law for Ringing {
     }
 }
 
-/// Frequencies from `low` to `high`, one half-power width apart, never closer than the longest record resolves.
-pub(super) fn scan(low: f64, high: f64, damping: f64, scene: &Scene) -> Vec<Vec<f64>> {
+/// Frequency and damping from `low` to `high`, one half-power width apart, never closer than the longest record resolves.
+pub(super) fn scan(low: f64, high: f64, damping: f64, scene: &Scene) -> Vec<[f64; 2]> {
     let finest = if scene.duration_s > 0.0 { 0.4 / scene.duration_s } else { low };
     let mut all = Vec::new();
     let mut hz = low;
     while hz <= high && all.len() < 2000 {
-        all.push(vec![hz, damping]);
+        all.push([hz, damping]);
         hz += (3.0 * damping * hz).max(finest);
     }
     all
@@ -71,42 +78,56 @@ pub(super) fn term(hz: f64, damping: f64, a: f64, b: f64) -> ModalTerm {
     ModalTerm { pole, residue: (pole * b * w + a * w * w) / Complex::new(0.0, 2.0 * turning) }
 }
 
-impl Effect for UnmodelledResonance {
-    fn facts(&self) -> &'static Facts {
+impl UnmodelledResonance {
+    fn at([frequency_hz, damping_ratio]: [f64; 2]) -> UnmodelledResonance {
+        UnmodelledResonance { frequency_hz, damping_ratio }
+    }
+}
+
+impl Parametric for UnmodelledResonance {
+    fn known() -> &'static Facts {
         &FACTS
     }
 
-    fn scan_points(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    fn grid(scene: &Scene) -> Vec<UnmodelledResonance> {
         let high = 0.45 / scene.sample_time_s;
-        [0.005, 0.02, 0.06].iter().flat_map(|&z| scan(30f64.min(0.01 * high), high, z, scene)).collect()
+        [0.005, 0.02, 0.06]
+            .iter()
+            .flat_map(|&z| scan(30f64.min(0.01 * high), high, z, scene))
+            .map(UnmodelledResonance::at)
+            .collect()
     }
 
-    fn law(&self, inner: &[f64], scene: &Scene) -> Box<dyn Law> {
-        Box::new(Ringing::at_rest(inner[0], inner[1], scene.sample_time_s, 2))
+    fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
+        vec![Some(&mut self.frequency_hz), Some(&mut self.damping_ratio)]
     }
 
-    fn may_occur_several_times(&self) -> bool {
+    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        Box::new(Ringing::at_rest(self.frequency_hz, self.damping_ratio, scene.sample_time_s, 2))
+    }
+
+    fn may_occur_several_times() -> bool {
         true
     }
 
-    fn parameters(&self, setting: &Setting, _scene: &Scene) -> Vec<Parameter> {
-        let [a, b] = [setting.strengths[0], setting.strengths[1]];
+    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+        let [a, b] = [strengths[0], strengths[1]];
         vec![
-            Parameter::new("frequency_hz", setting.inner[0], Unit::Hertz),
-            Parameter::new("damping_ratio", setting.inner[1], Unit::Ratio),
+            Parameter::new("frequency_hz", self.frequency_hz, Unit::Hertz),
+            Parameter::new("damping_ratio", self.damping_ratio, Unit::Ratio),
             Parameter::new("static_gain", a, Unit::PositionPerCommand),
             Parameter::new("rate_gain", b, Unit::PositionPerCommand),
-            Parameter::new("peak_gain", a.hypot(b) / (2.0 * setting.inner[1]), Unit::PositionPerCommand),
+            Parameter::new("peak_gain", a.hypot(b) / (2.0 * self.damping_ratio), Unit::PositionPerCommand),
         ]
     }
 
-    fn response_share(&self, setting: &Setting, _scene: &Scene, _w_rad_s: f64) -> Share {
-        Share::Terms(vec![term(setting.inner[0], setting.inner[1], setting.strengths[0], setting.strengths[1])])
+    fn response_share(&self, strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+        Share::Terms(vec![term(self.frequency_hz, self.damping_ratio, strengths[0], strengths[1])])
     }
 
-    fn setting_of(&self, given: &Given, _scene: &Scene) -> Result<Setting, PhysicsError> {
+    fn setting_of(given: &Given, _scene: &Scene) -> Result<(UnmodelledResonance, Vec<f64>), PhysicsError> {
         let damping = given.between("damping_ratio", 0.0, 1.0, "above 0 and below 1")?;
         let strengths = vec![given.need("static_gain")?, given.or("rate_gain", 0.0)];
-        Ok(Setting { inner: vec![given.positive("frequency_hz")?, damping], strengths })
+        Ok((UnmodelledResonance::at([given.positive("frequency_hz")?, damping]), strengths))
     }
 }

@@ -7,7 +7,7 @@ use super::TwinError;
 use crate::controller::{Controller, Law};
 use crate::lti::{Plant, step_chain};
 use crate::numeric::random::Random;
-use crate::physics::{Effect, Machine, Scene, Setting};
+use crate::physics::{Machine, Scene, Setting};
 use std::f64::consts::{PI, TAU};
 
 /// One row: reference, excitation, command, position.
@@ -56,7 +56,7 @@ pub fn scene(plant: &Plant, sample_time_s: f64, travel: f64, samples: usize, noi
 /// A record in closed loop, from rest.
 pub fn record(
     scene: &Scene,
-    effects: &[(&dyn Effect, &Setting)],
+    effects: &[&Setting],
     controller: &Controller,
     reference: &[f64],
     excitation: &[f64],
