@@ -175,7 +175,8 @@ fn note_margins(magnitude: &mut Panel, phase: &mut Panel, marks: &BodeMarks) {
         phase.marks.push(Mark::Note(Note { at: (at, margin - 180.0), text, ink: Ink::Plain }));
     }
     if let Some((at, margin)) = marks.gain_margin {
-        let text = format!("gain margin {} dB", NumberFormat::Decimals(1).page(margin));
+        let side = if margin < 0.0 { " (gain may fall)" } else { "" };
+        let text = format!("gain margin {} dB{side}", NumberFormat::Decimals(1).page(margin));
         magnitude.marks.push(Mark::Note(Note { at: (at, -margin), text, ink: Ink::Plain }));
     }
 }
