@@ -1,23 +1,20 @@
 #!/bin/sh
-# Builds the documentation site into target/site and looks whether every link in it leads somewhere.
-#   scripts/site.sh            mdbook is used where it is installed, and installed by cargo where it is not (some minutes)
+# Builds the documentation site into target/site and looks whether every link in it leads to a file, and to a place in it where it names one.
+#   scripts/site.sh            mdbook is used where it is installed, and installed by cargo where it is not (two minutes of one core).
+# Ends with 3, and says so, where mdbook cannot be installed. The pictures are made by scripts/pictures.sh and stand in book/src/pictures.
 set -eu
 cd "$(dirname "$0")/.."
 if ! command -v mdbook >/dev/null; then
-    cargo install mdbook --locked --version 0.5.4 --no-default-features --features search
+    cargo install mdbook --locked --version 0.5.4 --no-default-features --features search || { echo "no site: mdbook cannot be installed" >&2; exit 3; }
     PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
 fi
 mdbook build book
-# Pictures of the pages are made by the program and are in no commit; without Chromium or the program the site stands without them.
-pictures=yes
-scripts/pictures.sh target/site/pictures || { [ $? = 3 ] && pictures=no; }
 # Links within the site: every href and src that names no other host must be a file.
-python3 - target/site $pictures <<'PY'
+python3 - target/site <<'PY'
 import html.parser, pathlib, sys, urllib.parse
 
 root = pathlib.Path(sys.argv[1])
 wrong, seen = [], 0
-pictures = sys.argv[2] == "yes"
 pages = {}
 
 class Page(html.parser.HTMLParser):
@@ -40,7 +37,7 @@ for file, page in pages.items():
         continue
     for link in page.links:
         parts = urllib.parse.urlsplit(link)
-        if parts.scheme or parts.netloc or (parts.path.startswith("pictures/") and not pictures):
+        if parts.scheme or parts.netloc:
             continue
         seen += 1
         target = (file.parent / urllib.parse.unquote(parts.path)).resolve() if parts.path else file
@@ -50,6 +47,6 @@ for file, page in pages.items():
             wrong.append(f"{file.name}: {link}: no such file")
         elif parts.fragment and target in pages and urllib.parse.unquote(parts.fragment) not in pages[target].ids:
             wrong.append(f"{file.name}: {link}: no such place in the page")
-print(f"{len(pages)} pages, {seen} links" + ("" if pictures else "; without pictures of the pages"))
+print(f"{len(pages)} pages, {seen} links, {len(wrong)} wrong")
 sys.exit("\n".join(wrong) if wrong else 0)
 PY

@@ -3,7 +3,7 @@
 
 python3 scripts/worked_machines.py [--program target/release/servotune] [--out results]
 
-Pictures of the tuning's page are taken by headless Chromium; without one the page says that there are none.
+The pictures of the tunings' pages are taken by scripts/pictures.sh.
 """
 
 import argparse
@@ -24,20 +24,10 @@ def commands(readme: Path) -> list[str]:
     return [line for line in readme.read_text(encoding="utf-8").splitlines() if line.startswith("servotune ")]
 
 
-def picture(page: Path, to: Path) -> bool:
-    """The upper part of a page on a desk; False without a browser."""
-    browser = next((b for b in ("chromium", "chromium-browser", "google-chrome") if shutil.which(b)), None)
-    if browser is None:
-        return False
-    to.parent.mkdir(exist_ok=True)
-    words = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1100,1500", "--virtual-time-budget=3000"]
-    subprocess.run([browser, *words, f"--screenshot={to}", page.as_uri()], check=True, capture_output=True)
-    return True
-
-
-def walk(name: str, program: Path, out: Path) -> list[str]:
+def walk(name: str, program: Path) -> list[str]:
     """The section of one machine."""
-    lines = [f"## {MACHINES[name]}", "", f"Files: `examples/{name}/`, the README there says what each is.", ""]
+    # The book shows what lies between the anchors, with the picture on its own page.
+    lines = [f"## {MACHINES[name]}", "", f"Files: `examples/{name}/`, the README there says what each is.", "", f"<!-- ANCHOR: {name} -->"]
     with tempfile.TemporaryDirectory() as folder:
         here = Path(folder) / name
         shutil.copytree(ROOT / "examples" / name, here)
@@ -49,11 +39,8 @@ def walk(name: str, program: Path, out: Path) -> list[str]:
             said = run.stdout
             said = said[max(said.find(SAID[words[1]]), 0) :].strip()
             lines += ["```", f"$ {line}", said or run.stderr.strip(), "```", "", f"Exit code {run.returncode}, {took:.2f} s.", ""]
-        shot = out / "figures" / f"worked_{name}.png"
-        if picture(here / "report.html", shot):
-            lines += [f"![The page of the tuning]({shot.relative_to(out)})", ""]
-        else:
-            lines += ["No picture: chromium is not installed.", ""]
+        lines += [f"<!-- ANCHOR_END: {name} -->", ""]
+        lines += [f"![The page of the tuning](../book/src/pictures/worked_{name}.webp)", ""]
     return lines
 
 
@@ -71,7 +58,7 @@ def main() -> None:
         "",
     ]
     for name in MACHINES:
-        lines += walk(name, program, out)
+        lines += walk(name, program)
     page = out / "worked_machines.md"
     part = page.with_suffix(".part")
     part.write_text("\n".join(lines), encoding="utf-8")

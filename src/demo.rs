@@ -103,7 +103,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
         outcome: &outcome,
         over_model: Some(&over_model),
         table: &table,
-        certificate: Some(&says),
+        certificate: certificate.as_ref().map(|c| (c.proved, c.says.as_str())),
         provenance: provenance(&table),
         physics: None,
     })?;

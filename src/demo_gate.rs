@@ -112,13 +112,13 @@ fn sheet(rows: &[Row], truth: &BTreeMap<String, String>, learned: &str) -> Resul
         subtitle: "Class, probability, action and reason of each; only what the gate calls tunable was tuned".into(),
         cards: vec![
             card("Machines", rows.len(), ""),
-            card("Tuned", of(&|r| r.fate == Fate::Tuned), "every limit met"),
+            card("Tuned", of(&|r| r.fate == Fate::Tuned), "every limit met, none certified here"),
             card("To be repaired", of(&repair), ""),
             card("To be inspected", of(&|r| r.action == Action::Inspect), "the gate does not decide"),
             card("Left alone", of(&|r| r.action == Action::None), "healthy"),
         ],
         sections: vec![Section {
-            heading: "Machines".into(),
+            heading: "What became of each".into(),
             blocks: vec![
                 Block::Table(gated::sheet(rows)?),
                 Block::Prose(gated::summary(rows)),

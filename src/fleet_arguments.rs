@@ -21,8 +21,11 @@ pub(super) enum FleetCommand {
     History(FleetHistoryArguments),
     Diff(FleetDiffArguments),
     Check(FleetCheckArguments),
+    #[command(about = "Says yes to the table that a run proposed; a list of slots all or none")]
     Approve(FleetReviseArguments),
+    #[command(about = "Writes approved tables to the testers' folder; a list of slots all or none")]
     Apply(FleetReviseArguments),
+    #[command(about = "Puts back the bytes before the last apply; a list of slots all or none")]
     Rollback(FleetReviseArguments),
 }
 

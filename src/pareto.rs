@@ -60,7 +60,10 @@ pub(super) fn run(a: &ParetoArguments, screen: &mut Screen) -> Result<Ending, Fa
         for file in a.plant.iter().chain([&a.spec]) {
             provenance.push((file.display().to_string(), sha256_hex(read_text(file)?.as_bytes())));
         }
-        write_text(&a.out, &pareto_page(&points, now, objective, unit, provenance)?.html())?;
+        write_text(
+            &a.out,
+            &pareto_page(&points, now, spec.margins.max_sensitivity, objective, unit, provenance)?.html(),
+        )?;
     }
     screen.say(&format!("wrote {}", a.out.display()));
     screen.result(&document, &pareto_table(&points, objective, unit)?.text())?;

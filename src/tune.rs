@@ -146,7 +146,7 @@ fn report(
         outcome: &reached.outcome,
         over_model: over_model.as_ref(),
         table: &reached.table,
-        certificate: proof.map(|p| p.says.as_str()),
+        certificate: proof.map(|p| (p.proved, p.says.as_str())),
         provenance: slot::provenance(&reached.table),
         physics: given.physics().zip(reached.physics.as_ref()),
     };

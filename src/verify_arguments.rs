@@ -98,7 +98,12 @@ pub(super) fn uncertainty(text: &str) -> Result<Uncertainty, String> {
         };
         let value = number.trim().parse::<f64>().map_err(|_| wrong())? * scale;
         if !(0.0..1.0).contains(&value) {
-            return Err(format!("found `{part}`; expected a share of at least 0 and below 100 %"));
+            let meant = if (1.0..100.0).contains(&value) {
+                format!("; did you mean {}={value}%?", key.trim())
+            } else {
+                String::new()
+            };
+            return Err(format!("found `{part}`; expected a share of at least 0 and below 100 %{meant}"));
         }
         if seen.contains(&key.trim()) {
             return Err(format!("found `{}` twice; expected each once", key.trim()));

@@ -44,25 +44,59 @@ fn links(text: &str) -> Vec<String> {
     found
 }
 
+/// What `{{#include FILE}}` or `{{#include FILE:ANCHOR}}` puts into a page: the file, and the text that is taken.
+fn includes(text: &str, beside: &Path) -> Vec<(String, String)> {
+    let named = text.split("{{#include ").skip(1).filter_map(|s| s.split_once("}}").map(|(p, _)| p));
+    named
+        .map(|target| {
+            let (file, anchor) = target.split_once(':').unwrap_or((target, ""));
+            let whole = std::fs::read_to_string(beside.join(file)).unwrap_or_default();
+            let (from, to) = (format!("ANCHOR: {anchor} "), format!("ANCHOR_END: {anchor} "));
+            let between = || whole.split_once(&from)?.1.split_once(&to).map(|(part, _)| part.to_owned());
+            let taken = if anchor.is_empty() { whole.clone() } else { between().unwrap_or_default() };
+            assert!(!taken.is_empty(), "{target}: nothing is included");
+            (file.to_owned(), taken)
+        })
+        .collect()
+}
+
+/// Places of a page that `#place` leads to: its headings in small letters, blanks as hyphens, signs left out.
+fn places(text: &str) -> Vec<String> {
+    let kept = |c: char| match c {
+        c if c.is_alphanumeric() || c == '_' || c == '-' => Some(c.to_ascii_lowercase()),
+        c if c.is_whitespace() => Some('-'),
+        _ => None,
+    };
+    let heading = |line: &str| line.starts_with('#').then(|| line.trim_start_matches('#').trim().to_owned());
+    text.lines().filter_map(heading).map(|h| h.chars().filter_map(kept).collect()).collect()
+}
+
 #[test]
-fn every_link_and_every_include_leads_to_a_file() {
+fn every_link_and_every_include_leads_to_a_file_and_to_a_place_in_it() {
     let (mut wrong, mut seen) = (Vec::new(), 0);
     for file in documents() {
         let text = std::fs::read_to_string(&file).unwrap();
         let beside = file.parent().unwrap();
-        let includes: Vec<String> =
-            text.split("{{#include ").skip(1).filter_map(|s| s.split_once("}}").map(|(p, _)| p.to_owned())).collect();
+        let included = includes(&text, beside);
         // What a page includes stands in that page: its links are read from there, not from where it came.
-        let taken = includes.iter().flat_map(|p| links(&std::fs::read_to_string(beside.join(p)).unwrap_or_default()));
-        let targets: Vec<String> = links(&text).into_iter().chain(taken).chain(includes.iter().cloned()).collect();
+        let taken = included.iter().flat_map(|(_, part)| links(part));
+        let targets: Vec<String> =
+            links(&text).into_iter().chain(taken).chain(included.iter().map(|(p, _)| p.clone())).collect();
         for target in targets {
-            let path = target.split('#').next().unwrap();
-            if path.is_empty() || path.contains("://") || path.starts_with("mailto:") {
+            let (path, place) = target.split_once('#').unwrap_or((&target, ""));
+            if path.contains("://") || path.starts_with("mailto:") {
                 continue;
             }
             seen += 1;
-            if !beside.join(path).exists() {
+            let to = if path.is_empty() { file.clone() } else { beside.join(path) };
+            if !to.exists() {
                 wrong.push(format!("{}: {target}", file.display()));
+            } else if !place.is_empty() {
+                let there = std::fs::read_to_string(&to).unwrap();
+                let parts = includes(&there, to.parent().unwrap()).into_iter().map(|(_, part)| part);
+                if !parts.chain([there.clone()]).any(|t| places(&t).iter().any(|p| p == place)) {
+                    wrong.push(format!("{}: {target}: no such place", file.display()));
+                }
             }
         }
     }
@@ -137,4 +171,24 @@ fn the_first_tutorial_runs_as_written() {
     }
     assert_eq!(ran_all, ["init", "check", "margins", "identify", "tune", "verify", "export", "export"]);
     assert!(dir.join("gains.certificate.json").is_file() && dir.join("report.html").is_file());
+}
+
+/// The table of README.md in a folder of `servotune init spiral .`. The demo and its diagnosis take a minute and have tests of their own.
+#[test]
+fn the_commands_of_readme_run_as_written() {
+    let dir = folder("readme");
+    assert_eq!(servotune_with(&["init", "spiral", "."], Some(&dir), None).code, 0);
+    let text = std::fs::read_to_string(root("README.md")).unwrap();
+    let mut ran_all = 0;
+    for line in text.lines().filter_map(|l| l.strip_prefix("| `servotune ")) {
+        let words: Vec<&str> = line.split('`').next().unwrap().split_whitespace().collect();
+        if ["demo", "diagnose"].contains(&words[0]) {
+            continue;
+        }
+        let ran = servotune_with(&words, Some(&dir), None);
+        // 1: done, with something to look at, such as a machine that the gate leaves to a person.
+        assert!(ran.code <= 1, "{line}: {}{}", ran.out, ran.err);
+        ran_all += 1;
+    }
+    assert!(ran_all > 20, "{ran_all} commands");
 }

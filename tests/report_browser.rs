@@ -277,6 +277,7 @@ fn floor_page() -> String {
         tables: (1..5).map(|k| (format!("table_{k}"), format!("T00{k}/S01"), 20)).collect(),
         work: (0..30).map(|k| (format!("T001/S{k:02}"), 1e-3, "repair_pushpin".into(), why.into())).collect(),
         drift: (0..30).map(|k| (format!("T001/S{k:02}"), -0.4, 12.0, [8.0, 30.0, f64::INFINITY])).collect(),
+        margin_limits: [Some(31.0), Some(5.5), Some(2.65)],
         provenance: vec![("FLEET.toml".into(), "0123456789abcdef".repeat(4))],
     };
     fleet_page(&view).unwrap().html()

@@ -86,6 +86,7 @@ impl Refused for AnswerError {
             AnswerError::Pes(e) => e.class(words),
             AnswerError::Tune(e) => e.class(words),
             AnswerError::GainTable(e) => e.class(words),
+            AnswerError::Gains { source, .. } => source.class(words),
             AnswerError::Verify(e) => e.class(words),
             AnswerError::Gate(e) => e.class(words),
             AnswerError::Fleet(e) => e.class(words),

@@ -42,6 +42,8 @@ pub enum AnswerError {
     Pes(#[from] PesError),
     #[error(transparent)]
     Tune(#[from] TuneError),
+    #[error("{}: {source}", file.display())]
+    Gains { file: PathBuf, source: GainTableError },
     #[error(transparent)]
     GainTable(#[from] GainTableError),
     #[error(transparent)]

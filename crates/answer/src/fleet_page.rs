@@ -4,6 +4,7 @@ use super::{AnswerError, fleet_slot};
 use servotune::lti::Plant;
 use servotune_fleet::{Context, Proved, SlotRow, Store, Verdict, assigned, drift, work_list};
 use servotune_report::fleet::{CoverageLine, FleetView, SlotLine, fleet_page};
+use servotune_report::tuned::figure_name;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Slots that a page holds; of a larger floor every second, third, ... one is shown and counted in its distributions.
@@ -49,18 +50,12 @@ pub(super) fn html(
         ("the one table of FLEET.toml for all".into(), share(shared.base)),
         ("a table of its own for each slot".into(), share(shared.own)),
     ];
-    view.ways.extend(
-        shared
-            .groups
-            .iter()
-            .map(|(k, served)| (format!("{k} groups of machines that look alike, one table each"), share(*served))),
-    );
-    view.ways.extend(
-        shared
-            .curve
-            .iter()
-            .map(|c| (format!("{} shared tables, chosen by what is proven", c.tables.len()), share(c.served))),
-    );
+    view.ways.extend(shared.groups.iter().map(|(k, served)| {
+        (counted(*k, "group of machines", "groups of machines") + " that look alike, one table each", share(*served))
+    }));
+    view.ways.extend(shared.curve.iter().map(|c| {
+        (counted(c.tables.len(), "shared table", "shared tables") + ", chosen by what is proven", share(c.served))
+    }));
     let named = |(i, t): (usize, &servotune_fleet::SharedTable)| (format!("K{:02}", i + 1), t.origin.clone(), t.slots);
     view.tables = shared.tables.iter().enumerate().map(named).collect();
     view.work = work_list(store, run)?.into_iter().map(|w| (w.slot, w.gain, w.work, w.why)).collect();
@@ -79,12 +74,19 @@ pub(super) fn html(
             })
             .collect();
     }
+    let asked = &context.spec.margins;
+    view.margin_limits = [asked.phase_margin_deg, asked.gain_margin_db, asked.max_sensitivity];
     view.provenance = vec![
         ("program".into(), format!("servotune {}", env!("CARGO_PKG_VERSION"))),
         ("candidates for shared tables".into(), library.tables.len().to_string()),
     ];
     view.provenance.extend(context.inputs.iter().map(|(name, sha256)| (format!("{name} (SHA-256)"), sha256.clone())));
     Ok(fleet_page(&view)?.html())
+}
+
+/// One of them, or several.
+fn counted(n: usize, one: &str, more: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { more })
 }
 
 fn line(row: &SlotRow, shared: Option<String>) -> SlotLine {
@@ -96,8 +98,10 @@ fn line(row: &SlotRow, shared: Option<String>) -> SlotLine {
     };
     let of = |f: &dyn Fn(&Proved) -> Option<f64>| [now, then].map(|p| p.and_then(f).unwrap_or(f64::NAN));
     let gate = row.gate.as_ref();
-    let limit =
-        then.or(now).map(|p| if p.case.is_empty() { p.limit.to_string() } else { format!("{}, {}", p.limit, p.case) });
+    let limit = then.or(now).map(|p| {
+        let name = figure_name(p.limit);
+        if p.case.is_empty() { name } else { format!("{name}, {}", p.case) }
+    });
     let why = || gate.filter(|_| matches!(row.verdict, Verdict::Repair | Verdict::Inspect)).map(|g| g.why.clone());
     let note = row.error.clone().or_else(why).unwrap_or_default();
     SlotLine {

@@ -8,6 +8,7 @@ use servotune::tune::{Machine, Outcome, Reached, Route, Tuned, Work, judge, rang
 use servotune_fleet::{Context, OwnTable, SlotRow, SlotSource, gain_table_of};
 use servotune_report::page::Block;
 use servotune_report::table::Verdict;
+use servotune_report::tuned::figure_name;
 
 /// Where the page of a slot lies beside the fleet's page.
 pub(super) fn file(row: &SlotRow) -> String {
@@ -56,7 +57,8 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
         sweep: Some((&sweep, context.hold)),
         identified: None,
         spec: &context.spec,
-        start: Some(start),
+        // Gains that stay are no tuning: there is nothing before them.
+        start: found.map(|_| start),
         outcome: &outcome,
         over_model: None,
         table: &table,
@@ -72,7 +74,7 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
         *text = format!(
             "In the worst case ({}) {} is missed by {:.1} %.",
             if proved.case.is_empty() { "as measured" } else { &proved.case },
-            proved.limit,
+            figure_name(proved.limit),
             100.0 * proved.worst
         );
     }

@@ -11,6 +11,7 @@ mod fleet_slot;
 mod floor;
 mod identified;
 mod judged;
+mod linear;
 mod named;
 mod pages;
 mod physics;

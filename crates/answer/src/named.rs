@@ -5,7 +5,7 @@ use servotune::controller::Controller;
 use servotune::document::parse_toml;
 use servotune::lti::{Plant, PlantFile, imported_plant};
 use servotune::pes::Profile;
-use servotune::tune::GainTable;
+use servotune::tune::{GainTable, GainTableError};
 use std::path::Path;
 
 /// A value and the file that it came from, or what it is called.
@@ -39,7 +39,14 @@ pub fn plant(file: &Path, text: &str) -> Result<Plant, AnswerError> {
 pub fn controller(file: &Path, text: &str) -> Result<Controller, AnswerError> {
     // Only a gain table carries the sections that the firmware runs.
     if text.lines().any(|l| l.trim_start().starts_with("[[section]]")) {
-        return Ok(GainTable::parse(file, text)?.controller());
+        let table = GainTable::parse(file, text).map_err(|source| match source {
+            // These say what is wrong in the table, not in which.
+            GainTableError::Count { .. } | GainTableError::Section { .. } => {
+                AnswerError::Gains { file: file.into(), source }
+            }
+            other => other.into(),
+        })?;
+        return Ok(table.controller());
     }
     let controller: Controller = parse_toml(file, text)
         .map_err(|e| e.expecting("a controller with its [pid] and filters, or a gain table of `servotune tune`"))?;

@@ -2,7 +2,8 @@
 //!
 //! In: what the command found. Out: a [`Page`] of the same parts as that of a slot. Spec: `specs/report.md`.
 
-use super::slot::{decided, identified_blocks, linear_view, units};
+use super::linear::{Shown, linear_view};
+use super::slot::{decided, identified_blocks, units};
 use super::{AnswerError, Named};
 use servotune::controller::Controller;
 use servotune::frf::Sweep;
@@ -63,7 +64,7 @@ pub fn margins_page(
     controller: Named<'_, Controller>,
     provenance: Vec<(String, String)>,
 ) -> Result<Page, AnswerError> {
-    let view = linear_view("loop", plant.value, controller.value)?;
+    let view = linear_view("loop", plant.value, controller.value, Shown::of(plant.value, &[controller.value])?)?;
     let name = plant.file.display().to_string();
     // Nothing is asked of this loop.
     let spec = Spec {
@@ -104,9 +105,11 @@ pub fn compared_page(
     controllers: &[Named<'_, Controller>],
     provenance: Vec<(String, String)>,
 ) -> Result<Page, AnswerError> {
+    let values: Vec<&Controller> = controllers.iter().map(|c| c.value).collect();
+    let shown = Shown::of(plant.value, &values)?;
     let loops = controllers
         .iter()
-        .map(|c| linear_view(&c.file.display().to_string(), plant.value, c.value))
+        .map(|c| linear_view(&c.file.display().to_string(), plant.value, c.value, shown))
         .collect::<Result<Vec<_>, _>>()?;
     let beyond = (!plant.value.physics.is_empty()).then_some("Effects beyond linear are left out of this page.");
     Ok(overlay_page(&plant.file.display().to_string(), &loops, units(plant.value), beyond, provenance)?)

@@ -1,12 +1,12 @@
 //! One slot tuned: what `tune` and `demo` share, from the machine to the gain table and the page.
 
 use super::AnswerError;
-use super::steps::{move_record, step_responses};
+use super::linear::{Shown, linear_view};
+use super::steps::move_record;
 use servotune::controller::Controller;
-use servotune::feedback::{ModelLoop, OpenLoop, confirmed_margins};
 use servotune::frf::Sweep;
 use servotune::identify::Identified;
-use servotune::lti::{DiscretePlant, FrequencyResponse, Plant};
+use servotune::lti::{DiscretePlant, Plant};
 use servotune::pes::{figures, simulate, simulate_physical};
 use servotune::physics::Restored;
 use servotune::tune::{
@@ -24,7 +24,6 @@ use servotune_report::sampled::sampled_table;
 use servotune_report::slot::{SlotView, slot_page};
 use servotune_report::table::Verdict;
 use servotune_report::tuned::{Units, conflicts_table, gains_table, sections_table};
-use std::f64::consts::TAU;
 
 /// A slot with everything that is known of it.
 pub struct Slot<'a> {
@@ -48,8 +47,8 @@ pub struct Slot<'a> {
     pub over_model: Option<&'a Outcome>,
     /// The gain table.
     pub table: &'a GainTable,
-    /// What the certificate says of the table; none without one.
-    pub certificate: Option<&'a str>,
+    /// Whether the certificate proves the table, and what it says; none without one.
+    pub certificate: Option<(bool, &'a str)>,
     /// What was read, with digests: name and value.
     pub provenance: Vec<(String, String)>,
     /// The physics and the tuning with it, where the plant has any.
@@ -61,41 +60,15 @@ pub fn units(plant: &Plant) -> Units<'_> {
     Units { position: &plant.position_unit, command: &plant.command_unit }
 }
 
-/// Points of the drawn curves for each decade.
-const DRAWN_PER_DECADE: f64 = 400.0;
-
-/// Loop, margins and steps of one controller on the linear model; without a write and without limits.
-pub(super) fn linear_view(name: &str, plant: &Plant, c: &Controller) -> Result<LoopView, AnswerError> {
-    let sections = c.sections().map_err(servotune::tune::TuneError::from)?;
-    let sampled = DiscretePlant::of(plant, c.sample_time_s)?;
-    let l = ModelLoop::new(&sampled, &sections)?;
-    let margins = confirmed_margins(&l)?;
-    // From a decade below the slowest crossing on, 10 Hz at most.
-    let crossings = [margins.gain_crossover_hz, margins.phase_crossover_hz].into_iter().flatten();
-    let (from, to) = (TAU * crossings.fold(10.0, |low: f64, hz| low.min(0.1 * hz)), l.end_rad_s());
-    let n = (DRAWN_PER_DECADE * (to / from).log10()).ceil() as usize;
-    let mut w: Vec<f64> = (0..=n).map(|i| from * (to / from).powf(i as f64 / n as f64)).collect();
-    w.extend(l.grid().into_iter().filter(|w| *w > from));
-    w.sort_by(f64::total_cmp);
-    w.dedup();
-    let steps = margins.stable.then(|| step_responses(&sampled, c, &sections.chain, margins.gain_crossover_hz));
-    Ok(LoopView {
-        name: name.to_owned(),
-        open_loop: w.iter().map(|&w| l.at(w)).collect(),
-        plant: w.iter().map(|&w| sampled.at(w)).collect(),
-        sample_time_s: c.sample_time_s,
-        hz: w.into_iter().map(|w| w / TAU).collect(),
-        margins,
-        write: None,
-        steps,
-        move_end: None,
-        judged: None,
-    })
-}
-
 /// All that is drawn of one controller on the model.
-fn loop_view(name: &str, slot: &Slot<'_>, c: &Controller, judged: Judged) -> Result<LoopView, AnswerError> {
-    let mut view = linear_view(name, slot.plant, c)?;
+fn loop_view(
+    name: &str,
+    slot: &Slot<'_>,
+    c: &Controller,
+    shown: Shown,
+    judged: Judged,
+) -> Result<LoopView, AnswerError> {
+    let mut view = linear_view(name, slot.plant, c, shown)?;
     if let Some(profile) = &slot.spec.profile {
         let write = match slot.physics {
             Some((physics, _)) => simulate_physical(physics, c, profile)?,
@@ -135,13 +108,15 @@ const DRAW_SEED: u64 = 1;
 pub fn page(slot: &Slot<'_>) -> Result<Page, AnswerError> {
     let after_controller = slot.outcome.controller();
     let judged_after = slot.physics.map_or(&slot.outcome.after()[0].judged, |(_, t)| &t.after.judged);
-    let after = loop_view("after", slot, after_controller, judged_after.clone())?;
+    let both: Vec<&Controller> = std::iter::once(after_controller).chain(slot.start).collect();
+    let shown = Shown::of(slot.plant, &both)?;
+    let after = loop_view("after", slot, after_controller, shown, judged_after.clone())?;
     let judged_before = match slot.physics {
         Some((_, t)) => t.before.as_ref().map(|p| &p.judged),
         None => slot.outcome.before().and_then(|b| b.first()).map(|p| &p.judged),
     };
     let before = match (slot.start, judged_before) {
-        (Some(c), Some(judged)) => Some(loop_view("before", slot, c, judged.clone())?),
+        (Some(c), Some(judged)) => Some(loop_view("before", slot, c, shown, judged.clone())?),
         _ => None,
     };
     let view = SlotView {

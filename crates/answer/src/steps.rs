@@ -15,17 +15,17 @@ use std::f64::consts::TAU;
 const FEWEST: usize = 100;
 const MOST: usize = 20_000;
 
-/// Both steps, long enough for the loop's crossover and for its integrator to settle.
-pub(super) fn step_responses(
-    plant: &DiscretePlant,
-    c: &Controller,
-    chain: &[Section],
-    crossover_hz: Option<f64>,
-) -> StepResponses {
+/// Long enough for the loop's crossover and for its integrator to settle (s).
+pub(super) fn step_time_s(c: &Controller, crossover_hz: Option<f64>) -> f64 {
     // Eight time constants of the crossover; of the integral action, kp/ki, four where it has any.
     let crossover = crossover_hz.map_or(0.0, |hz| 8.0 / (TAU * hz));
     let integral = if c.pid.ki_per_s > 0.0 { (4.0 * c.pid.kp / c.pid.ki_per_s).abs() } else { 0.0 };
-    let samples = ((crossover + integral.min(4.0 * crossover)) / c.sample_time_s).ceil();
+    crossover + integral.min(4.0 * crossover)
+}
+
+/// Both steps over this time.
+pub(super) fn step_responses(plant: &DiscretePlant, c: &Controller, chain: &[Section], time_s: f64) -> StepResponses {
+    let samples = (time_s / c.sample_time_s).ceil();
     let samples = (samples as usize).clamp(FEWEST, MOST);
     let run = |reference: f64, load: f64| {
         let (mut state, mut memory) = (PlantState::at_rest(plant), vec![[0.0; 2]; chain.len()]);

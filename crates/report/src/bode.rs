@@ -175,7 +175,9 @@ fn note_margins(magnitude: &mut Panel, phase: &mut Panel, marks: &BodeMarks) {
         phase.marks.push(Mark::Note(Note { at: (at, margin - 180.0), text, ink: Ink::Plain }));
     }
     if let Some((at, margin)) = marks.gain_margin {
-        let text = format!("gain margin {} dB", NumberFormat::Decimals(1).page(margin));
+        // Below 0 dB the gain may fall by so much, above it may rise.
+        let words = if margin < 0.0 { "gain may fall" } else { "gain margin" };
+        let text = format!("{words} {} dB", NumberFormat::Decimals(1).page(margin.abs()));
         magnitude.marks.push(Mark::Note(Note { at: (at, -margin), text, ink: Ink::Plain }));
     }
 }

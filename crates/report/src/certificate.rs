@@ -78,8 +78,8 @@ pub fn certificate_text(c: &Certificate) -> Result<String, ReportError> {
         }
         text.push('\n');
     }
-    for f in &c.findings {
-        text += &format!("{}\n", sentence(f));
+    for said in sentences(&c.findings) {
+        text += &format!("{said}\n");
     }
     text += if c.proved { "Proved.\n" } else { "NOT PROVED.\n" };
     Ok(text)
@@ -117,7 +117,7 @@ pub fn certificate_sentence(c: &Certificate) -> String {
             )
         }));
     }
-    parts.extend(c.findings.iter().map(|f| sentence(f).trim_end_matches('.').to_owned()));
+    parts.extend(sentences(&c.findings).into_iter().map(|s| s.trim_end_matches('.').to_owned()));
     format!("Not proved: {}.", parts.join("; "))
 }
 
@@ -163,6 +163,18 @@ pub(super) fn write_line(w: &WriteBox) -> String {
             format!("The write has no bound over the box: {why}.")
         }
     }
+}
+
+/// Findings in words. Figures found on other files differ for that reason alone, and are counted in one sentence.
+pub fn sentences(findings: &[Finding]) -> Vec<String> {
+    let others = findings.iter().any(|f| matches!(f, Finding::Digest { .. }));
+    let kept = |f: &&Finding| !(others && matches!(f, Finding::Figure { .. }));
+    let mut said: Vec<String> = findings.iter().filter(kept).map(sentence).collect();
+    let left = findings.len() - said.len();
+    if left > 0 {
+        said.push(format!("Its [after] is of those files: {left} of its figures are not what is proved here."));
+    }
+    said
 }
 
 /// A finding in words.

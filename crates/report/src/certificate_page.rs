@@ -4,11 +4,11 @@
 //! below 0 where it misses it; nothing but "proved" is green. Spec: `specs/report.md`, `specs/certificate.md`.
 
 use super::ReportError;
-use super::certificate::{certificate_sentence, open_reason, proven_columns, sentence, stability_words, write_line};
+use super::certificate::{certificate_sentence, open_reason, proven_columns, sentences, stability_words, write_line};
 use super::limit_cards::first_upper;
 use super::number::{MISSING, NumberFormat, typographic};
 use super::page::{Block, Card, Page, Section};
-use super::proven_limit::{name, word};
+use super::proven_limit::{in_words, name, word};
 use super::proven_room::{room, room_figure};
 use super::table::{Cell, Column, Table, Verdict};
 use super::tuned::Units;
@@ -38,7 +38,7 @@ pub fn certificate_page(v: &CertificateView<'_>) -> Result<Page, ReportError> {
     let c = v.certificate;
     let verdict = overall(c);
     let mut blocks = vec![Block::Notice(verdict, certificate_sentence(c))];
-    blocks.extend(c.findings.iter().map(|f| Block::Notice(Verdict::Fail, sentence(f))));
+    blocks.extend(sentences(&c.findings).into_iter().map(|said| Block::Notice(Verdict::Fail, said)));
     blocks.push(Block::Table(side_by_side(v)?));
     if let Some(figure) = room_figure(c, &|i| machine_name(v, i))? {
         blocks.push(Block::Figure(figure));
@@ -150,7 +150,7 @@ fn cards(v: &CertificateView<'_>, verdict: Verdict) -> Vec<Card> {
             "Least room proved",
             worst.map_or_else(|| MISSING.to_owned(), |(x, _)| NumberFormat::Decimals(2).page(100.0 * x)),
             "%",
-            worst.map_or_else(String::new, |(_, l)| format!("to {}, {}", l.name, required(l))),
+            worst.map_or_else(String::new, |(_, l)| format!("to {}, {}", in_words(&l.name), required(l))),
             worst.filter(|(_, l)| l.verdict != Proven::Proved).map(|(_, l)| word(l.verdict).0),
         ),
     ]
@@ -207,7 +207,7 @@ fn case_blocks(v: &CertificateView<'_>, case: &CaseProof) -> Result<Vec<Block>, 
             open = open_reason(v.certificate, case, l);
         }
         let mut row = vec![
-            l.name.as_str().into(),
+            in_words(&l.name).as_str().into(),
             required(l).as_str().into(),
             l.proven.low.into(),
             l.proven.high.into(),

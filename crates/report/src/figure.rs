@@ -68,6 +68,8 @@ pub enum Ticks {
     Decibels,
     /// 15, 30, 45, 90, 180, ... degrees.
     Degrees,
+    /// Whole numbers: things that are counted.
+    Whole,
 }
 
 /// One thing in a panel.
@@ -268,6 +270,11 @@ impl Axis {
     /// A linear axis in degrees.
     pub fn degrees(label: &str) -> Self {
         Axis { ticks: Ticks::Degrees, ..Axis::linear(label, "deg") }
+    }
+
+    /// A linear axis of things that are counted.
+    pub fn counts(label: &str) -> Self {
+        Axis { ticks: Ticks::Whole, ..Axis::linear(label, "") }
     }
 
     /// The label with its unit in brackets.

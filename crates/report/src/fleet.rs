@@ -4,11 +4,12 @@
 //! as long as the page stays of a size that a browser opens at once.
 
 use super::ReportError;
-use super::figure::{Axis, Figure, Ink, Kind, Mark, Panel, Series, Tile};
+use super::figure::{Axis, Figure, Ink, Kind, Mark, Panel, RuleLine, Series, Tile};
 use super::histogram::{Group, histogram};
 use super::number::NumberFormat;
 use super::page::{Block, Card, Page, Section};
 use super::table::{Cell, Column, Table, Verdict};
+use servotune::tune::Side;
 
 /// One slot as the page shows it; NaN where there is no number.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,6 +76,8 @@ pub struct FleetView {
     pub work: Vec<(String, f64, String, String)>,
     /// Drift: slot, gain in percent a run, room left in percent, runs left (earliest, likely, latest).
     pub drift: Vec<(String, f64, f64, [f64; 3])>,
+    /// Limits of phase margin (deg), gain margin (dB) and largest sensitivity (ratio), where the spec has them.
+    pub margin_limits: [Option<f64>; 3],
     /// Inputs by name and digest.
     pub provenance: Vec<(String, String)>,
 }
@@ -203,21 +206,40 @@ fn distributions(v: &FleetView) -> Result<Vec<Block>, ReportError> {
     let mut blocks = vec![Block::Prose(
         "Slots with a table of their own, or gains that are kept: as found in the slot and with the table, as measured.".into(),
     )];
-    let mut draw =
-        |title: &str, quantity: (&str, &str), of: &dyn Fn(&SlotLine) -> [f64; 2]| -> Result<(), ReportError> {
-            let [before, after] = both(v, of);
-            if !before.is_empty() {
-                let groups =
-                    [Group { name: "as found", values: &before }, Group { name: "with its table", values: &after }];
-                blocks.push(Block::Figure(histogram(title, "Slots in each bin.", quantity, &groups, 40)?));
+    let [phase, gain, peak] = v.margin_limits;
+    let mut draw = |title: &str,
+                    quantity: (&str, &str),
+                    of: &dyn Fn(&SlotLine) -> [f64; 2],
+                    limit: Option<(Side, f64)>|
+     -> Result<(), ReportError> {
+        let [before, after] = both(v, of);
+        if !before.is_empty() {
+            let groups =
+                [Group { name: "as found", values: &before }, Group { name: "with its table", values: &after }];
+            let mut figure = histogram(title, "Slots in each bin.", quantity, &groups, 40)?;
+            for panel in &mut figure.panels {
+                panel.y.label = "Slots".into();
+                limit.iter().for_each(|&(side, at)| draw_limit(panel, side, at));
             }
-            Ok(())
-        };
-    draw("PES", ("DFT norm, both bands", &v.position_unit), &|s| s.dft)?;
-    draw("Phase margin", ("Phase margin", "deg"), &|s| s.phase_margin_deg)?;
-    draw("Gain margin", ("Gain margin", "dB"), &|s| s.gain_margin_db)?;
-    draw("Sensitivity", ("Largest sensitivity", ""), &|s| s.max_sensitivity)?;
+            blocks.push(Block::Figure(figure));
+        }
+        Ok(())
+    };
+    draw("PES", ("DFT norm, both bands", &v.position_unit), &|s| s.dft, None)?;
+    draw("Phase margin", ("Phase margin", "deg"), &|s| s.phase_margin_deg, phase.map(|x| (Side::AtLeast, x)))?;
+    draw("Gain margin", ("Gain margin", "dB"), &|s| s.gain_margin_db, gain.map(|x| (Side::AtLeast, x)))?;
+    draw("Sensitivity", ("Largest sensitivity", ""), &|s| s.max_sensitivity, peak.map(|x| (Side::AtMost, x)))?;
     Ok(blocks)
+}
+
+/// A limit in a histogram, with air beside it where it lies outside of all bins.
+fn draw_limit(panel: &mut Panel, side: Side, at: f64) {
+    let words = if side == Side::AtLeast { "at least" } else { "at most" };
+    panel.marks.push(RuleLine::vertical(at, &format!("{words} {at}"), Ink::Limit));
+    if let Some((low, high)) = panel.x.range {
+        let air = 0.04 * (high - low);
+        panel.x.range = Some((low.min(at - air), high.max(at + air)));
+    }
 }
 
 fn shared(v: &FleetView) -> Result<Vec<Block>, ReportError> {
@@ -228,7 +250,10 @@ fn shared(v: &FleetView) -> Result<Vec<Block>, ReportError> {
         let k: Vec<f64> = v.coverage.iter().map(|c| c.tables as f64).collect();
         let served: Vec<f64> = v.coverage.iter().map(|c| 100.0 * c.share).collect();
         let most: Vec<f64> = v.coverage.iter().map(|c| 100.0 * c.at_most).collect();
-        let mut panel = Panel::new(Axis::linear("Shared tables", ""), Axis::linear("Slots served", "%"));
+        let mut panel = Panel::new(Axis::counts("Shared tables"), Axis::linear("Slots served", "%"));
+        // No share is above all of them; a little air keeps the uppermost points whole.
+        let least = served.iter().chain(&most).copied().fold(100.0, f64::min);
+        panel.y.range = Some(((0.95 * least - 2.0).max(0.0), 101.0));
         panel.x.range = Some((0.0, v.coverage.len() as f64 + 1.0));
         panel.marks.push(Series::new("the best choice found", Ink::Data(0), Kind::Points, &k, &served)?.into());
         panel.marks.push(Series::new("no choice serves more", Ink::Muted, Kind::Dashed, &k, &most)?.into());
@@ -295,10 +320,10 @@ fn put(t: &mut Table, s: &SlotLine) -> Result<(), ReportError> {
 }
 
 /// What the names of slots lead to.
-const REPORTS: &str = "Where a slot has a full report of its own, its name leads there; `--pages N` writes as many.";
+const REPORTS: &str = "The limit that is nearest, or missed most, in any case: above 0 % it is missed by so much, below there is as much room. Where a slot has a full report of its own, its name leads there; `--pages N` writes as many.";
 
 fn worst(v: &FleetView) -> Result<Table, ReportError> {
-    let mut t = Table::new("Limits missed most, with the best gains there are", slot_columns());
+    let mut t = Table::new("Slots with the least room, with the best gains there are", slot_columns());
     let now = |s: &SlotLine| if s.worst[1].is_finite() { s.worst[1] } else { s.worst[0] };
     let mut all: Vec<&SlotLine> = v.slots.iter().filter(|s| now(s).is_finite()).collect();
     all.sort_by(|a, b| now(b).total_cmp(&now(a)));

@@ -30,7 +30,7 @@ pub fn histogram(
     for (i, group) in groups.iter().enumerate() {
         let counts = counts(group.values, low, width, at.len());
         tallest = counts.iter().copied().fold(tallest, f64::max);
-        let mut panel = Panel::new(Axis::linear(quantity, unit), Axis::linear("Machines", ""));
+        let mut panel = Panel::new(Axis::linear(quantity, unit), Axis::counts("Machines"));
         panel.height = 0.6;
         panel.x.range = Some((low, high));
         let kind = Kind::Bars { from: 0.05 * width, to: 0.95 * width };

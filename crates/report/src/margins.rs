@@ -20,7 +20,7 @@ pub fn margins_table(m: &Margins) -> Result<Table, ReportError> {
         table.push(vec![name.into(), value.into(), unit.into(), hz.into()])
     };
     row("phase margin", m.phase_margin_deg, "deg", m.gain_crossover_hz)?;
-    row("gain margin", m.gain_margin_db, "dB", m.phase_crossover_hz)?;
+    row(gain_margin_name(m.gain_margin_db), m.gain_margin_db, "dB", m.phase_crossover_hz)?;
     row("max sensitivity Ms", Some(m.max_sensitivity), "ratio", Some(m.max_sensitivity_hz))?;
     row("modulus margin 1/Ms", Some(m.modulus_margin), "ratio", Some(m.max_sensitivity_hz))?;
     row("delay margin", m.delay_margin_s.map(|s| s * 1e6), "us", None)?;
@@ -30,6 +30,11 @@ pub fn margins_table(m: &Margins) -> Result<Table, ReportError> {
         table.push(vec!["closed-loop poles outside the unit circle".into(), value, "".into(), None.into()])?;
     }
     Ok(table)
+}
+
+/// Below 0 dB it says how far the gain may fall, above how far it may rise.
+fn gain_margin_name(db: Option<f64>) -> &'static str {
+    if db.is_some_and(|db| db < 0.0) { "gain margin (gain may fall)" } else { "gain margin" }
 }
 
 /// All crossings of one loop.
@@ -76,7 +81,7 @@ pub fn interval_table(caption: &str, g: &Margins, i: &MarginIntervals) -> Result
     row("gain crossover", g.gain_crossover_hz, i.gain_crossover_hz, "Hz")?;
     row("phase margin", g.phase_margin_deg, i.phase_margin_deg, "deg")?;
     row("phase crossover", g.phase_crossover_hz, i.phase_crossover_hz, "Hz")?;
-    row("gain margin", g.gain_margin_db, i.gain_margin_db, "dB")?;
+    row(gain_margin_name(g.gain_margin_db), g.gain_margin_db, i.gain_margin_db, "dB")?;
     row("max sensitivity Ms", Some(g.max_sensitivity), Some(i.max_sensitivity), "ratio")?;
     row("delay margin", g.delay_margin_s.map(|s| 1e6 * s), None, "us")?;
     row("disk margin", Some(g.disk_margin), None, "ratio")?;

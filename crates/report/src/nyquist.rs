@@ -87,6 +87,21 @@ pub fn nyquist(
     Ok(Figure { title: title.to_owned(), caption: caption.to_owned(), share_x: false, panels: vec![panel] })
 }
 
+/// Draws another loop behind those of a Nyquist plot.
+pub fn behind(
+    figure: &mut Figure,
+    name: &str,
+    frequency_hz: &[f64],
+    open_loop: &[Complex<f64>],
+) -> Result<(), ReportError> {
+    let Some(panel) = figure.panels.first_mut() else { return Ok(()) };
+    let (re, im): (Vec<f64>, Vec<f64>) = open_loop.iter().map(|v| (v.re, v.im)).unzip();
+    let series = Series::new(name, Ink::Data(1), Kind::Dashed, &re, &im)?.along("frequency", "Hz", frequency_hz)?;
+    let place = panel.marks.iter().position(|m| matches!(m, Mark::Series(_))).unwrap_or(panel.marks.len());
+    panel.marks.insert(place, series.into());
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]

@@ -1,6 +1,6 @@
 //! The front of margin against objective as a table and a picture; the budget of a PES as a table and bars.
 
-use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Series};
+use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Scale, Series};
 use super::number::NumberFormat;
 use super::table::{Cell, Column, Table, Verdict};
 use super::{Page, ReportError, page};
@@ -42,33 +42,46 @@ pub fn pareto_table(points: &[ParetoPoint], objective: (&str, &str), unit: &str)
     Ok(table)
 }
 
-/// The objective over Ms; `now` is Ms and objective of the controller that runs today.
+/// An objective's name as a page says it: `pes_rms` is PES rms.
+fn in_words(name: &str) -> String {
+    name.replace('_', " ").replace("pes", "PES").replace("dft", "DFT")
+}
+
+/// The objective over Ms; `now` is Ms and objective of the controller that runs today, `asked` the spec's limit of Ms.
 pub fn pareto_figure(
     title: &str,
     caption: &str,
     points: &[ParetoPoint],
     now: Option<(f64, f64)>,
+    asked: Option<f64>,
     objective: (&str, &str),
 ) -> Result<Figure, ReportError> {
     let column = |of: &dyn Fn(&ParetoPoint) -> bool| -> (Vec<f64>, Vec<f64>) {
         points.iter().filter(|p| of(p)).map(|p| (p.max_sensitivity, p.objective)).unzip()
     };
-    let mut panel = Panel::new(Axis::linear("Ms", ""), Axis::linear(objective.0, objective.1));
+    let mut panel = Panel::new(Axis::linear("Ms", ""), Axis::linear(&in_words(objective.0), objective.1));
     let (x, y) = column(&|p| p.on_front);
     panel.marks.push(Series::new("front", Ink::Data(0), Kind::Solid, &x, &y)?.into());
     panel.marks.push(Series::new("tuned", Ink::Data(0), Kind::Points, &x, &y)?.into());
+    // What a margin costs is a factor: over a decade and more only a logarithm shows both ends.
+    let (least, most) = y.iter().fold((f64::INFINITY, 0.0f64), |(a, b), &v| (a.min(v), b.max(v)));
+    if least > 0.0 && most > 8.0 * least {
+        panel.y.scale = Scale::Log10;
+    }
     // A point that misses a limit far off would press the front flat: only those near it are drawn.
-    let most = y.iter().copied().fold(0.0, f64::max);
     let (x, y) = column(&|p| !p.feasible && p.objective <= 2.0 * most);
     if !x.is_empty() {
         panel.marks.push(Series::new("a limit missed", Ink::Limit, Kind::Points, &x, &y)?.into());
     }
     if let Some((ms, value)) = now {
         panel.marks.push(Series::new("today", Ink::Data(1), Kind::Points, &[ms], &[value])?.into());
-        panel.marks.push(RuleLine::vertical(ms, "", Ink::Muted));
+        panel.marks.push(RuleLine::vertical(ms, "today", Ink::Muted));
+    }
+    if let Some(limit) = asked {
+        panel.marks.push(RuleLine::vertical(limit, &format!("the spec's limit {limit}"), Ink::Limit));
     }
     // Air beside the first and the last marker, which the frame would cut in half.
-    let all = panel.series().flat_map(|s| s.x.iter().copied()).filter(|x| x.is_finite());
+    let all = panel.series().flat_map(|s| s.x.iter().copied()).chain(asked).filter(|x| x.is_finite());
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
     if low <= high {
         let air = 0.04 * (high - low).max(0.01 * high.abs());
@@ -81,12 +94,13 @@ pub fn pareto_figure(
 pub fn pareto_page(
     points: &[ParetoPoint],
     now: Option<(f64, f64)>,
+    asked: Option<f64>,
     objective: (&str, &str),
     unit: &str,
     provenance: Vec<(String, String)>,
 ) -> Result<Page, ReportError> {
     let caption = "Each point is a table tuned to the Ms below it, worst machine; left is safer, lower is better.";
-    let figure = pareto_figure("What a margin costs", caption, points, now, objective)?;
+    let figure = pareto_figure("What a margin costs", caption, points, now, asked, objective)?;
     Ok(Page {
         title: "Margin against objective".into(),
         subtitle: format!(
@@ -97,7 +111,10 @@ pub fn pareto_page(
         cards: vec![],
         sections: vec![page::Section {
             heading: "Front".into(),
-            blocks: vec![page::Block::Figure(figure), page::Block::Table(pareto_table(points, objective, unit)?)],
+            blocks: vec![
+                page::Block::Figure(figure),
+                page::Block::Table(pareto_table(points, (&in_words(objective.0), objective.1), unit)?),
+            ],
         }],
         provenance,
     })

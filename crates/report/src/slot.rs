@@ -11,7 +11,7 @@ use super::loop_view::LoopView;
 use super::margins::margins_table;
 use super::move_end::{MoveRecord, move_end};
 use super::number::{MISSING, NumberFormat};
-use super::nyquist::{NyquistMarks, nyquist};
+use super::nyquist::{NyquistMarks, behind as nyquist_behind, nyquist};
 use super::page::{Block, Card, Page, Section};
 use super::sensitivity::sensitivity;
 use super::steps::{StepLimits, StepResponses};
@@ -30,8 +30,8 @@ pub struct SlotView<'a> {
     pub name: &'a str,
     /// The verdict in one sentence, and whether it is good.
     pub verdict: (Verdict, String),
-    /// What the certificate says of the gain table; none without one.
-    pub certificate: Option<&'a str>,
+    /// Whether the certificate proves the gain table, and what it says; none without one.
+    pub certificate: Option<(bool, &'a str)>,
     /// On what the limits were judged, where that is not what the curves show.
     pub judged_on: Option<&'a str>,
     /// Sections about where the plant comes from, shown first.
@@ -56,7 +56,10 @@ pub fn slot_page(view: &SlotView<'_>) -> Result<Page, ReportError> {
     let mut verdict = vec![Block::Notice(view.verdict.0, view.verdict.1.clone()), Block::Table(limits)];
     // Without it, the table's figures would seem to contradict the cards and the curves.
     verdict.extend(view.judged_on.map(|said| Block::Prose(said.to_owned())));
-    verdict.extend(view.certificate.map(|said| Block::Prose(said.to_owned())));
+    verdict.extend(
+        view.certificate
+            .map(|(proved, said)| Block::Notice(if proved { Verdict::Ok } else { Verdict::Warn }, said.to_owned())),
+    );
     let mut sections = vec![Section { heading: "Verdict".into(), blocks: verdict }];
     sections.extend(view.plant.iter().cloned());
     sections.push(loop_section(view)?);
@@ -173,7 +176,10 @@ fn loop_section(view: &SlotView<'_>) -> Result<Section, ReportError> {
     let behind = view.before.zip(s_before.as_ref()).map(|(b, s)| (b.name.as_str(), &b.hz[..], &s[..]));
     let mut gang = sensitivity("Sensitivity functions", "", &after.hz, &s, &t, limit, behind)?;
     requirements(&mut gang, view, &[Magnitude::S, Magnitude::T])?;
-    let curve = nyquist("Nyquist curve", "", &after.hz, &after.open_loop, &nyquist_marks)?;
+    let mut curve = nyquist("Nyquist curve", "", &after.hz, &after.open_loop, &nyquist_marks)?;
+    if let Some(b) = view.before {
+        nyquist_behind(&mut curve, &b.name, &b.hz, &b.open_loop)?;
+    }
     let mut blocks = vec![Block::Figure(open), Block::Figure(gang)];
     let mut steps: Vec<(&str, &StepResponses)> = after.steps.iter().map(|s| (after.name.as_str(), s)).collect();
     if steps.is_empty() {

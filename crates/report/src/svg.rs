@@ -92,6 +92,7 @@ fn view_data(axis: &Axis, view: &super::view::View) -> String {
         Ticks::Decimal => "dec",
         Ticks::Decibels => "db",
         Ticks::Degrees => "deg",
+        Ticks::Whole => "whole",
     };
     format!("{scale} {ticks} {} {}", view.lo, view.hi)
 }

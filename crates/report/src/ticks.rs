@@ -41,9 +41,11 @@ pub(super) fn axis_ticks(axis: &Axis, view: &View, length: f64, spacing: f64, ro
 
 /// The smallest allowed step that is not below `raw`.
 pub(super) fn step(policy: Ticks, raw: f64) -> f64 {
+    let raw = if policy == Ticks::Whole { raw.max(1.0) } else { raw };
     let (fixed, unit): (&[f64], f64) = match policy {
         Ticks::Decimal => (&[], 1.0),
         Ticks::Decibels => (&[2.0, 5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 100.0], 1.0),
+        Ticks::Whole => (&[], 1.0),
         Ticks::Degrees => (&[2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 90.0, 180.0], 360.0),
     };
     if raw > 1.0
@@ -147,6 +149,12 @@ mod tests {
         );
         let view = View::new(Scale::Linear, -200.0, 0.0);
         assert_eq!(labels(view, Ticks::Degrees, 230.0, 40.0).len(), 5);
+    }
+
+    #[test]
+    fn what_is_counted_has_no_halves() {
+        assert_eq!(labels(View::new(Scale::Linear, 0.0, 2.1), Ticks::Whole, 600.0, 60.0), ["0", "1", "2"]);
+        assert_eq!(labels(View::new(Scale::Linear, 0.0, 40.0), Ticks::Whole, 200.0, 60.0), ["0", "20", "40"]);
     }
 
     #[test]

@@ -16,6 +16,11 @@ pub struct Units<'a> {
     pub command: &'a str,
 }
 
+/// A figure's name in words, as the tables of a page have it.
+pub fn figure_name(what: What) -> String {
+    figure_words(what, Units { position: "", command: "" }).0
+}
+
 /// A figure in words, with its unit.
 pub(super) fn figure_words<'a>(what: What, units: Units<'a>) -> (String, &'a str) {
     match what {

@@ -1,5 +1,6 @@
 // Tick marks for a zoomed view; the same rules as report/ticks.rs, which draws the unzoomed picture.
 function step(policy, raw) {
+  if (policy === "whole") raw = Math.max(raw, 1);
   var fixed = { db: [2, 5, 10, 20, 40, 60, 80, 100], deg: [2, 5, 10, 15, 30, 45, 90, 180] }[policy] || [];
   if (raw > 1) {
     for (var i = 0; i < fixed.length; i++) if (fixed[i] >= raw) return fixed[i];

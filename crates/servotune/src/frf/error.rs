@@ -172,7 +172,9 @@ pub enum FrfError {
         "{file}, line {line}: found {found} columns without a header that names them; expected frequency, magnitude and phase"
     )]
     Columns { file: String, line: u64, found: usize },
-    #[error("{file}, line {line}: the header names {header} columns, the rows have {rows}")]
+    #[error(
+        "{file}, line {line}: the header names {header} columns, the rows have {rows}; were decimal commas written between commas? Then write points, or separate the columns by semicolons"
+    )]
     HeaderCount { file: String, line: u64, header: usize, rows: usize },
     #[error("{file}: no column for {wanted}; the header has: {}", list(header))]
     ColumnAbsent { file: String, wanted: &'static str, header: Vec<String> },

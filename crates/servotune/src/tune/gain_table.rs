@@ -145,7 +145,9 @@ pub enum GainTableError {
     #[error("{found} [[section]] rows, but the gains make {expected}")]
     Count { found: usize, expected: usize },
     /// A section is not the one of the gains.
-    #[error("[[section]] {index}: {key} = {found}, but the gains make {expected}; the table was edited by hand?")]
+    #[error(
+        "[[section]] {index}: {key} = {found}, but the gains make {expected}; the table was edited by hand? What stands above the first [[section]] is a controller of its own: keep only that to run gains set by hand"
+    )]
     Section { index: usize, key: &'static str, found: f64, expected: f64 },
     /// The table could not be put into text.
     #[error("the gain table cannot be written as TOML: {0}")]
