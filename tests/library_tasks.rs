@@ -1,6 +1,8 @@
 //! The library's examples run from top to bottom; each ends with an error where its own check fails.
 #![allow(missing_docs)]
 
+#[path = "../crates/servotune/examples/margins_of_many.rs"]
+mod margins_of_many;
 #[path = "../crates/servotune/examples/sweep_to_margins.rs"]
 mod sweep_to_margins;
 #[path = "../crates/servotune/examples/tune_and_verify.rs"]
@@ -14,4 +16,9 @@ fn a_sweep_to_margins() {
 #[test]
 fn a_table_tuned_and_verified() {
     tune_and_verify::main().unwrap_or_else(|e| panic!("{e}"));
+}
+
+#[test]
+fn margins_of_many_files() {
+    margins_of_many::main().unwrap_or_else(|e| panic!("{e}"));
 }

@@ -51,7 +51,7 @@ fn row(id: &str, what: &str, expected: &str, unit: &str, d: &Diagnosis, seconds:
 }
 
 fn foreign(f: &Foretold) -> Result<Row, StudyError> {
-    let (case, plant, controller) = f.made()?;
+    let (case, plant, controller) = f.trial.made(f.id)?;
     let began = Instant::now();
     let d = diagnose(&case, &plant, Some(&controller), &DiagnoseSettings::default(), |_| {})?.diagnosis;
     let seconds = began.elapsed().as_secs_f64();

@@ -49,6 +49,12 @@ pub(super) struct Foreign {
     /// Step of the encoder's count.
     pub lattice: f64,
     pub joint: Option<Joint>,
+    /// A detent: torque, place, width; a bump of Gauss.
+    pub detent: [f64; 3],
+    /// A drag in one direction alone: its level at speed, and the speed over which it comes.
+    pub one_sided: [f64; 2],
+    /// Share by which the amplifier is weaker for negative commands.
+    pub lopsided: f64,
     /// A push: time, width (s), peak.
     pub push: [f64; 3],
     /// White noise of the encoder, rms.
@@ -68,6 +74,9 @@ pub(super) const SOUND: Foreign = Foreign {
     cyclic: [0.0, 1.0],
     lattice: 0.0,
     joint: None,
+    detent: [0.0, 0.0, 1.0],
+    one_sided: [0.0, 1.0],
+    lopsided: 0.0,
     push: [0.0, 1.0, 0.0],
     noise: 0.003,
 };
@@ -82,6 +91,7 @@ type State = [f64; 5];
 
 impl Foreign {
     fn amplified(&self, u: f64) -> f64 {
+        let u = if u < 0.0 { (1.0 - self.lopsided) * u } else { u };
         let u = if self.dead_band > 0.0 {
             // The ends are round over a twentieth of the band.
             let soft = |x: f64| 0.05 * self.dead_band * (x / (0.05 * self.dead_band)).min(500.0).exp().ln_1p();
@@ -93,12 +103,20 @@ impl Foreign {
         if self.limit.is_finite() { u.signum() * self.limit * soft_limit(u.abs() / self.limit) } else { u }
     }
 
+    /// Torques over place and speed that have no name.
+    fn nameless(&self, x: f64, v: f64) -> f64 {
+        let ([peak, place, width], [level, slow]) = (self.detent, self.one_sided);
+        let bump = if peak == 0.0 { 0.0 } else { peak * (-0.5 * ((x - place) / width).powi(2)).exp() };
+        let drag = if level == 0.0 || v <= 0.0 { 0.0 } else { level * (1.0 - (-v / slow).exp()) };
+        bump - drag
+    }
+
     /// Slope of the state under a command and a torque that stays over the step.
     fn slope(&self, s: &State, push: f64) -> State {
         let [b, k, c] = self.body;
         let [x, v, x2, v2, z] = *s;
         let [level, length] = self.bristles;
-        let torque = push - if level > 0.0 { level * z } else { 0.0 };
+        let torque = push + self.nameless(x, v) - if level > 0.0 { level * z } else { 0.0 };
         let dz = if level > 0.0 { (v - v.abs() * z) / length } else { 0.0 };
         let Some(j) = self.joint else { return [v, b * torque - k * x - c * v, v, 0.0, dz] };
         // Two masses of shares 1 - s and s: w² = kc/(s (1 - s)) over the whole inertia.

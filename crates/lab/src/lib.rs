@@ -18,7 +18,9 @@ mod fleet_reliability;
 mod fleet_study;
 mod foreign;
 mod foreign_case;
+mod foreign_scale;
 mod foreign_stage;
+mod foreign_trial;
 mod free_form;
 mod gate;
 mod gate_seeds;
@@ -37,6 +39,10 @@ mod reader_mutations;
 mod readers;
 mod recordings;
 mod reliability_readers;
+mod sealed;
+mod sealed_draw;
+mod sealed_page;
+mod sealed_row;
 pub mod study_identify;
 
 pub use abroad::abroad;
@@ -63,6 +69,8 @@ pub use reached::Reached;
 pub use reader_mutations::{Tally, reader_mutations};
 pub use recordings::recordings;
 pub use reliability_readers::readers;
+pub use sealed::{SealedCase, digests, sealed, sealed_set};
+pub use sealed_row::{Outcome, Row, outcome};
 
 /// What a study hands over: files by name, relative to the results' folder.
 #[derive(Clone, Debug, Default, PartialEq)]

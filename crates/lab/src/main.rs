@@ -34,6 +34,12 @@ struct StudyArguments {
     /// Cases to make again, all unless told; the others keep their lines (study `abroad`)
     #[arg(long, value_name = "ID,ID,...", value_delimiter = ',')]
     cases: Vec<String>,
+    /// Seed of the set (studies `sealed` and `sealed-digests`)
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Cases of the set, 208 unless told (studies `sealed` and `sealed-digests`)
+    #[arg(long, value_name = "N")]
+    count: Option<usize>,
     /// Folder with the measured records (studies `mirror`, `motor`, `hdd`)
     #[arg(long, value_name = "DIR", default_value = "../shared/data")]
     data: PathBuf,
@@ -82,6 +88,10 @@ enum StudyName {
     ReliabilityReaders,
     /// Diagnoses of the cases in the folder --data, beside their answers
     Mismatch,
+    /// The digests of a sealed set of other forms, to be published before it is run
+    SealedDigests,
+    /// The diagnosis on a sealed set of other forms
+    Sealed,
     /// Real recordings: EMPS, Silverbox, motor bench, mirror, diagnosed from a linear model
     Recordings,
     /// The motor bench with flexible coupling, measured
@@ -114,7 +124,7 @@ enum Made {
     Files(Vec<PathBuf>),
 }
 
-fn run(a: &StudyArguments, say: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>, StudyError> {
+fn run(a: &StudyArguments, say: &mut (dyn FnMut(&str) + Send)) -> Result<Vec<PathBuf>, StudyError> {
     use Made::{Files, Pages};
     let made = match a.study {
         StudyName::Fleet => Files(study::floor(&a.out, say)?),
@@ -134,6 +144,11 @@ fn run(a: &StudyArguments, say: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>, St
         StudyName::Abroad => {
             let known = std::fs::read_to_string(a.out.join("mismatch/abroad.json")).ok();
             Pages(study::abroad(&a.data, &a.cases, known.as_deref(), say)?)
+        }
+        StudyName::SealedDigests => Pages(study::digests(a.seed, a.count)),
+        StudyName::Sealed => {
+            let known = std::fs::read_to_string(a.out.join("mismatch/sealed_digests.txt")).ok();
+            Pages(study::sealed(a.seed, a.count, known.as_deref(), say)?)
         }
         StudyName::Classes => Pages(study::classes()?),
         StudyName::FreeForm => Pages(study::free_form(&a.data)?),

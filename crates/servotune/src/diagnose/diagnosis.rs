@@ -73,9 +73,12 @@ pub fn diagnose(
     let sound = hygiene.finding.is_none();
     let start = sound.then(|| cleared(&bench, settings.select.iterations, &mut |step: &str| progress(step))).flatten();
     if let Some(start) = start {
-        remarks.push(
-            "the search set out from a plant fitted together with a law: the given one conceals what acts".into(),
-        );
+        remarks.push(match start.law {
+            Some(_) => {
+                "the search set out from a plant fitted together with a law: the given one conceals what acts".into()
+            }
+            None => "the search set out from a plant fitted to the balance of torques: the given one is far off".into(),
+        });
         bench = Bench::new(&start.plant, bench.runs, sample_time_s, case.spindle_hz)?;
         bench.foretold = start.law;
     }

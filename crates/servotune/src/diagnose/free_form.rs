@@ -10,8 +10,8 @@ use super::free_form_left_out::LeftOut;
 use super::free_form_shape::Shape;
 use super::free_form_stretches::Stretches;
 use super::free_form_trial::Trial;
-use super::rules::{CURVE_LAG, FOLD_NAMED, SECOND_CURVE};
-use crate::numeric::spline::roughness_rows;
+use super::rules::{CURVE_CLEARLY, CURVE_LAG, FOLD_NAMED, SECOND_CURVE};
+use crate::numeric::spline::{Spline, roughness_rows};
 use crate::physics::CurvePort;
 use nalgebra::DMatrix;
 use std::f64::consts::LN_2;
@@ -48,6 +48,8 @@ pub(super) struct Estimated<'a> {
 
 /// Times that the smoothness is chosen anew.
 const CHOICES: usize = 2;
+/// Times that the knots of the best curve are doubled.
+const FINER: usize = 2;
 /// Time constant from which a lag sets out (samples).
 const LAG: f64 = 3.0;
 /// Share of the readings below the place where a fold is taken to lie at first, and share of the range below that which makes an edge: the
@@ -106,6 +108,33 @@ fn with_lag<'a>(found: Foretelling<'a>) -> Foretelling<'a> {
     let t = found.trial.bench.scene.sample_time_s;
     let lagged = foretold(found.trial.clone().lagged(Some(LAG * t)));
     lagged.filter(|l| l.left_out < CURVE_LAG * found.left_out).unwrap_or(found)
+}
+
+/// The knots with others between them.
+fn doubled(at: &[f64]) -> Vec<f64> {
+    let mut all: Vec<f64> = at.iter().copied().chain(at.windows(2).map(|w| 0.5 * (w[0] + w[1]))).collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+/// The same curve over more knots, where it foretells clearly better: what acts at one place only falls between few.
+fn finer<'a>(bench: &'a Bench, ground: &'a Stretches, mut found: Foretelling<'a>) -> Foretelling<'a> {
+    for _ in 0..FINER {
+        let Shape::Curve(port, at, value) = &found.trial.shape else { break };
+        if *port == CurvePort::SensorOverPosition {
+            break;
+        }
+        let spline = Spline::new(at.clone(), value.clone());
+        let at = doubled(at);
+        let value = at.iter().map(|a| spline.value(*a)).collect();
+        let shape = Shape::Curve(*port, at, value);
+        let next = foretold(Trial::new(bench, ground, &found.trial.p, shape).lagged(found.trial.lag_s));
+        match next.filter(|n| n.left_out < CURVE_CLEARLY * found.left_out) {
+            Some(next) => found = next,
+            None => break,
+        }
+    }
+    found
 }
 
 /// Linear parameters with other gains: what is read may be a part of the motion only.
@@ -197,7 +226,9 @@ pub(super) fn estimated<'a>(
 ) -> Option<Estimated<'a>> {
     progress("a curve without a name: the linear plant by simulation");
     let linear = with_lag(from_each(bench, ground, starts, &Shape::Linear)?);
-    let from = [linear.trial.p.clone()];
+    // What acts may have bent the refit: the given plant is another start.
+    let mut from = vec![linear.trial.p.clone()];
+    from.extend(starts.first().filter(|p| **p != from[0]).cloned());
     let (mut best, mut tried) = (None, Vec::new());
     let mut taken = |port: CurvePort, found: Option<Foretelling<'a>>| {
         tried.extend(found.as_ref().map(|f| (port, f.left_out)));
@@ -213,12 +244,8 @@ pub(super) fn estimated<'a>(
     let read = readings(bench, one_place, starts);
     taken(CurvePort::SensorOverPosition, sensor(bench, one_place, &from, &read));
     let mut curve = best?;
-    let Shape::Curve(port, at, _) = curve.trial.shape.clone() else { return None };
-    // What acts may have bent the refit: the given plant is another start.
-    if port != CurvePort::SensorOverPosition && starts[0] != from[0] {
-        let given = from_each(bench, ground, &starts[..1], &Shape::idle(port, at));
-        curve = better(Some(curve), given)?;
-    }
+    let Shape::Curve(port, ..) = curve.trial.shape else { return None };
+    curve = finer(bench, ground, curve);
     if curve.trial.lag_s.is_none() {
         curve = with_lag(curve);
     }

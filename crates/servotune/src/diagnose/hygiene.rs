@@ -4,7 +4,7 @@
 //! that is shifted by d samples makes this replay fail, and shifting it back makes it right again; a machine with more delay
 //! does not.
 
-use super::rules::{REPLAY_ERROR, STUCK_STEPS};
+use super::rules::{JUMP_STEPS, REPLAY_ERROR, STUCK_STEPS};
 use super::run::Run;
 use super::stack::Basis;
 use crate::controller::Law;
@@ -182,7 +182,7 @@ fn factors(law: &Law, with: &[(&Run, &[f64])]) -> (f64, f64, f64) {
 }
 
 /// Samples that the clock says are missing, and stretches where the position did not move although its noise says it must, or, where it lies on
-/// a coarse count, although the model (`expected`) moves over several steps of it.
+/// a coarse count, although the model (`expected`) moves over several steps of it; the log of an arm that moved on jumps where it goes on.
 pub fn sample_faults(run: &Run, gaps: &[ClockGap], sample_time_s: f64, expected: &[f64]) -> Vec<SampleFault> {
     let mut all: Vec<SampleFault> = gaps
         .iter()
@@ -215,7 +215,8 @@ pub fn sample_faults(run: &Run, gaps: &[ClockGap], sample_time_s: f64, expected:
     };
     let mut at = 0;
     for length in lengths {
-        if length >= longest && at > 0 && moves(at, at + length) {
+        let jumps = |end: usize| end == y.len() || (y[end] - y[at]).abs() > JUMP_STEPS * grid;
+        if length >= longest && at > 0 && moves(at, at + length) && jumps(at + length) {
             let time_s = at as f64 * sample_time_s;
             all.push(SampleFault { record: run.name.clone(), time_s, samples: length as f64, stuck: true });
         }

@@ -6,7 +6,7 @@ use super::linear::{Sampled, free_motions};
 use super::lines::Line;
 use super::lines::mains;
 use super::name::{HUM, RUNOUT, everywhere, text_of};
-use super::rules::{HUM_COHERENCE, HUM_FADES, HUM_SPREAD};
+use super::rules::{HUM_COHERENCE, HUM_FADES, HUM_PERIODS, HUM_SPREAD};
 use super::run::Run;
 use super::selection::Selection;
 use crate::lti::FrequencyResponse;
@@ -30,8 +30,8 @@ pub(super) fn left(bench: &Bench, selection: &Selection) -> Vec<(Run, Vec<f64>)>
     out
 }
 
-/// A line in every run: its cosine and sine over the whole, the first and the second half.
-struct Phasors([Vec<[f64; 2]>; 3]);
+/// A line in every run: its cosine and sine over the whole, the first and the second half; and its periods in the shortest run.
+struct Phasors([Vec<[f64; 2]>; 3], f64);
 
 impl Phasors {
     fn of(bench: &Bench, runs: &[(Run, Vec<f64>)], line: &Line) -> Phasors {
@@ -43,7 +43,8 @@ impl Phasors {
             });
             each.collect()
         };
-        Phasors([over([0, 2]), over([0, 1]), over([1, 2])])
+        let shortest = runs.iter().map(|(run, _)| run.len()).min().unwrap_or(0);
+        Phasors([over([0, 2]), over([0, 1]), over([1, 2])], line.hz * shortest as f64 * t)
     }
 
     fn amplitudes(&self) -> Vec<f64> {
@@ -52,13 +53,13 @@ impl Phasors {
 
     /// Whether it is a hum: as strong in every run, as strong in both halves of each, and in step over them. A narrow band of
     /// noise changes its strength from run to run as Rayleigh's law has it (relative spread 0.52) and loses its step; what rings
-    /// after a push dies away.
+    /// after a push dies away; what has few periods in a record is any slow change.
     fn steady(&self) -> bool {
         let amplitudes = self.amplitudes();
         let n = amplitudes.len() as f64;
         let mean = amplitudes.iter().sum::<f64>() / n;
         let spread = (amplitudes.iter().map(|a| (a - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt();
-        let [_, first, second] = &self.0;
+        let Phasors([_, first, second], periods) = self;
         let power = |x: &[[f64; 2]]| x.iter().map(|[a, b]| a * a + b * b).sum::<f64>();
         let (before, after) = (power(first), power(second));
         let (re, im) = first
@@ -66,7 +67,8 @@ impl Phasors {
             .zip(second)
             .fold((0.0, 0.0), |(re, im), ([a, b], [c, d])| (re + a * c + b * d, im + a * d - b * c));
         let ratio = after / before;
-        spread < HUM_SPREAD * mean
+        *periods >= HUM_PERIODS
+            && spread < HUM_SPREAD * mean
             && re.hypot(im) > HUM_COHERENCE * (before * after).sqrt()
             && (1.0 / HUM_FADES..HUM_FADES).contains(&ratio)
     }

@@ -5,6 +5,7 @@
 //! errors have variance 1 under noise alone. Spec: `specs/mismatch.md`.
 
 mod answers;
+mod balance;
 mod bench;
 mod bootstrap;
 mod bootstrap_chance;

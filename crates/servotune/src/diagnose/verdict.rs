@@ -11,9 +11,9 @@ use super::model::Model;
 use super::name::{finding, same_drag, unexplained};
 use super::reported::Reported;
 use super::rules::{
-    BOOTSTRAP_CHANCE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, COLOURED, DECISIVE_RIVAL, DECISIVE_SHARE, GIVEN_FAR,
-    HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER, LOOP_EXPLAINS, LOOP_LEFT, NAMED_SHARE,
-    NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE,
+    BELOW_NOISE, BOOTSTRAP_CHANCE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, COLOURED, DECISIVE_RIVAL, DECISIVE_SHARE,
+    GIVEN_FAR, HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER, LOOP_EXPLAINS, LOOP_LEFT,
+    NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE,
 };
 use super::selection::Selection;
 use super::swing::swing;
@@ -116,10 +116,15 @@ impl<'a> Evidence<'a> {
         let laws = model.chosen.len();
         let several =
             selection.leftover.is_some() && (laws > 2 || laws > 1 && !self.clean && explained < NAMED_SHARE_OF_SEVERAL);
-        let told = (explained >= NAMED_SHARE || self.clean || decisive) && !several && beside.is_none() && !mixture;
-        // In closed loop nothing drifts: what several times the noise is left of, is not explained.
-        let left = |h: FitFigures| h.rms_after > LOOP_LEFT * h.noise_floor && h.explained_share < LOOP_EXPLAINS;
-        let left = d.fit.simulation == Simulation::ClosedLoop && d.fit.holdout.is_some_and(left);
+        // Where all noise is the encoder's rounding, it is no draw of chance, and what fits it takes nothing of other records.
+        let below = selection.baseline.cost < BELOW_NOISE * selection.baseline.freedom;
+        let rounded = below && d.holdout_whitened.is_some_and(|[refit, after]| after >= refit);
+        let told = !rounded
+            && (explained >= NAMED_SHARE || self.clean || decisive)
+            && !several
+            && beside.is_none()
+            && !mixture;
+        let left = d.fit.holdout.is_some_and(|h| loop_left(d, h));
         told && !left && self.holds && self.against.is_none() && denied.is_none()
     }
 
@@ -216,6 +221,28 @@ pub(super) fn judge(
     }
     take_noise(d, bench, noise);
     beyond_the_fit(d, bench, selection);
+    far_from_noise(d, bench, selection);
+}
+
+/// Nothing is said to be explained while several times what repeats differ by stays in closed loop, where nothing drifts.
+fn far_from_noise(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
+    let says = matches!(d.verdict, Verdict::Named | Verdict::Family | Verdict::NoMismatch | Verdict::Refit);
+    let figures = d.fit.holdout.unwrap_or(d.fit.fit);
+    if !(says && bench.levels.from_repeats && loop_left(d, figures)) {
+        return;
+    }
+    let times = figures.rms_after / figures.noise_floor;
+    let names: Vec<&str> = d.findings.iter().map(|f| f.effect.as_str()).collect();
+    let beside = if names.is_empty() { String::new() } else { format!(" beside {}", names.join(", ")) };
+    d.remarks.push(format!("{times:.1} times the noise stay in the simulation{beside}: something else acts"));
+    d.verdict = Verdict::LocatedUnexplained;
+    d.findings = vec![unexplained(bench, selection, figures.explained_share.clamp(0.0, 1.0))];
+}
+
+/// Whether these figures, of records in closed loop, leave several times the noise and much of what the given plant leaves.
+fn loop_left(d: &Diagnosis, figures: FitFigures) -> bool {
+    let far = figures.rms_after > LOOP_LEFT * figures.noise_floor && figures.explained_share < LOOP_EXPLAINS;
+    d.fit.simulation == Simulation::ClosedLoop && far
 }
 
 /// Pushes and lines, which were found before the search.

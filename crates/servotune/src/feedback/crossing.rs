@@ -2,7 +2,7 @@
 
 use super::trace::{STRETCH, TURN};
 use super::{OpenLoop, Trace};
-use crate::numeric::golden::golden_section;
+use crate::numeric::brent::brent_minimum;
 use crate::numeric::root::bracketed_root;
 use nalgebra::Complex;
 use serde::Serialize;
@@ -47,10 +47,10 @@ pub(super) fn sign_changes(
             let s = b.signum();
             let (falls, rises) = (s * (f(from * (1.0 + NEXT)) - a) < 0.0, s * (b - f(to * (1.0 - NEXT))) > 0.0);
             if falls && rises {
-                let dip = golden_section(|x| s * f(x), from, to, 1e-12 * from);
-                if dip.value < 0.0 {
-                    found.push(root(from, a, dip.x, s * dip.value));
-                    found.push(root(dip.x, s * dip.value, to, b));
+                let (dip, value) = brent_minimum(|x| s * f(x), from, to, 1e-12 * from);
+                if value < 0.0 {
+                    found.push(root(from, a, dip, s * value));
+                    found.push(root(dip, s * value, to, b));
                 }
             }
         }

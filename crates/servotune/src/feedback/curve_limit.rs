@@ -3,7 +3,7 @@
 //! In: the limit, straight in ln f and dB between its points; plant and loop. Out: by how much it is missed at worst, and where.
 
 use super::{OpenLoop, gang_of_four};
-use crate::numeric::golden::golden_section;
+use crate::numeric::brent::brent_minimum;
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -138,8 +138,8 @@ impl CurveLimit {
             if value[i] < value[before] || value[i] < value[after] || value[i] < highest - 6.0 {
                 continue;
             }
-            let peak = golden_section(|x| -at(x), w[before], w[after], 1e-9 * w[i]);
-            let (x, db) = if -peak.value > value[i] { (peak.x, -peak.value) } else { (w[i], value[i]) };
+            let (place, below) = brent_minimum(|x| -at(x), w[before], w[after], 1e-9 * w[i]);
+            let (x, db) = if -below > value[i] { (place, -below) } else { (w[i], value[i]) };
             if db > worst.db {
                 worst = Excess { hz: x / TAU, db };
             }

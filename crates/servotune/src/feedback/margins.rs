@@ -2,7 +2,7 @@
 
 use super::crossing::{gain_crossings, phase_crossings};
 use super::{Crossing, OpenLoop, Trace, nyquist_count};
-use crate::numeric::golden::golden_section;
+use crate::numeric::brent::brent_minimum;
 use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -90,8 +90,8 @@ fn minimum(l: &impl OpenLoop, trace: &Trace, f: impl Fn(Complex<f64>) -> f64) ->
         // The trace turns by half a radian at most between points, so a dip hides less than a third of its depth.
         if dips && value[i] <= 1.5 * lowest {
             // A minimum is flat: its place is worth half the digits of its value.
-            let dip = golden_section(|x| f(l.at(x)), w[before], w[after], 1e-9 * w[i]);
-            let found = if dip.value < value[i] { (dip.x, dip.value) } else { (w[i], value[i]) };
+            let dip = brent_minimum(|x| f(l.at(x)), w[before], w[after], 1e-9 * w[i]);
+            let found = if dip.1 < value[i] { dip } else { (w[i], value[i]) };
             if found.1 < best.1 {
                 best = found;
             }

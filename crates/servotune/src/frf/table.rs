@@ -107,7 +107,9 @@ pub(crate) fn table(file: &str, text: &str) -> Result<Table, FrfError> {
         .map(|(i, line)| (i as u64 + 1, line.trim_end_matches('\r')))
         .filter(|(_, line)| !line.trim().is_empty() && !is_comment(line.trim_start()))
         .collect();
-    let no_rows = || FrfError::NoRows { file: file.to_owned(), lines: lines.len() as u64 };
+    // What the last line break is followed by is no line.
+    let read = lines.iter().rposition(|l| !l.is_empty()).map_or(0, |last| last as u64 + 1);
+    let no_rows = || FrfError::NoRows { file: file.to_owned(), lines: read };
     let voters = &content[content.len().saturating_sub(VOTERS)..];
     let votes = |layout: &Layout| {
         voters.iter().filter(|(_, l)| is_row(cut(l, *layout).iter().map(String::as_str), layout.comma)).count()

@@ -249,8 +249,8 @@ impl Gate {
                     Direction::Below => "below",
                     Direction::Equal => "at",
                 };
-                let value = d.value.map_or("missing".to_owned(), |v| format!("{v:.4e}"));
-                format!("{} = {value} ({side} the median {:.4e})", d.feature, d.training_median)
+                let value = d.value.map_or("missing".to_owned(), four_digits);
+                format!("{} = {value} ({side} the median {})", d.feature, four_digits(d.training_median))
             })
             .collect();
         why += &format!("; decided by {}; plant evidence: {}", features.join(", "), j.plant.says);
@@ -277,5 +277,15 @@ impl Gate {
             expected_cost: j.expected,
             imputed,
         }
+    }
+}
+
+/// Four digits, and a power of ten only where zeros would have to be counted.
+fn four_digits(v: f64) -> String {
+    let exponent = v.abs().log10().floor();
+    match exponent {
+        _ if v == 0.0 || !v.is_finite() => v.to_string(),
+        -4.0..6.0 => format!("{v:.*}", (3.0 - exponent).max(0.0) as usize),
+        _ => format!("{v:.3e}"),
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! In: plain slices. Out: plain numbers and small structs. Every method is deterministic.
 
+pub mod brent;
 pub mod dense;
 pub mod golden;
 pub mod least_squares;

@@ -163,6 +163,14 @@ impl Parametric for CoulombFriction {
         all
     }
 
+    /// With Stribeck's rise.
+    fn fuller(&self, scene: &Scene) -> Vec<CoulombFriction> {
+        let plain = self.stribeck.is_none() && matches!(self.turning, Turning::Length { .. });
+        let speeds = if plain { logarithmic(0.01, 0.16, 3) } else { Vec::new() };
+        let rising = |share: f64| Some(Stribeck { speed: share * scene.speed, rise: 0.2 });
+        speeds.into_iter().map(|share| CoulombFriction { stribeck: rising(share), ..self.clone() }).collect()
+    }
+
     fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
         let (Turning::Length { sliding_length: over } | Turning::Creep { speed: over }) = &mut self.turning;
         let (speed, rise) = self.stribeck.as_mut().map(|s| (&mut s.speed, &mut s.rise)).unzip();

@@ -68,6 +68,11 @@ impl Parametric for CurrentSaturation {
         vec![Parameter::new("limit", self.limit, Unit::Command)]
     }
 
+    /// Amplifiers round their corner off: a limit that is met softly is taken for one a little lower.
+    fn form_uncertainty(&self, _parameter: &str) -> f64 {
+        0.02
+    }
+
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(CurrentSaturation, Vec<f64>), PhysicsError> {
         Ok((CurrentSaturation { limit: given.positive("limit")? }, vec![1.0]))
     }

@@ -321,6 +321,11 @@ pub trait Parametric: Clone + PartialEq + std::fmt::Debug + Sized {
         Vec::new()
     }
 
+    /// Fuller forms of it to be tried once it stands as it is: with what a plain form leaves out.
+    fn fuller(&self, _scene: &Scene) -> Vec<Self> {
+        Vec::new()
+    }
+
     /// The law that does the same thing and is possible, where this one is not: a wave of twice its period carried by its second harmonic.
     fn equivalent(&self) -> Option<Self> {
         None

@@ -235,6 +235,11 @@ impl AnyLaw {
         each!(self, law => law.measured_in_last_fit())
     }
 
+    /// [`Parametric::fuller`].
+    pub fn fuller(&self, scene: &Scene) -> Vec<AnyLaw> {
+        each!(self, law => law.fuller(scene).into_iter().map(AnyLaw::from).collect())
+    }
+
     /// [`Parametric::equivalent`].
     pub fn equivalent(&self) -> Option<AnyLaw> {
         each!(self, law => law.equivalent().map(AnyLaw::from))

@@ -25,6 +25,9 @@ rules! {
     STUCK_STEPS: f64 = 3.0, "counts",
         "steps of the encoder that the model moves while the position stands still, from which the value is stuck",
         "judgement: two counts may be rounding";
+    JUMP_STEPS: f64 = 1.5, "counts",
+        "jump of the position behind such a stretch, in steps of the encoder, from which it was stuck",
+        "an arm that stands goes on by one count";
     UNIT_FACTOR: f64 = 0.02, "share",
         "deviation of a factor from 1 above which a position counts as logged in other units",
         "a factor is found to parts in a thousand; 2 % leave room for rounding";

@@ -62,7 +62,7 @@ rules! {
         "difference of the two sides that is reported",
         "judgement";
     CURVE_CLEARLY: f64 = 0.6, "share",
-        "squared error on parts left out over that of the best linear plant that a curve must stay below",
+        "squared error on parts left out over that of the best linear plant that a curve must stay below; over that of a curve, one of twice its knots",
         "judgement: a curve has seventeen numbers and no name";
     CURVE_NO_WORSE: f64 = 1.0, "ratio",
         "error on held-out records over that of the better linear model",

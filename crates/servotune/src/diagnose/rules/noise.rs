@@ -43,6 +43,9 @@ rules! {
     HUM_FADES: f64 = 3.0, "ratio",
         "power of one half over the other up to which a hum is steady",
         "judgement: a hum neither fades nor swells";
+    HUM_PERIODS: f64 = 6.0, "periods",
+        "periods in the shortest record from which a line hums",
+        "judgement: drag that changes with each start looks like a period or two";
     MAINS_MULTIPLES: f64 = 12.0, "multiples",
         "multiples of the mains that are taken for hum",
         "rectifiers give 6 and 12";

@@ -49,6 +49,9 @@ rules! {
     CLEAN: f64 = 3.0, "standard deviations",
         "excess below which a model is down to the noise",
         "a normal number passes it once in 740";
+    BELOW_NOISE: f64 = 0.7, "ratio",
+        "whitened squared error of the linear refit over its freedom, below which no law is named that takes nothing of held-out records",
+        "what stays so far below the noise is the encoder's rounding";
     RESTLESS_SIGMA: f64 = 6.0, "standard deviations",
         "excess from which something is there though no law was found",
         "noise may differ a little from what its repeats say";
