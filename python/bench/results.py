@@ -1,4 +1,5 @@
-"""Makes results/python.md: `python python/bench/results.py` with the package, python-control and the program at hand.
+"""Makes results/python.md: `python python/bench/results.py` with the package, python-control, the program and its example at hand
+(`cargo build --release --bin servotune --example margins_of_many -p servotune-cli -p servotune`).
 
 What is measured: the time of a call of `margins` from Python and of its parts, python-control on the same loops with its agreement, and 1000 slots through
 the program, the single call and the batch, to the last bit.
@@ -140,6 +141,10 @@ def same(machines: list[st.Plant], law: st.Controller, law_file: Path) -> list[s
 
         with ThreadPoolExecutor(2) as pool:
             said = list(pool.map(one, range(SLOTS)))
+        files = [Path(folder) / f"{i}.toml" for i in range(SLOTS)]
+        lines = subprocess.run([named.parent / "examples/margins_of_many", law_file, *files], capture_output=True, check=True).stdout
+        library = [json.loads(line) for line in lines.splitlines()]
+    library_equal = sum(found == document for found, document in zip(library, said))
     batch_equal = sum(json.loads(row) == document for row, document in zip(rows, said))
     single_equal = sum(json.loads(text) == document for text, document in zip(single, said))
     bytes_equal = sum(a == b for a, b in zip(rows, single))
@@ -149,6 +154,7 @@ def same(machines: list[st.Plant], law: st.Controller, law_file: Path) -> list[s
         "",
         "| way | slots equal in every key and bit |",
         "|---|---:|",
+        f"| the Rust library, called by `crates/servotune/examples/margins_of_many.rs` | {library_equal} of {SLOTS} |",
         f"| `margins` | {single_equal} of {SLOTS} |",
         f"| `batch.margins` ({SLOTS / spent:.0f} slots/s on {os.cpu_count()} cores) | {batch_equal} of {SLOTS} |",
         f"| `margins` and `batch.margins`, byte by byte | {bytes_equal} of {SLOTS} |",

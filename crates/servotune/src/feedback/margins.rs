@@ -53,9 +53,11 @@ pub fn margins(l: &impl OpenLoop) -> Margins {
     let closes = l.ends_at_half_rate() || l.at(l.end_rad_s()).norm() < 1.0;
     let stable = closes && count.unstable_closed_loop_poles == 0;
     let one = Complex::new(1.0, 0.0);
-    let (sensitivity_w, distance) = minimum(l, &trace, |v| (one + v).norm());
+    let (sensitivity_w, distance) = minimum(l, &trace, |v| (one + v).norm_sqr());
     // |(1 + L)/(1 - L)| is half the disk margin at one frequency; at L = 1 the disk is unbounded there.
-    let (disk_w, disk) = minimum(l, &trace, |v| 2.0 * (one + v).norm() / (one - v).norm().max(f64::MIN_POSITIVE));
+    let ratio = |v: Complex<f64>| (one + v).norm_sqr() / (one - v).norm_sqr().max(f64::MIN_POSITIVE);
+    let (disk_w, disk) = minimum(l, &trace, ratio);
+    let (distance, disk) = (distance.sqrt(), 2.0 * disk.sqrt());
     let smallest = |all: &[Crossing]| all.iter().copied().min_by(|a, b| a.value.abs().total_cmp(&b.value.abs()));
     let (worst_gain, worst_phase) = (smallest(&gain), smallest(&phase));
     let delay_margin_s =
@@ -78,7 +80,7 @@ pub fn margins(l: &impl OpenLoop) -> Margins {
     }
 }
 
-/// The smallest `f(L)` and where (rad/s): every dip of the trace near the lowest is refined.
+/// The smallest `f(L)`, a square, and where (rad/s): every dip of the trace near the lowest is refined.
 fn minimum(l: &impl OpenLoop, trace: &Trace, f: impl Fn(Complex<f64>) -> f64) -> (f64, f64) {
     let value: Vec<f64> = trace.value.iter().map(|&v| f(v)).collect();
     let w = &trace.w_rad_s;
@@ -88,7 +90,7 @@ fn minimum(l: &impl OpenLoop, trace: &Trace, f: impl Fn(Complex<f64>) -> f64) ->
         let (before, after) = (i.saturating_sub(1), (i + 1).min(value.len() - 1));
         let dips = value[i] <= value[before] && value[i] <= value[after];
         // The trace turns by half a radian at most between points, so a dip hides less than a third of its depth.
-        if dips && value[i] <= 1.5 * lowest {
+        if dips && value[i] <= 1.5 * 1.5 * lowest {
             // A minimum is flat: its place is worth half the digits of its value.
             let dip = brent_minimum(|x| f(l.at(x)), w[before], w[after], 1e-9 * w[i]);
             let found = if dip.1 < value[i] { dip } else { (w[i], value[i]) };

@@ -1,7 +1,7 @@
 //! What a loop must offer to be judged, and the loop of a model.
 
 use super::frequency_grid;
-use crate::lti::{DiscretePlant, FrequencyResponse, Sections};
+use crate::lti::{DiscretePlant, Sections};
 use nalgebra::Complex;
 use thiserror::Error;
 
@@ -109,7 +109,8 @@ pub fn angle_from_rest(turn: f64, value: Complex<f64>, integrators: usize) -> f6
 
 impl OpenLoop for ModelLoop<'_> {
     fn at(&self, w: f64) -> Complex<f64> {
-        self.plant.at(w) * self.sections.at(w)
+        let z = Complex::from_polar(1.0, w * self.sections.sample_time_s);
+        self.plant.at_z(z) * self.sections.at_delay(z.conj())
     }
 
     fn grid(&self) -> Vec<f64> {

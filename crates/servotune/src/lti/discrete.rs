@@ -241,8 +241,14 @@ impl DiscretePlant {
 impl FrequencyResponse for DiscretePlant {
     /// P(z) at z = e^{j w T}: position over command as the controller sees it.
     fn at(&self, w: f64) -> Complex<f64> {
+        self.at_z(Complex::from_polar(1.0, w * self.sample_time_s))
+    }
+}
+
+impl DiscretePlant {
+    /// P(z) on the unit circle.
+    pub(crate) fn at_z(&self, z: Complex<f64>) -> Complex<f64> {
         let t = self.sample_time_s;
-        let z = Complex::from_polar(1.0, w * t);
         let [mut now, mut before] = widest(Modes { plant: self, z });
         if self.rigid2 != 0.0 {
             let (h, d) = (t - self.rest_s, self.rest_s);
@@ -252,7 +258,7 @@ impl FrequencyResponse for DiscretePlant {
             now += drift * h + (0.5 * self.rigid2 * h * h + self.rigid1 * h) / step;
             before += drift * d + (self.rigid2 * d * (h + 0.5 * d) + self.rigid1 * d) / step;
         }
-        (now + before / z) * Complex::from_polar(1.0, -w * t * self.whole as f64)
+        (now + before / z) * z.conj().powu(self.whole as u32)
     }
 }
 
@@ -276,6 +282,9 @@ impl Wide for Modes<'_> {
         for from in (0..n).step_by(LANES) {
             let count = LANES.min(n - from);
             let of = |x: &[f64]| -> [f64; LANES] {
+                if let Some(whole) = x[from..].first_chunk() {
+                    return *whole;
+                }
                 let mut lanes = [0.0; LANES];
                 lanes[..count].copy_from_slice(&x[from..from + count]);
                 lanes

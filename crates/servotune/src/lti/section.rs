@@ -146,7 +146,13 @@ pub struct Sections {
 impl FrequencyResponse for Sections {
     /// The product of the sections at z = e^{j w T}.
     fn at(&self, w: f64) -> Complex<f64> {
-        let back = Complex::from_polar(1.0, -w * self.sample_time_s);
+        self.at_delay(Complex::from_polar(1.0, -w * self.sample_time_s))
+    }
+}
+
+impl Sections {
+    /// The chain at z⁻¹ = `back`.
+    pub(crate) fn at_delay(&self, back: Complex<f64>) -> Complex<f64> {
         self.chain.iter().map(|s| s.at_delay(back)).product()
     }
 }

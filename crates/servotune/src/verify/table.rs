@@ -114,8 +114,9 @@ pub(super) fn figures(s: &Summary, b: &Bounds, write: Option<&WriteFigures>) -> 
         }
     };
     let flag = |x: bool| f64::from(u8::from(x));
-    let stable = flag(b.stability == Stability::Stable);
-    check("stable", Some(flag(s.stable)), Bounded { low: Some(stable), high: Some(stable), hz: None });
+    // What is not decided contradicts nothing.
+    let [low, high] = [Stability::Stable, Stability::Unstable].map(|s| flag(b.stability == s));
+    check("stable", Some(flag(s.stable)), Bounded { low: Some(low), high: Some(1.0 - high), hz: None });
     check("phase_margin_deg", s.phase_margin_deg.map(f64::abs), b.phase_margin_deg);
     check("gain_crossover_hz", s.gain_crossover_hz, b.gain_crossover_hz);
     // Half the sample rate, where L is real, is a crossing of the proof and not of the table: from above it binds nothing.
