@@ -47,7 +47,7 @@ fn spoilt_numbers_are_named_by_line_and_column() {
     refuses!("missing_field.bod", E::MissingField { line: 9, column: 2, .. });
     refuses!("short_row.bod", E::FieldCount { line: 9, found: 2, expected: 3, .. });
     refuses!("long_row.bod", E::FieldCount { line: 9, found: 4, expected: 3, .. });
-    refuses!("thousands.csv", E::NoRows { lines: 3, .. } | E::NotANumber { .. });
+    refuses!("thousands.csv", E::NoRows { lines: 2, .. } | E::NotANumber { .. });
     refuses!("open_quote.csv", E::OpenQuote { line: 3, .. });
 }
 

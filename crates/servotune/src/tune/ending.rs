@@ -174,14 +174,21 @@ impl<'a> Ending<'a> {
             let conflicts: Vec<RelaxedLimit> = relaxed.into_iter().filter_map(|(_, limit)| limit).collect();
             let asked = std::mem::replace(&mut problem.wanted, wanted.clone());
             problem.aim_guarded(false);
-            let from = refine(problem, &best.x, self.steps, &mut problem.work());
-            let from = from.map_or_else(|| best.x.clone(), |p| p.x);
-            let end = self.settle(problem, &from, false)?;
+            let polished = refine(problem, &best.x, self.steps, &mut problem.work()).map(|p| p.x);
+            let mut end = None;
+            // A polish may leave what the compromise itself meets.
+            for from in polished.into_iter().chain([best.x.clone()]) {
+                let x = self.settle(problem, &from, false)?.x;
+                let found = judged(self.machines, &problem.parameters.controller(&x), self.spec)?;
+                if found.iter().all(|p| Judged::of(&wanted, p.judged.found.clone()).passes()) {
+                    end = Some((x, found));
+                    break;
+                }
+            }
             problem.wanted = asked;
-            let found = judged(self.machines, &problem.parameters.controller(&end.x), self.spec)?;
-            confirmed = found.iter().all(|p| Judged::of(&wanted, p.judged.found.clone()).passes());
-            if confirmed {
-                reached = Some((end.x, found, conflicts));
+            confirmed = end.is_some();
+            if let Some((x, found)) = end {
+                reached = Some((x, found, conflicts));
                 break;
             }
             // Unconfirmed, the compromise's own relaxation is still the best that can be said.
