@@ -1,17 +1,21 @@
 #!/usr/bin/env python3
 """results/house.md: what the house weighs, before and now, counted from the files of two revisions.
 
-python3 scripts/house.py [--before 947496e] [--out results/house.md]
+python3 scripts/house.py [--before 947496e] [--out results/house.md] [--time]
 
-Counts are of text, not of a compiler: rustfmt's layout is relied on.
+Counts are of text, not of a compiler: rustfmt's layout is relied on. `--time` also builds both revisions from nothing and runs the tests, on a
+machine with nothing else to do (half an hour); its seconds stay in results/house_times.json.
 """
 
 import argparse
 import io
+import json
+import os
 import re
 import subprocess
 import tarfile
 import tempfile
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -143,6 +147,33 @@ def figures(root: Path) -> list[tuple[str, str]]:
     ]
 
 
+def seconds(root: Path, target: Path, words: list[str]) -> float:
+    """Of a cargo command that succeeds."""
+    begun = time.monotonic()
+    subprocess.run(["cargo", *words, "--locked", "--quiet"], cwd=root, check=True, env={**os.environ, "CARGO_TARGET_DIR": str(target)})
+    return round(time.monotonic() - begun)
+
+
+def times(root: Path) -> dict[str, float]:
+    """Seconds of a revision's builds, each from nothing, sources already fetched."""
+    found = {}
+    for name, words in [("library", ["-p", "servotune"]), ("program", ["--bin", "servotune"])]:
+        if name == "program" or (root / "crates/servotune").is_dir():
+            with tempfile.TemporaryDirectory() as target:
+                found[name] = seconds(root, Path(target), ["build", "--release", *words])
+    return found
+
+
+def timed(kept: Path) -> list[tuple[str, str, str]]:
+    """Rows of the seconds that were measured last."""
+    if not kept.is_file():
+        return []
+    known = json.loads(kept.read_text())
+    said = lambda when, what: str(known[when].get(what, "-"))  # noqa: E731
+    names = [("library alone, release build from nothing, s", "library"), ("program, the same, s", "program"), ("README's test command, tests built, s", "tests")]
+    return [(f"{name} ({known['cores']} cores)", said("before", what), said("now", what)) for name, what in names]
+
+
 def rules(code: dict[str, str]) -> int:
     """Rows of the table of decision rules."""
     row = re.compile(r"^    [A-Z_]+: (?:f64|usize) = ", re.M)
@@ -160,13 +191,21 @@ def main() -> None:
     a = argparse.ArgumentParser(description=__doc__)
     a.add_argument("--before", default="947496e")
     a.add_argument("--out", type=Path, default=ROOT / "results/house.md")
+    a.add_argument("--time", action="store_true")
     w = a.parse_args()
+    kept = ROOT / "results/house_times.json"
     with tempfile.TemporaryDirectory() as folder:
         archive = subprocess.run(["git", "archive", w.before], cwd=ROOT, capture_output=True, check=True).stdout
         tarfile.open(fileobj=io.BytesIO(archive)).extractall(folder, filter="data")
         before = figures(Path(folder))
+        if w.time:
+            measured = {"cores": os.cpu_count(), "before": times(Path(folder)), "now": times(ROOT)}
+            seconds(ROOT, ROOT / "target", ["test", "--no-run"])
+            measured["now"]["tests"] = seconds(ROOT, ROOT / "target", ["test"])
+            kept.write_text(json.dumps(measured, indent=1) + "\n")
     now = figures(ROOT)
-    rows = "\n".join(f"| {name} | {old} | {new} |" for (name, old), (_, new) in zip(before, now, strict=True))
+    all_rows = [(name, old, new) for (name, old), (_, new) in zip(before, now, strict=True)] + timed(kept)
+    rows = "\n".join(f"| {name} | {old} | {new} |" for name, old, new in all_rows)
     w.out.write_text(
         "# The house\n\n"
         f"Made by `python3 scripts/house.py`: counted from the text of commit {w.before} and of the files as they stand. Studies, tests and Python are left out where the product is counted.\n\n"

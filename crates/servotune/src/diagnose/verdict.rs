@@ -13,7 +13,7 @@ use super::reported::Reported;
 use super::rules::{
     BELOW_NOISE, BOOTSTRAP_CHANCE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, COLOURED, DECISIVE_RIVAL, DECISIVE_SHARE,
     GIVEN_FAR, HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER, LOOP_EXPLAINS, LOOP_LEFT,
-    NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE,
+    NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE, WIND_LEFT,
 };
 use super::selection::Selection;
 use super::swing::swing;
@@ -301,7 +301,15 @@ fn coloured(d: &Diagnosis, bench: &Bench, noise: f64) -> bool {
 fn take_noise(d: &mut Diagnosis, bench: &Bench, noise: Vec<Finding>) {
     let rounding = bench.grid.map_or(0.0, |g| g.step / 12f64.sqrt());
     let beyond = coloured(d, bench, bench.levels.sensor_rms.hypot(rounding));
-    let open = beyond && noise.iter().all(|f| f.port != Port::Torque);
+    let wind = noise.iter().any(|f| f.port == Port::Torque);
+    let open = beyond && !wind;
+    // A plant that was fitted under wind differs from that of records under other wind: as little as that has no name of its own.
+    let h = d.fit.holdout.unwrap_or(d.fit.fit);
+    let blown = wind && !bench.coarse() && bench.levels.from_repeats && h.rms_refit_linear < WIND_LEFT * h.noise_floor;
+    if blown && d.verdict == Verdict::LocatedUnexplained {
+        d.verdict = Verdict::Refit;
+        d.findings.clear();
+    }
     for f in noise {
         if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit) && !open {
             d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
