@@ -169,9 +169,9 @@ def timed(kept: Path) -> list[tuple[str, str, str]]:
     if not kept.is_file():
         return []
     known = json.loads(kept.read_text())
-    said = lambda when, what: str(known[when].get(what, "-"))  # noqa: E731
     names = [("library alone, release build from nothing, s", "library"), ("program, the same, s", "program"), ("README's test command, tests built, s", "tests")]
-    return [(f"{name} ({known['cores']} cores)", said("before", what), said("now", what)) for name, what in names]
+    both = (known["before"], known["now"])
+    return [(f"{name} ({known['cores']} cores)", *(str(when.get(what, "-")) for when in both)) for name, what in names]
 
 
 def rules(code: dict[str, str]) -> int:

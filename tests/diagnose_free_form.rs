@@ -153,8 +153,8 @@ fn a_drag_that_peaks_is_recovered() {
     let found = curve(&Machine { torque: |_, v| peaking(v), ..SOUND });
     assert_eq!((found.port, found.argument), ("torque", "velocity"));
     let (inside, miss) = recovered(&found, peaking);
-    // The band of 31 knots holds 71 to 81 % of them over four seeds of the noise, not 90 %: neighbours err together, and what a drag held over
-    // a sample is off by is not in it. The miss is what is held; the share says that the band is of the miss's size.
+    // The band of 31 knots holds 71 to 81 % of them over four seeds of the noise, not 90 %, and why is not known. The miss is what is
+    // held; the share says that the band is of the miss's size.
     assert!(inside > 0.6 && miss < 0.05, "{inside} {miss}");
 }
 

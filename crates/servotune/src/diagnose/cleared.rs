@@ -10,7 +10,7 @@ use super::chosen::Chosen;
 use super::fitted::refit;
 use super::judge::size;
 use super::model::Model;
-use super::rules::{CLEARED_BETTER, CLEARED_FAR};
+use super::rules::{CLEARED_BETTER, CLEARED_FAR, CLEARED_FULLER};
 use super::run::{Run, mean_run};
 use super::simulation_problem::{Problem, descended};
 use crate::lti::{Body, Plant};
@@ -21,8 +21,6 @@ const SMOOTHINGS: [f64; 3] = [3.0, 8.0, 20.0];
 /// Laws that are tried by simulation, as they stand and fitted.
 const TRIED: usize = 16;
 const FITTED: usize = 3;
-/// Squared error that a fuller form of a law must stay below, over that of the plain one.
-const FULLER: f64 = 0.9;
 /// Speeds at which the arm surely slides, over what the sensor's noise makes of the smoothed speed at rest: where it may stick, a drag is
 /// whatever holds it, and its rows tell of no law. Both balances are tried.
 const SLIDES: [f64; 2] = [0.0, 6.0];
@@ -104,7 +102,7 @@ pub(super) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str
             let model = Model { chosen: vec![with_freedom(full, &own.scene)], ..model.clone() };
             let Some(fitted) = descended(ground, &model, None, &whole) else { continue };
             let after = plain(ground, &fitted);
-            if after < FULLER * best.as_ref().map_or(f64::MAX, |b| b.0) {
+            if after < CLEARED_FULLER * best.as_ref().map_or(f64::MAX, |b| b.0) {
                 best = Some((after, cleared(ground, &fitted)));
             }
         }

@@ -1,7 +1,7 @@
 //! The minimum of a smooth function of one number: parabolas through three places, halved by the golden section where they lead astray.
 //!
 //! In: a function and an interval with one valley. Out: the lowest place visited and its value (Brent, Algorithms for Minimization without
-//! Derivatives, 1973, chapter 5). On a smooth valley it takes a fifth of the evaluations of [`super::golden`].
+//! Derivatives, 1973, chapter 5). On a smooth valley it takes less than half of the evaluations of [`super::golden`].
 
 /// Evaluations at most; a valley that no parabola fits ends by golden sections well before.
 const MOST: usize = 100;

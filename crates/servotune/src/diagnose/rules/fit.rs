@@ -19,6 +19,9 @@ rules! {
     CLEARED_BETTER: f64 = 0.5, "ratio",
         "simulation error with the law over that of the best linear plant below which its plant is taken",
         "a bent plant leaves several times the noise; half cannot be one more number's luck";
+    CLEARED_FULLER: f64 = 0.9, "ratio",
+        "the same of a fuller form of the law over that of the plain one, below which it is taken",
+        "judgement: a rise at rest must pay for its two numbers";
     CLEARED_FAR: f64 = 3.0, "noise",
         "simulation error of the best linear plant over the sensor's noise from which a plant is cleared at all",
         "nearer to the noise the search starts well enough";
