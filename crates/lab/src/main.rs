@@ -31,7 +31,7 @@ struct StudyArguments {
     /// Changed files (study `reliability-readers`)
     #[arg(long, value_name = "N", default_value_t = 12_000)]
     runs: usize,
-    /// Cases to make again, all unless told; the others keep their lines (study `abroad`)
+    /// Cases to make again, all unless told: the others keep their lines (study `abroad`), or the diagnoses are written instead of the page (study `sealed`)
     #[arg(long, value_name = "ID,ID,...", value_delimiter = ',')]
     cases: Vec<String>,
     /// Seed of the set (studies `sealed` and `sealed-digests`)
@@ -146,6 +146,9 @@ fn run(a: &StudyArguments, say: &mut (dyn FnMut(&str) + Send)) -> Result<Vec<Pat
             Pages(study::abroad(&a.data, &a.cases, known.as_deref(), say)?)
         }
         StudyName::SealedDigests => Pages(study::digests(a.seed, a.count)),
+        StudyName::Sealed if !a.cases.is_empty() => {
+            Pages(study::sealed_cases(a.seed, a.count, &a.cases, say)?)
+        }
         StudyName::Sealed => {
             let known = std::fs::read_to_string(a.out.join("mismatch/sealed_digests.txt")).ok();
             Pages(study::sealed(a.seed, a.count, known.as_deref(), say)?)

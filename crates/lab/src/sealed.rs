@@ -11,7 +11,7 @@ use super::sealed_row::{Outcome, Row, outcome};
 use super::{Study, StudyError};
 use rayon::prelude::*;
 use servotune::controller::Controller;
-use servotune::diagnose::{DiagnoseSettings, diagnose};
+use servotune::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
 use servotune::document::sha256_hex;
 use servotune::lti::Plant;
 use servotune::recording::{Case, Role};
@@ -108,13 +108,21 @@ impl SealedCase {
 
     /// Diagnoses the case and holds it against the truth.
     pub fn row(&self) -> Result<Row, StudyError> {
+        Ok(self.diagnosed()?.0)
+    }
+
+    /// The same, with the diagnosis where there is one.
+    fn diagnosed(&self) -> Result<(Row, Option<Diagnosis>), StudyError> {
         let began = Instant::now();
         let (case, plant, controller) = &self.made;
         let d = match diagnose(case, plant, Some(controller), &DiagnoseSettings::default(), |_| {}) {
             Ok(d) => d.diagnosis,
-            Err(e) => return Ok(self.refused(&e.to_string(), began.elapsed().as_secs_f64())),
+            Err(e) => return Ok((self.refused(&e.to_string(), began.elapsed().as_secs_f64()), None)),
         };
-        let seconds = began.elapsed().as_secs_f64();
+        Ok((self.held_against(&d, began.elapsed().as_secs_f64())?, Some(d)))
+    }
+
+    fn held_against(&self, d: &Diagnosis, seconds: f64) -> Result<Row, StudyError> {
         let h = d.fit.holdout.unwrap_or(d.fit.fit);
         let mut held = [0, 0];
         for (effect, parameter, value) in &self.drawn.truth {
@@ -127,7 +135,7 @@ impl SealedCase {
         Ok(Row {
             verdict: serde_json::to_string(&d.verdict)?.trim_matches('"').into(),
             findings: d.findings.iter().map(|f| f.family.join(" or ")).collect::<Vec<_>>().join(", "),
-            outcome: outcome(&self.drawn.expected, self.acts(), &d),
+            outcome: outcome(&self.drawn.expected, self.acts(), d),
             // What is no number is written as a very large one: JSON has no infinity.
             holdout: [h.rms_before, h.rms_refit_linear, h.rms_after]
                 .map(|v| if v.is_finite() { v / h.noise_floor.max(f64::MIN_POSITIVE) } else { 1e300 }),
@@ -185,19 +193,43 @@ pub fn sealed(
         let lines: Vec<&str> = text.lines().skip(1).collect();
         cases.iter().filter(|c| lines.contains(&format!("{} {}", c.digest(), c.id).as_str())).count()
     });
-    let say = Mutex::new(say);
-    let rows: Vec<Row> = cases
-        .par_iter()
-        .map(|case| {
-            let row = case.row()?;
-            if let Ok(mut say) = say.lock() {
-                say(&serde_json::to_string(&row)?);
-            }
-            Ok(row)
-        })
-        .collect::<Result<_, StudyError>>()?;
+    let rows: Vec<Row> = rows(&cases, say)?.into_iter().map(|(row, _)| row).collect();
     let mut study = Study::default();
     study.page("mismatch/sealed.md", page(seed, &rows, published));
     study.page("mismatch/sealed.json", serde_json::to_string_pretty(&rows)? + "\n");
     Ok(study)
+}
+
+/// Some cases of a set, by their names or the beginnings of them: the diagnoses as files, the lines as they are known.
+pub fn sealed_cases(
+    seed: u64,
+    count: Option<usize>,
+    names: &[String],
+    say: &mut (dyn FnMut(&str) + Send),
+) -> Result<Study, StudyError> {
+    let mut cases = sealed_set(seed, count.unwrap_or(WHOLE), SAMPLES);
+    cases.retain(|c| names.iter().any(|n| c.id.starts_with(n.as_str())));
+    let mut study = Study::default();
+    for (case, (_, diagnosis)) in cases.iter().zip(rows(&cases, say)?) {
+        if let Some(d) = diagnosis {
+            study.page(&format!("mismatch/{}.json", case.id), serde_json::to_string_pretty(&d)? + "\n");
+        }
+    }
+    Ok(study)
+}
+
+/// Diagnoses of the cases, each line said as it is known.
+fn rows(
+    cases: &[SealedCase],
+    say: &mut (dyn FnMut(&str) + Send),
+) -> Result<Vec<(Row, Option<Diagnosis>)>, StudyError> {
+    let say = Mutex::new(say);
+    let one = |case: &SealedCase| {
+        let (row, diagnosis) = case.diagnosed()?;
+        if let Ok(mut say) = say.lock() {
+            say(&serde_json::to_string(&row)?);
+        }
+        Ok((row, diagnosis))
+    };
+    cases.par_iter().map(one).collect()
 }

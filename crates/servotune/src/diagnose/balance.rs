@@ -6,28 +6,30 @@ use super::bench::Bench;
 use super::chosen::Chosen;
 use super::columns::columns_along;
 use super::rules::CLEARED_TELLS;
-use super::run::Run;
+use super::run::{Run, mean_run};
 use crate::lti::{Body, Plant};
 use crate::numeric::least_squares::Qr;
 use crate::physics::{AnyLaw, Effect, Entry, Sample, Scene, Setting, library};
 use rayon::prelude::*;
 
+/// Standard deviations of the smoothing (samples): wide for slow machines, narrow for fast ones.
+pub(super) const SMOOTHINGS: [f64; 3] = [3.0, 8.0, 20.0];
 /// The later of the two commands whose shares make any delay between them (samples).
-const LATER: usize = 4;
+pub(super) const LATER: usize = 4;
 /// Smoothings between rows of the balance.
 const ROWS: f64 = 0.5;
 /// Least natural frequency of a body that is made (rad/s): plants go down to a tenth of it.
 pub(super) const SLOWEST_RAD_S: f64 = 1e-3;
 /// A record's mean run, smoothed: its motion and what stands on both sides of the balance.
-struct Smoothed {
-    samples: Vec<Sample>,
-    acceleration: Vec<f64>,
+pub(super) struct Smoothed {
+    pub samples: Vec<Sample>,
+    pub acceleration: Vec<f64>,
     /// Rows that are used.
-    rows: Vec<usize>,
+    pub rows: Vec<usize>,
 }
 
 /// Weights of a Gaussian, from its middle on.
-fn weights(width: f64) -> Vec<f64> {
+pub(super) fn weights(width: f64) -> Vec<f64> {
     let raw: Vec<f64> =
         (0..=(3.5 * width).ceil() as usize).map(|i| (-0.5 * (i as f64 / width).powi(2)).exp()).collect();
     let sum = raw[0] + 2.0 * raw[1..].iter().sum::<f64>();
@@ -35,7 +37,7 @@ fn weights(width: f64) -> Vec<f64> {
 }
 
 /// A series smoothed at one place; its ends go on as they are.
-fn smooth(x: &[f64], k: usize, weights: &[f64]) -> f64 {
+pub(super) fn smooth(x: &[f64], k: usize, weights: &[f64]) -> f64 {
     let at = |i: isize| x[i.clamp(0, x.len() as isize - 1) as usize];
     let both = |(j, w): (usize, &f64)| w * (at(k as isize + j as isize) + at(k as isize - j as isize));
     weights[0] * x[k] + weights.iter().enumerate().skip(1).map(both).sum::<f64>()
@@ -82,15 +84,20 @@ fn roughness(means: &[Run]) -> f64 {
     all.get(all.len() / 2).map_or(0.0, |m| m / (20f64.sqrt() * 0.6745))
 }
 
+/// The mean run of every segment as recorded: what was taken out around a bent plant (lines) is none of theirs.
+pub(super) fn recorded_means(bench: &Bench) -> Vec<Run> {
+    bench.stack.segments.iter().map(|s| mean_run(&bench.runs, &s.runs)).collect()
+}
+
 /// The balance of all mean runs at one smoothing.
 pub(super) struct Balance<'a> {
-    bench: &'a Bench,
+    pub bench: &'a Bench,
     /// Mean runs as recorded: what was taken out of them around a bent plant (lines) is none of theirs.
-    means: &'a [Run],
+    pub means: &'a [Run],
     /// The machine with the size of the motion as it is seen here.
-    scene: Scene,
-    width: f64,
-    parts: Vec<Smoothed>,
+    pub scene: Scene,
+    pub width: f64,
+    pub parts: Vec<Smoothed>,
 }
 
 /// What a balance comes to: the plant, the law's strengths, and the square of what is left.
@@ -122,7 +129,7 @@ impl<'a> Balance<'a> {
     }
 
     /// The balance with a law, or without.
-    fn solved(&self, law: Option<&AnyLaw>) -> Option<Balanced> {
+    pub fn solved(&self, law: Option<&AnyLaw>) -> Option<Balanced> {
         let scene = &self.scene;
         let weights = weights(self.width);
         let facts = law.map(|l| l.facts());
@@ -188,7 +195,7 @@ impl<'a> Balance<'a> {
     }
 
     /// The given plant with another body and delay; a spring or a damper that pushes is none.
-    fn plant(&self, gain: f64, delay_samples: f64, viscous: f64, stiffness: f64) -> Plant {
+    pub fn plant(&self, gain: f64, delay_samples: f64, viscous: f64, stiffness: f64) -> Plant {
         let given = &self.bench.form.given;
         let t = self.bench.scene.sample_time_s;
         let over = given.resonance_gain / self.bench.scene.arm_over_record();

@@ -1,23 +1,22 @@
-//! A plant cleared of what acted while it was fitted: body, delay and one law together, by the balance of torques.
+//! A plant cleared of what acted while it was fitted: body, delay and one law, or a curve without a name, together, by the balance of torques.
 //!
 //! In: records and the given plant, of which nothing but its modes is used: where it was fitted under dry friction or a dead band, gain and delay may be
 //! anything. Out: the plant from which the search sets out. What explains most is fitted by plain simulation and kept only where it
 //! simulates far better than the best linear plant. It names nothing: the search begins anew from the plant alone.
 
-use super::balance::{Balance, Balanced, SLOWEST_RAD_S, with_freedom};
+use super::balance::{Balance, Balanced, SLOWEST_RAD_S, SMOOTHINGS, recorded_means, with_freedom};
 use super::bench::Bench;
 use super::chosen::Chosen;
 use super::fitted::refit;
+use super::free_form_balance::{Curved, curves};
 use super::judge::size;
 use super::model::Model;
-use super::rules::{CLEARED_BETTER, CLEARED_FAR, CLEARED_FULLER};
-use super::run::{Run, mean_run};
+use super::rules::{CLEARED_BETTER, CLEARED_BY_CURVE, CLEARED_FAR, CLEARED_FULLER, CLEARED_TELLS};
+use super::run::Run;
 use super::simulation_problem::{Problem, descended};
 use crate::lti::{Body, Plant};
 use crate::physics::{AnyLaw, Setting};
 
-/// Standard deviations of the smoothing (samples): wide for slow machines, narrow for fast ones.
-const SMOOTHINGS: [f64; 3] = [3.0, 8.0, 20.0];
 /// Laws that are tried by simulation, as they stand and fitted.
 const TRIED: usize = 16;
 const FITTED: usize = 3;
@@ -25,18 +24,26 @@ const FITTED: usize = 3;
 /// whatever holds it, and its rows tell of no law. Both balances are tried.
 const SLIDES: [f64; 2] = [0.0, 6.0];
 
-/// A plant from which the search sets out, and the law that it was cleared of.
+/// Curves that are tried by simulation where no law clears the plant as well.
+const CURVES: usize = 2;
+
+/// A plant from which the search sets out, and what it was cleared of.
 pub(super) struct Cleared {
     pub plant: Plant,
+    /// The law, where it has a name.
     pub law: Option<Chosen>,
+    /// Whether it was a curve without one.
+    pub curve: bool,
 }
 
 /// The plant to set out from, where the given one conceals what acts; none where the given one, or a refit of it, does.
 pub(super) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str)) -> Option<Cleared> {
-    let means: Vec<Run> = bench.stack.segments.iter().map(|s| mean_run(&bench.runs, &s.runs)).collect();
+    let means = recorded_means(bench);
     let balances = SMOOTHINGS.iter().flat_map(|&w| SLIDES.map(|s| Balance::of(bench, &means, w, s)));
     let mut laws: Vec<(f64, Balanced)> = balances.flat_map(|b| b.laws()).collect();
-    let nothing_bends = laws.iter().all(|(_, b)| b.law.is_none());
+    let bent = curves(&SMOOTHINGS.map(|w| Balance::of(bench, &means, w, 0.0)));
+    let bent: Vec<Curved> = bent.into_iter().filter(|c| c.share < CLEARED_TELLS).collect();
+    let nothing_bends = bent.is_empty() && laws.iter().all(|(_, b)| b.law.is_none());
     let zero = vec![0.0; bench.form.knobs.len()];
     let near = bench.fit(vec![]).cost(&zero) < CLEARED_FAR * CLEARED_FAR * bench.stack.total as f64;
     if laws.is_empty() || nothing_bends && near {
@@ -90,6 +97,7 @@ pub(super) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str
     let cleared = |ground: &Bench, m: &Model| Cleared {
         plant: not_too_slow(ground.form.plant(&m.refitted.p)),
         law: m.chosen.first().cloned(),
+        curve: false,
     };
     if let Some((least, ground, model)) = settled.first() {
         best = Some((*least, cleared(ground, model)));
@@ -105,6 +113,22 @@ pub(super) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str
             if after < CLEARED_FULLER * best.as_ref().map_or(f64::MAX, |b| b.0) {
                 best = Some((after, cleared(ground, &fitted)));
             }
+        }
+    }
+    let most = best.as_ref().map_or(f64::INFINITY, |b| b.0);
+    for c in bent.into_iter().take(CURVES) {
+        let Some(setting) = c.shape.effect() else { continue };
+        let ground = around(&own, &c.plant);
+        let mut model = linear.clone();
+        model.chosen = vec![Chosen { setting, continuous: Vec::new(), range: Vec::new(), step: 0 }];
+        (model.refitted.p, model.refitted.plant) = (vec![0.0; ground.form.knobs.len()], c.plant);
+        if !plain(&ground, &model).is_finite() {
+            continue;
+        }
+        let fitted = descended(&ground, &model, None, &whole).unwrap_or(model);
+        let left = plain(&ground, &fitted);
+        if left < CLEARED_BY_CURVE * most && left < best.as_ref().map_or(f64::INFINITY, |b| b.0) {
+            best = Some((left, Cleared { law: None, curve: true, ..cleared(&ground, &fitted) }));
         }
     }
     best.filter(|(left, _)| *left < CLEARED_BETTER * CLEARED_BETTER * least).map(|(_, cleared)| cleared)

@@ -77,6 +77,9 @@ pub fn diagnose(
             Some(_) => {
                 "the search set out from a plant fitted together with a law: the given one conceals what acts".into()
             }
+            None if start.curve => {
+                "the search set out from a plant fitted together with a curve without a name: the given one conceals what acts".into()
+            }
             None => "the search set out from a plant fitted to the balance of torques: the given one is far off".into(),
         });
         bench = Bench::new(&start.plant, bench.runs, sample_time_s, case.spindle_hz)?;

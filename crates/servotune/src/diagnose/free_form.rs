@@ -5,6 +5,7 @@
 //! Spec: `specs/mismatch.md`, "Curves without a name".
 
 use super::bench::Bench;
+use super::free_form_balance::Curved;
 use super::free_form_gauge::{Plain, plain};
 use super::free_form_left_out::LeftOut;
 use super::free_form_shape::Shape;
@@ -67,7 +68,7 @@ fn foretold<'a>(mut trial: Trial<'a>) -> Option<Foretelling<'a>> {
     let judged = |trial: &mut Trial<'a>| {
         let (r, j) = trial.slopes();
         let sound = r.iter().chain(j.iter()).all(|v| v.is_finite());
-        sound.then(|| (LeftOut::new(trial.stretches, &r, &j, &trial.numbers(), &rough), r, j))
+        sound.then(|| (LeftOut::new(&trial.stretches.blocks, &r, &j, &trial.numbers(), &rough), r, j))
     };
     if at.is_some() {
         for _ in 0..CHOICES {
@@ -217,11 +218,12 @@ pub(super) fn grounds(bench: &Bench) -> [Stretches; 2] {
     [plain, one_place]
 }
 
-/// Estimates the curve at every port and takes the best.
+/// Estimates the curve at every port and takes the best; `curves` are those of the balance of torques.
 pub(super) fn estimated<'a>(
     bench: &'a Bench,
     [ground, one_place]: [&'a Stretches; 2],
     starts: &[Vec<f64>],
+    curves: &[Curved],
     progress: &mut dyn FnMut(&str),
 ) -> Option<Estimated<'a>> {
     progress("a curve without a name: the linear plant by simulation");
@@ -237,8 +239,14 @@ pub(super) fn estimated<'a>(
     for port in CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition) {
         let [name, argument] = port.names();
         progress(&format!("a curve without a name: {name} over {argument}"));
-        let Some(at) = Shape::knots(bench, port) else { continue };
-        taken(port, from_each(bench, ground, &from, &Shape::idle(port, at)));
+        let idle = Shape::knots(bench, port).and_then(|at| from_each(bench, ground, &from, &Shape::idle(port, at)));
+        // The balance of torques knows nothing of the given plant, which what acts may have bent.
+        let balanced = curves.iter().find(|c| c.shape.port() == Some(port));
+        let balanced = balanced.and_then(|c| {
+            let p = c.numbers(&bench.form)?;
+            foretold(Trial::new(bench, ground, &p, c.shape.clone()))
+        });
+        taken(port, better(idle, balanced));
     }
     progress("a curve without a name: sensor over position");
     let read = readings(bench, one_place, starts);

@@ -1,7 +1,7 @@
 //! What of a curve the linear plant can hold, given to the linear plant: the rest is the curve's own.
 //!
 //! In: a curve, the covariance of its values, the linear parameters. Out: the same in its plain form. A torque keeps no mean, and no line
-//! where the plant has a spring or a damper for it (the line of least squares over the samples); a gain has the mean 1; an amplifier gives 0
+//! where the plant has a spring or a damper for it (the line of least squares over the samples); a loading curve begins at 0; a gain has the mean 1; an amplifier gives 0
 //! for 0 and rises by 1 on the mean; a sensor rises or falls by 1 on the mean.
 
 use super::bench::Bench;
@@ -29,10 +29,10 @@ const LEAST: f64 = 1e-3;
 /// Least stiffness over the given one, and least damping over its unit, that a curve's line may leave.
 const LEFT: f64 = 0.02;
 
-/// How many samples lie near each knot; even for a sensor, behind whose curve nobody saw the arm.
+/// How many samples lie near each knot; even for a sensor, behind whose curve nobody saw the arm, and for a loading curve, whose ways nest.
 fn weights(bench: &Bench, port: CurvePort, at: &[f64]) -> Vec<f64> {
     let mut count = vec![0.0; at.len()];
-    if port == CurvePort::SensorOverPosition {
+    if matches!(port, CurvePort::SensorOverPosition | CurvePort::TorqueOverLoading) {
         count.fill(1.0);
     } else {
         let arm = if port == CurvePort::AmplifierOverCommand { 1.0 } else { bench.scene.arm_over_record() };
@@ -107,7 +107,16 @@ pub(super) fn plain(
             map = (DMatrix::identity(n, n) - &ones * mean.transpose()) * map;
             &map * &theta
         }
-        CurvePort::GainOverPosition => {
+        CurvePort::TorqueOverTime => {
+            map = &map - &ones * mean.transpose();
+            &map * &theta
+        }
+        CurvePort::TorqueOverLoading => {
+            map.column_mut(0).fill(0.0);
+            map.column_mut(0).iter_mut().skip(1).for_each(|v| *v = -1.0);
+            &map * &theta
+        }
+        CurvePort::GainOverPosition | CurvePort::GainOverTime => {
             let level = mean.dot(&theta);
             scaled(&mut out, gain, level);
             let plain = &theta / level;

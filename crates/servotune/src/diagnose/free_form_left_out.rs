@@ -4,7 +4,6 @@
 //! the numbers. Near its end a fit is straight in its numbers: what it would be without a part follows from the normal equations of the
 //! others, without a simulation more (Wahba 1990, Spline Models for Observational Data, ch. 4, for the choice of the smoothness).
 
-use super::free_form_stretches::Stretches;
 use nalgebra::{DMatrix, DVector};
 
 /// Normal equations of one block.
@@ -34,11 +33,17 @@ const TO_A_DECADE: i32 = 2;
 const ORDER: usize = 12;
 
 impl LeftOut {
-    /// Of a fit at `x`; `rough` belongs to the last numbers.
-    pub fn new(stretches: &Stretches, r: &[f64], j: &DMatrix<f64>, x: &[f64], rough: &DMatrix<f64>) -> LeftOut {
+    /// Of a fit at `x` whose rows stand in blocks, each with its length and the part that it belongs to; `rough` belongs to the last numbers.
+    pub fn new(
+        of: &[(usize, usize)],
+        r: &[f64],
+        j: &DMatrix<f64>,
+        x: &[f64],
+        rough: &DMatrix<f64>,
+    ) -> LeftOut {
         let (m, mut from) = (x.len(), 0);
         let mut blocks = Vec::new();
-        for &(len, part) in &stretches.blocks {
+        for &(len, part) in of {
             let own = j.rows(from, len);
             let left = DVector::from_column_slice(&r[from..from + len]);
             blocks.push(Block { part, gram: own.tr_mul(&own), right: own.tr_mul(&left), square: left.norm_squared() });
@@ -47,7 +52,8 @@ impl LeftOut {
         let mut all = DMatrix::zeros(m, m);
         let at = m - rough.ncols();
         all.view_mut((at, at), (rough.ncols(), rough.ncols())).copy_from(&rough.tr_mul(rough));
-        LeftOut { blocks, parts: stretches.parts(), rough: all, x: DVector::from_column_slice(x) }
+        let parts = of.iter().map(|b| b.1 + 1).max().unwrap_or(0);
+        LeftOut { blocks, parts, rough: all, x: DVector::from_column_slice(x) }
     }
 
     /// The normal matrix of all blocks but those of one part, and the right-hand side.
@@ -67,6 +73,14 @@ impl LeftOut {
             own.map(|b| b.square - 2.0 * step.dot(&b.right) + step.dot(&(&b.gram * &step))).sum::<f64>()
         };
         (0..self.parts).map(one).sum()
+    }
+
+    /// Where a fit that is straight in its numbers ends.
+    pub fn solution(&self, smoothness: f64) -> Option<Vec<f64>> {
+        let (gram, right) = self.without(None);
+        let rough = &self.rough * smoothness;
+        let step = solved(&(gram + &rough), &(right + &rough * &self.x))?;
+        Some((&self.x - step).iter().copied().collect())
     }
 
     /// The weight of the roughness under which the parts left out are foretold best.

@@ -8,7 +8,7 @@ use super::rules::{CURVE_LIKE, CURVE_LOPSIDED};
 use crate::numeric::least_squares::Qr;
 use crate::physics::{
     CurvePort, Facts, aerodynamic_drag, cable_spring, coulomb_friction, current_saturation, dead_band,
-    encoder_scale_error, nonlinear_spring, sensor_curve, torque_factor_rolloff, torque_ripple, unexplained,
+    encoder_scale_error, gain_drift, nonlinear_spring, pivot_friction, sensor_curve, shock, torque_factor_rolloff, torque_ripple, unexplained,
 };
 
 /// The nearest law of the library.
@@ -79,6 +79,26 @@ fn forms(c: &Plain) -> Vec<Form> {
                 -(x - centre).powi(4)
             }));
         }
+        CurvePort::TorqueOverLoading => {
+            for s in KINKS {
+                let length = 2.0 * s * half;
+                let first = |d: f64| -((low - d) / length).exp_m1();
+                all.push(over(&pivot_friction::FACTS, "a bearing that sticks", &first));
+            }
+        }
+        CurvePort::TorqueOverTime => {
+            let strongest = (0..c.at.len()).max_by(|a, b| c.value[*a].abs().total_cmp(&c.value[*b].abs())).unwrap_or(0);
+            for s in KINKS {
+                let push = |t: f64| (-((t - c.at[strongest]) / (s * half)).powi(2)).exp();
+                all.push(over(&shock::FACTS, "a push at one time of every record", &push));
+            }
+        }
+        CurvePort::GainOverTime => {
+            for s in KINKS {
+                let warmed = |t: f64| -((low - t) / (2.0 * s * half)).exp_m1();
+                all.push(over(&gain_drift::FACTS, "a gain that drifts as the machine warms up", &warmed));
+            }
+        }
         CurvePort::SensorOverPosition => {
             for s in KINKS.into_iter().chain([0.0]) {
                 for edge in [centre + s * half, centre - s * half] {
@@ -125,6 +145,8 @@ fn sides(port: CurvePort) -> [&'static str; 2] {
     match port {
         CurvePort::TorqueOverVelocity => ["going up", "going down"],
         CurvePort::AmplifierOverCommand => ["for positive commands", "for negative commands"],
+        CurvePort::TorqueOverLoading => ["on long ways", "on short ways"],
+        CurvePort::GainOverTime | CurvePort::TorqueOverTime => ["late", "early"],
         _ => ["above the middle", "below the middle"],
     }
 }

@@ -58,13 +58,24 @@ impl Shape {
         }
     }
 
+    /// The port of a curve.
+    pub fn port(&self) -> Option<CurvePort> {
+        match self {
+            Shape::Curve(port, ..) => Some(*port),
+            _ => None,
+        }
+    }
+
     /// Whether it stands between the arm and what is recorded.
     pub fn reads(&self) -> bool {
         matches!(self, Shape::Fold(_) | Shape::Limits(_) | Shape::Curve(CurvePort::SensorOverPosition, ..))
     }
 
-    /// Knots of a curve at a port over the range of the records; none where nothing moves there.
+    /// Knots of a curve at a port over the range of the records; none where nothing moves there, or few knots tell nothing.
     pub fn knots(bench: &Bench, port: CurvePort) -> Option<Vec<f64>> {
+        if port == CurvePort::TorqueOverTime {
+            return None;
+        }
         let arm = match port {
             CurvePort::AmplifierOverCommand | CurvePort::SensorOverPosition => 1.0,
             _ => bench.scene.arm_over_record(),
@@ -75,18 +86,27 @@ impl Shape {
         all.sort_by(f64::total_cmp);
         let off = (BEYOND * all.len() as f64) as usize;
         let [low, high] = [*all.get(off)?, *all.get(all.len().checked_sub(off + 1)?)?];
+        let [low, high] = if port == CurvePort::TorqueOverLoading { [0.0, high - low] } else { [low, high] };
         Some(Shape::spread(port, low, high)).filter(|_| low < high)
     }
 
-    /// Knots from `low` to `high`. Dense around 0 where laws turn there: over velocity and command.
+    /// Knots from `low` to `high`. Dense around 0 where laws turn there: over velocity and command, and on a loading curve.
     pub fn spread(port: CurvePort, low: f64, high: f64) -> Vec<f64> {
-        let share = |k: usize| k as f64 / (KNOTS - 1) as f64;
+        Shape::spread_of(port, low, high, KNOTS)
+    }
+
+    /// The same with a number of knots.
+    pub fn spread_of(port: CurvePort, low: f64, high: f64, knots: usize) -> Vec<f64> {
+        let share = |k: usize| k as f64 / (knots - 1) as f64;
+        if port == CurvePort::TorqueOverLoading {
+            return (0..knots).map(|k| low + share(k).powi(3) * (high - low)).collect();
+        }
         let around = matches!(port, CurvePort::TorqueOverVelocity | CurvePort::AmplifierOverCommand);
         if around && low < 0.0 && high > 0.0 && low > -8.0 * high && high < -8.0 * low {
             let s = |k: usize| 2.0 * share(k) - 1.0;
-            return (0..KNOTS).map(|k| s(k).abs().powf(1.6) * if s(k) < 0.0 { low } else { high }).collect();
+            return (0..knots).map(|k| s(k).abs().powf(1.6) * if s(k) < 0.0 { low } else { high }).collect();
         }
-        (0..KNOTS).map(|k| low + share(k) * (high - low)).collect()
+        (0..knots).map(|k| low + share(k) * (high - low)).collect()
     }
 
     /// The curve that changes nothing.

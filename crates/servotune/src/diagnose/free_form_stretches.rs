@@ -76,11 +76,6 @@ impl Stretches {
     pub fn total(&self) -> usize {
         self.runs.iter().map(Run::len).sum()
     }
-
-    /// Parts that are left out in turn.
-    pub fn parts(&self) -> usize {
-        self.blocks.iter().map(|b| b.1 + 1).max().unwrap_or(0)
-    }
 }
 
 /// Evenly spread pieces of long records.

@@ -75,6 +75,7 @@ fn knobs(bench: &Bench, shape: &Shape) -> Vec<usize> {
     let held = match shape {
         Shape::Curve(CurvePort::TorqueOverPosition, ..) => Some(Knob::Stiffness),
         Shape::Curve(CurvePort::TorqueOverVelocity, ..) => Some(Knob::Viscous),
+        Shape::Curve(CurvePort::TorqueOverLoading | CurvePort::TorqueOverTime, ..) => None,
         Shape::Curve(..) => Some(Knob::Gain),
         _ => None,
     };
@@ -287,7 +288,7 @@ impl<'a> Trial<'a> {
         }
         SHAPE_STEP
             * match &self.shape {
-                Shape::Curve(CurvePort::GainOverPosition, ..) => 1.0,
+                Shape::Curve(CurvePort::GainOverPosition | CurvePort::GainOverTime, ..) => 1.0,
                 _ if self.shape.reads() => s.travel,
                 _ => s.command,
             }

@@ -83,6 +83,22 @@ impl LinearForm {
         LinearForm { given: given.clone(), knobs, sample_time_s }
     }
 
+    /// The parameters of a plant that differs from the given one in body and delay; none where its gain is of the other sign.
+    pub fn numbers_of(&self, plant: &Plant) -> Option<Vec<f64>> {
+        let (b0, k0, c0) = body_numbers(&self.given.body);
+        let (b, k, c) = body_numbers(&plant.body);
+        let ratio = b * plant.resonance_gain / (b0 * self.given.resonance_gain);
+        let number = |knob: &Knob| match knob {
+            Knob::Gain => ratio.ln(),
+            Knob::Stiffness => k / k0 - 1.0,
+            Knob::Viscous => (c - c0) / rate_of(&self.given.body),
+            Knob::Delay => (plant.delay_s - self.given.delay_s) / self.sample_time_s,
+            _ => 0.0,
+        };
+        let all: Vec<f64> = self.knobs.iter().map(number).collect();
+        (ratio > 0.0 && all.iter().all(|v| v.is_finite())).then_some(all)
+    }
+
     /// The plant that carries a simulation at these parameters.
     pub fn carrier(&self, p: &[f64]) -> Carrier {
         let mut held = p.to_vec();

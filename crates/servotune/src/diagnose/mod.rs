@@ -32,6 +32,7 @@ mod fit;
 mod fit_report;
 mod fitted;
 mod free_form;
+mod free_form_balance;
 mod free_form_gauge;
 mod free_form_left_out;
 mod free_form_likeness;

@@ -4,11 +4,13 @@
 //! In: a diagnosis that ended without a name. Out: the corrected model with the curve, its errors, and what diagnosis.json says of it;
 //! a reading that folds or ends at limits has a name and is found here too.
 
+use super::balance::{Balance, SMOOTHINGS, recorded_means};
 use super::bench::Bench;
 use super::corrected::Corrected;
 use super::diagnosis_json::Diagnosis;
 use super::finding::{Estimate, Finding, Verdict};
 use super::free_form::{Estimated, Foretelling, estimated, grounds};
+use super::free_form_balance::{Curved, curves};
 use super::free_form_gauge::Plain;
 use super::free_form_likeness::likeness;
 use super::free_form_said::FreeForm;
@@ -55,7 +57,7 @@ pub(super) fn stand_in(
     progress: &mut dyn FnMut(&str),
 ) -> Option<StandIn> {
     let [ground, one_place] = grounds(bench);
-    let found = estimated(bench, [&ground, &one_place], &starts(bench, selection), progress)?;
+    let found = estimated(bench, [&ground, &one_place], &starts(bench, selection), &balanced(bench), progress)?;
     let best = taken(&found)?;
     let model = model(bench, best, &found.plain);
     let errors = [standing.closed, None].map(|closed| shown(bench, &model, best, &one_place, closed));
@@ -163,7 +165,9 @@ fn model(bench: &Bench, best: &Foretelling, c: &Plain) -> Corrected {
 pub fn curve_title(port: &str, argument: &str) -> String {
     match (port, argument) {
         ("amplifier", _) => "what the amplifier makes of the command".into(),
-        ("gain", _) => "the torque per command over the position".into(),
+        ("gain", argument) => format!("the torque per command over the {argument}"),
+        (_, "time") => "a torque over the time of every record".into(),
+        (_, "loading") => "a torque that resists over the way since the last turn".into(),
         ("sensor", _) => "what the sensor reads of the position".into(),
         (_, argument) => format!("a torque over the {argument}"),
     }
@@ -248,7 +252,8 @@ pub struct MissingCurve {
 /// The curve at the port where it foretells best, whatever the verdict; none where it foretells no better than a linear plant.
 pub fn missing_curve(bench: &Bench, selection: &Selection) -> Option<MissingCurve> {
     let [ground, one_place] = grounds(bench);
-    let found = estimated(bench, [&ground, &one_place], &starts(bench, selection), &mut |_| {})?;
+    let found =
+        estimated(bench, [&ground, &one_place], &starts(bench, selection), &balanced(bench), &mut |_| {})?;
     let best = taken(&found).filter(|b| matches!(b.trial.shape, Shape::Curve(..)))?;
     let errors = shown(bench, &model(bench, best, &found.plain), best, &one_place, None);
     let share = 1.0 - best.left_out / found.linear.left_out;
@@ -264,4 +269,10 @@ fn starts(bench: &Bench, selection: &Selection) -> Vec<Vec<f64>> {
         }
     }
     starts
+}
+
+/// Plants and curves by the balance of torques.
+fn balanced(bench: &Bench) -> Vec<Curved> {
+    let means = recorded_means(bench);
+    curves(&SMOOTHINGS.map(|width| Balance::of(bench, &means, width, 0.0)))
 }

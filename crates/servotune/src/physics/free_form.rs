@@ -1,7 +1,10 @@
 //! A curve without a name: what no law of the library holds, as it was estimated at one port of the machine.
 //!
 //! A natural cubic spline through knots, straight beyond the first and the last with the slope that it has there; at the amplifier a
-//! first-order lag may follow it. One curve for each port, all under the name `free_form`; the search of the library leaves them out (`specs/mismatch.md`, "Curves without a name").
+//! first-order lag may follow it. Over the way since the last turn it is a loading curve, linear between knots and level behind the last: a
+//! row of springs that slide, one at each knot (Iwan 1966; generalised Maxwell slip, Al-Bender, Lampaert, Swevers 2005), whose loops follow
+//! Masing's rule. One curve for each port, all under the name `free_form`; the search of the library leaves them out (`specs/mismatch.md`,
+//! "Curves without a name").
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::Parameter;
@@ -17,10 +20,16 @@ pub enum CurvePort {
     TorqueOverPosition,
     /// Torque added (command_unit) over the arm's velocity.
     TorqueOverVelocity,
+    /// Torque that resists (command_unit) over the way of the arm since it first moved: the loading curve of a hysteresis.
+    TorqueOverLoading,
+    /// Torque added (command_unit) over the time since the start of each record (s): what comes with every record at its own time.
+    TorqueOverTime,
     /// What acts (command_unit) over the command.
     AmplifierOverCommand,
     /// Torque per command over the arm's position.
     GainOverPosition,
+    /// Torque per command over the time of the session (s).
+    GainOverTime,
     /// What is read (position_unit) over the position.
     SensorOverPosition,
 }
@@ -58,15 +67,25 @@ static TORQUE_OVER_POSITION: Facts = made(Port::Torque, Entry::Torque, "tau = u 
 static TORQUE_OVER_VELOCITY: Facts = made(Port::Torque, Entry::Torque, "tau = u + f(x'), f a natural cubic spline");
 static AMPLIFIER_OVER_COMMAND: Facts = made(Port::Amplifier, Entry::Command, "i = f(u), f a natural cubic spline");
 static GAIN_OVER_POSITION: Facts = made(Port::Torque, Entry::Torque, "tau = f(x) u, f a natural cubic spline");
+static GAIN_OVER_TIME: Facts = made(Port::Torque, Entry::Torque, "tau = f(t) u, f a natural cubic spline");
+static TORQUE_OVER_TIME: Facts = made(Port::Torque, Entry::Torque, "tau = u + f(t), f a natural cubic spline, t from the start of a record");
+static TORQUE_OVER_LOADING: Facts = made(
+    Port::Torque,
+    Entry::Torque,
+    "tau = u - sum k_j z_j, z_j = clip(z_j + dx, -d_j, d_j): a row of springs that slide, first loading f(d) linear between knots",
+);
 static SENSOR_OVER_POSITION: Facts = made(Port::Sensor, Entry::Position, "m = f(x), f a natural cubic spline");
 
 impl CurvePort {
     /// All of them.
-    pub const ALL: [CurvePort; 5] = [
+    pub const ALL: [CurvePort; 8] = [
         CurvePort::TorqueOverPosition,
         CurvePort::TorqueOverVelocity,
+        CurvePort::TorqueOverLoading,
+        CurvePort::TorqueOverTime,
         CurvePort::AmplifierOverCommand,
         CurvePort::GainOverPosition,
+        CurvePort::GainOverTime,
         CurvePort::SensorOverPosition,
     ];
 
@@ -75,8 +94,11 @@ impl CurvePort {
         match self {
             CurvePort::TorqueOverPosition => &TORQUE_OVER_POSITION,
             CurvePort::TorqueOverVelocity => &TORQUE_OVER_VELOCITY,
+            CurvePort::TorqueOverLoading => &TORQUE_OVER_LOADING,
+            CurvePort::TorqueOverTime => &TORQUE_OVER_TIME,
             CurvePort::AmplifierOverCommand => &AMPLIFIER_OVER_COMMAND,
             CurvePort::GainOverPosition => &GAIN_OVER_POSITION,
+            CurvePort::GainOverTime => &GAIN_OVER_TIME,
             CurvePort::SensorOverPosition => &SENSOR_OVER_POSITION,
         }
     }
@@ -86,8 +108,11 @@ impl CurvePort {
         match self {
             CurvePort::TorqueOverPosition => ["torque", "position"],
             CurvePort::TorqueOverVelocity => ["torque", "velocity"],
+            CurvePort::TorqueOverLoading => ["torque", "loading"],
+            CurvePort::TorqueOverTime => ["torque", "time"],
             CurvePort::AmplifierOverCommand => ["amplifier", "command"],
             CurvePort::GainOverPosition => ["gain", "position"],
+            CurvePort::GainOverTime => ["gain", "time"],
             CurvePort::SensorOverPosition => ["sensor", "position"],
         }
     }
@@ -96,10 +121,12 @@ impl CurvePort {
     pub fn units(self, position: &str, command: &str) -> [String; 2] {
         let speed = format!("{position}/s");
         match self {
-            CurvePort::TorqueOverPosition => [position.into(), command.into()],
+            CurvePort::TorqueOverPosition | CurvePort::TorqueOverLoading => [position.into(), command.into()],
             CurvePort::TorqueOverVelocity => [speed, command.into()],
             CurvePort::AmplifierOverCommand => [command.into(), command.into()],
             CurvePort::GainOverPosition => [position.into(), "1".into()],
+            CurvePort::GainOverTime => ["s".into(), "1".into()],
+            CurvePort::TorqueOverTime => ["s".into(), command.into()],
             CurvePort::SensorOverPosition => [position.into(), position.into()],
         }
     }
@@ -107,17 +134,22 @@ impl CurvePort {
     /// The value that changes nothing.
     pub fn idle(self, at: f64) -> f64 {
         match self {
-            CurvePort::TorqueOverPosition | CurvePort::TorqueOverVelocity => 0.0,
-            CurvePort::GainOverPosition => 1.0,
+            CurvePort::TorqueOverPosition
+            | CurvePort::TorqueOverVelocity
+            | CurvePort::TorqueOverLoading
+            | CurvePort::TorqueOverTime => 0.0,
+            CurvePort::GainOverPosition | CurvePort::GainOverTime => 1.0,
             CurvePort::AmplifierOverCommand | CurvePort::SensorOverPosition => at,
         }
     }
 
-    /// What the curve goes over, at a sample.
+    /// What the curve goes over, at a sample; of a loading curve the position, from whose turns on it counts.
     pub fn argument(self, s: &Sample) -> f64 {
         match self {
             CurvePort::TorqueOverVelocity => s.v,
             CurvePort::AmplifierOverCommand => s.u,
+            CurvePort::GainOverTime => s.session,
+            CurvePort::TorqueOverTime => s.t,
             _ => s.x,
         }
     }
@@ -186,6 +218,60 @@ pub(super) fn restored(entry: &PhysicsEntry) -> Result<FreeForm, PhysicsError> {
     Ok(FreeForm { port, at, value, lag_s })
 }
 
+/// A row of springs that slide, one at each knot of a loading curve behind the first.
+pub(crate) struct Sliders {
+    /// Way at which each slides (position_unit).
+    yields: Vec<f64>,
+    /// Stretch of each (position_unit).
+    stretch: Vec<f64>,
+}
+
+impl Sliders {
+    /// At rest, of the ways between the first knot and the others.
+    pub fn of(at: &[f64]) -> Sliders {
+        let yields: Vec<f64> = at.iter().skip(1).map(|a| a - at[0]).collect();
+        Sliders { stretch: vec![0.0; yields.len()], yields }
+    }
+
+    /// The stretch of one after a way `dx`.
+    pub fn moved(&self, j: usize, dx: f64) -> f64 {
+        // Not `clamp`, which panics where the motion is no number.
+        (self.stretch[j] + dx).max(-self.yields[j]).min(self.yields[j])
+    }
+
+    /// Goes the way `dx`; the stretches.
+    pub fn go(&mut self, dx: f64) -> &[f64] {
+        for j in 0..self.yields.len() {
+            self.stretch[j] = self.moved(j, dx);
+        }
+        &self.stretch
+    }
+}
+
+/// What each slider of a loading curve holds per stretch: the fall of the curve's slope at its knot.
+pub(crate) fn slider_stiffness(at: &[f64], value: &[f64]) -> Vec<f64> {
+    let slope = |i: usize| if i + 1 < at.len() { (value[i + 1] - value[i]) / (at[i + 1] - at[i]) } else { 0.0 };
+    (0..at.len().saturating_sub(1)).map(|i| slope(i) - slope(i + 1)).collect()
+}
+
+/// A loading curve in motion.
+struct Loading {
+    sliders: Sliders,
+    stiffness: Vec<f64>,
+}
+
+impl Law for Loading {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        let dx = to.x - from.x;
+        let both = |(j, k): (usize, &f64)| k * (self.sliders.stretch[j] + self.sliders.moved(j, dx));
+        out[0] = -0.5 * self.stiffness.iter().enumerate().map(both).sum::<f64>();
+    }
+
+    fn commit(&mut self, from: &Sample, to: &Sample) {
+        self.sliders.go(to.x - from.x);
+    }
+}
+
 struct Curve {
     port: CurvePort,
     spline: Spline,
@@ -221,7 +307,11 @@ impl Law for Curve {
         out[0] = match self.port {
             CurvePort::TorqueOverPosition => self.mean(from.x, to.x),
             CurvePort::TorqueOverVelocity => self.mean(from.v, to.v),
+            CurvePort::TorqueOverTime => self.mean(from.t, to.t),
             CurvePort::GainOverPosition => (self.mean(from.x, to.x) - 1.0) * from.i,
+            CurvePort::GainOverTime => (self.mean(from.session, to.session) - 1.0) * from.i,
+            // It has a motion of its own (`Loading`).
+            CurvePort::TorqueOverLoading => 0.0,
             CurvePort::AmplifierOverCommand => {
                 let wanted = self.spline.value(to.u);
                 let late = |lag: &Lag| (lag.arrived(self.spline.value(from.u)) - wanted) * lag.mean;
@@ -254,6 +344,10 @@ impl Parametric for FreeForm {
     }
 
     fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+        if self.port == CurvePort::TorqueOverLoading {
+            let stiffness = slider_stiffness(&self.at, &self.value);
+            return Box::new(Loading { sliders: Sliders::of(&self.at), stiffness });
+        }
         let made = |tau: f64| {
             let ratio = scene.sample_time_s / tau;
             Lag { keep: (-ratio).exp(), mean: -(-ratio).exp_m1() / ratio, current: None }
@@ -274,8 +368,17 @@ impl Parametric for FreeForm {
         true
     }
 
+    /// Of a loading curve, its first and steepest part.
+    fn stiffness(&self, _strengths: &[f64]) -> f64 {
+        let first = || slider_stiffness(&self.at, &self.value).iter().sum::<f64>().max(0.0);
+        if self.port == CurvePort::TorqueOverLoading { first() } else { 0.0 }
+    }
+
     /// A reading that turns round does not tell where the arm is.
     fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+        if self.port == CurvePort::TorqueOverTime {
+            return Share::Outside;
+        }
         let spline = self.spline();
         let rises = |k: &[f64]| spline.slope(k[0]) > 0.0 && spline.slope(0.5 * (k[0] + k[1])) > 0.0;
         let monotone = self.port != CurvePort::SensorOverPosition || spline.at().windows(2).all(rises);
@@ -292,5 +395,5 @@ impl Parametric for FreeForm {
 pub static FACTS: Facts = made(
     Port::Torque,
     Entry::Torque,
-    "a natural cubic spline at one port: torque over position or velocity, amplifier over command, gain over position, sensor over position",
+    "a natural cubic spline at one port: torque over position or velocity, amplifier over command, gain over position or time, torque over the time of a record, sensor over position; a loading curve over the way since the last turn",
 );

@@ -61,6 +61,7 @@ pub use cycle::{Cycle, Motion};
 pub use describing::describing;
 pub use effect::{COLUMNS, Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 pub use free_form::CurvePort;
+pub(crate) use free_form::Sliders;
 pub use library::{AnyLaw, Effect, Setting, curves, data_facts, effect, facts, library};
 pub use machine::{Machine, Reading};
 pub use parameter::{Parameter, Unit};

@@ -22,6 +22,9 @@ rules! {
     CLEARED_FULLER: f64 = 0.9, "ratio",
         "the same of a fuller form of the law over that of the plain one, below which it is taken",
         "judgement: a rise at rest must pay for its two numbers";
+    CLEARED_BY_CURVE: f64 = 0.25, "ratio",
+        "squared simulation error with a curve over that of the best law, below which the plant is cleared of the curve instead",
+        "judgement: a curve has thirty numbers and no name; half the error is more than a law's form leaves";
     CLEARED_FAR: f64 = 3.0, "noise",
         "simulation error of the best linear plant over the sensor's noise from which a plant is cleared at all",
         "nearer to the noise the search starts well enough";
