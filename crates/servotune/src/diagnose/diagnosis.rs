@@ -1,21 +1,21 @@
 //! The diagnosis of a case, step by step: logs, noise, linear refit, search, judgement on hold-out records, verdict.
 
-use super::bench::Bench;
-use super::bump::set_aside;
-use super::cleared::cleared;
 use super::diagnose_error::DiagnoseError;
-use super::diagnosed::Diagnosed;
-use super::excerpt::excerpts;
-use super::fitted::refit;
-use super::ground;
-use super::judge::rms;
-use super::logs::check;
-use super::pace::Pace;
+use super::preconditions;
+use super::progress::Pace;
 use super::rules::MEASURED_COMMAND;
-use super::run::{Run, runs};
 use super::settings::DiagnoseSettings;
 use super::trial::Trial;
 use crate::controller::{Controller, Law};
+use crate::diagnose::data::excerpt::excerpts;
+use crate::diagnose::data::run::{Run, runs};
+use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::fitted_model::refit;
+use crate::diagnose::fit::shock::set_aside;
+use crate::diagnose::fit::simulation::rms;
+use crate::diagnose::search::cleared_plant::cleared;
+use crate::diagnose::verdict::diagnosed::Diagnosed;
+use crate::diagnose::verdict::log_checks::check;
 use crate::lti::{Body, Plant};
 use crate::recording::{Case, Role};
 
@@ -61,7 +61,7 @@ pub fn diagnose(
         remarks.push(format!("the search was made on excerpts of the fit records, {kept} samples together; figures are of the whole records"));
     }
     let mut bench = Bench::new(given, cut.unwrap_or_else(|| whole.clone()), sample_time_s, case.spindle_hz)?;
-    ground::check(&bench)?;
+    preconditions::check(&bench)?;
     if controller.is_none() {
         progress("is the command held between samples, or measured");
         let (better, measured) = held_or_measured(bench, case, given, settings.select.iterations, &mut remarks)?;

@@ -1,29 +1,29 @@
 //! The search on the ground of a case, and what it comes to; a curve in the place of the law where it ends without a name.
 
-use super::bench::Bench;
-use super::bump::{Bump, beyond};
-use super::confirm::confirm;
-use super::corrected::corrected;
 use super::diagnose_error::DiagnoseError;
-use super::diagnosed::Diagnosed;
-use super::diagnosis_json::Diagnosis;
-use super::experiment::propose;
-use super::finding::{NextExperiment, Tried, Verdict};
-use super::fit_report::{Errors, figures_of, fit_report};
-use super::held_out::{held_out, mean};
-use super::judge::Judged;
-use super::logs::Hygiene;
-use super::noise_finding::noise_findings;
-use super::reported::Reporting;
-use super::run::Run;
-use super::select::select;
-use super::select_settings::SelectSettings;
-use super::selection::Selection;
 use super::settings::DiagnoseSettings;
-use super::stand_in::{Standing, enter, stand_in};
-use super::unrest::unrest;
-use super::verdict::{ByOthers, judge};
 use crate::controller::Law;
+use crate::diagnose::data::run::Run;
+use crate::diagnose::fit::corrected_model::corrected;
+use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::shock::{Bump, beyond};
+use crate::diagnose::fit::simulation::Judged;
+use crate::diagnose::noise::torque_noise::unrest;
+use crate::diagnose::search::select::select;
+use crate::diagnose::search::select_settings::SelectSettings;
+use crate::diagnose::search::selection::Selection;
+use crate::diagnose::verdict::confirmation::confirm;
+use crate::diagnose::verdict::diagnosed::Diagnosed;
+use crate::diagnose::verdict::diagnosis_json::Diagnosis;
+use crate::diagnose::verdict::finding::{NextExperiment, Tried, Verdict};
+use crate::diagnose::verdict::fit_report::{Errors, figures_of, fit_report};
+use crate::diagnose::verdict::held_out::{held_out, mean};
+use crate::diagnose::verdict::judgement::{ByOthers, judge};
+use crate::diagnose::verdict::log_checks::Hygiene;
+use crate::diagnose::verdict::missing_curve::{Standing, enter, stand_in};
+use crate::diagnose::verdict::next_experiment::propose;
+use crate::diagnose::verdict::noise_finding::noise_findings;
+use crate::diagnose::verdict::offered_models::Reporting;
 use crate::lti::Plant;
 use crate::physics::library;
 use crate::recording::Case;
@@ -78,7 +78,7 @@ impl Trial<'_> {
     /// One search and what it comes to, with the errors of all runs in open loop.
     fn made(&self, mut bench: Bench, progress: &mut dyn FnMut(&str)) -> Result<(Diagnosed, Errors), DiagnoseError> {
         let mut remarks = self.remarks.to_vec();
-        let unrest = unrest(&bench);
+        let unrest = unrest(&bench.repeats, &bench.whitener, &bench.form.given, bench.scene.sample_time_s);
         // Records whose samples slipped hold nothing that a model could be fitted to.
         // A log that slipped or is in other units is no ground for the long way.
         let sound = self.hygiene.finding.is_none();

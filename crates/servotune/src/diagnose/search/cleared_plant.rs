@@ -1,0 +1,130 @@
+//! A plant cleared of what acted while it was fitted: body, delay and one law together, by the balance of torques.
+//!
+//! In: records and the given plant, of which nothing but its modes is used: where it was fitted under dry friction or a dead band, gain and delay may be
+//! anything. Out: the plant from which the search sets out. What explains most is fitted by plain simulation and kept only where it
+//! simulates far better than the best linear plant. It names nothing: the search begins anew from the plant alone.
+
+use super::torque_balance::{Balance, Balanced, SLOWEST_RAD_S, with_freedom};
+use crate::diagnose::data::run::{Run, mean_run};
+use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::fitted_model::refit;
+use crate::diagnose::fit::model::Model;
+use crate::diagnose::fit::output_error_problem::{Problem, descended};
+use crate::diagnose::fit::selected_effect::Chosen;
+use crate::diagnose::fit::simulation::size;
+use crate::diagnose::rules::{CLEARED_BETTER, CLEARED_FAR, CLEARED_FULLER};
+use crate::lti::{Body, Plant};
+use crate::physics::{AnyLaw, Setting};
+
+/// Standard deviations of the smoothing (samples): wide for slow machines, narrow for fast ones.
+const SMOOTHINGS: [f64; 3] = [3.0, 8.0, 20.0];
+/// Laws that are tried by simulation, as they stand and fitted.
+const TRIED: usize = 16;
+const FITTED: usize = 3;
+/// Speeds at which the arm surely slides, over what the sensor's noise makes of the smoothed speed at rest: where it may stick, a drag is
+/// whatever holds it, and its rows tell of no law. Both balances are tried.
+const SLIDES: [f64; 2] = [0.0, 6.0];
+
+/// A plant from which the search sets out, and the law that it was cleared of.
+pub(in crate::diagnose) struct Cleared {
+    pub plant: Plant,
+    pub law: Option<Chosen>,
+}
+
+/// The plant to set out from, where the given one conceals what acts; none where the given one, or a refit of it, does.
+pub(in crate::diagnose) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str)) -> Option<Cleared> {
+    let means: Vec<Run> = bench.stack.segments.iter().map(|s| mean_run(&bench.runs, &s.runs)).collect();
+    let balances = SMOOTHINGS.iter().flat_map(|&w| SLIDES.map(|s| Balance::of(bench, &means, w, s)));
+    let mut laws: Vec<(f64, Balanced)> = balances.flat_map(|b| b.laws()).collect();
+    let nothing_bends = laws.iter().all(|(_, b)| b.law.is_none());
+    let zero = vec![0.0; bench.form.knobs.len()];
+    let near = bench.fit(vec![]).cost(&zero) < CLEARED_FAR * CLEARED_FAR * bench.stack.total as f64;
+    if laws.is_empty() || nothing_bends && near {
+        return None;
+    }
+    let mut own = bench.clone();
+    let linear = refit(&mut own, iterations);
+    let whole: Vec<(&Run, usize)> = means.iter().zip(&own.stack.segments).map(|(m, s)| (m, s.runs.len())).collect();
+    let mut given = linear.clone();
+    given.refitted.p.fill(0.0);
+    let plain = |b: &Bench, m: &Model| {
+        let mut problem = Problem::plain_error(b, m, None, &whole);
+        let x = problem.start();
+        size(&problem.settle(&x))
+    };
+    let samples: f64 = whole.iter().map(|(r, n)| (r.len() * n) as f64).sum();
+    let least =
+        [plain(&own, &linear), plain(&own, &given)].into_iter().filter(|v| v.is_finite()).fold(f64::MAX, f64::min);
+    // Sums of squares count in the sensor's noise.
+    if least < CLEARED_FAR * CLEARED_FAR * samples {
+        return None;
+    }
+    say("a plant cleared of what bends it");
+    laws.sort_by(|a, b| a.0.total_cmp(&b.0));
+    laws.truncate(TRIED);
+    let model_of = |b: &Balanced| -> Option<(Bench, Model)> {
+        let ground = around(&own, &b.plant);
+        let zero = vec![0.0; ground.form.knobs.len()];
+        let mut model = linear.clone();
+        model.chosen = b.law.iter().cloned().collect();
+        (model.refitted.p, model.refitted.plant) = (zero, b.plant.clone());
+        Some((ground, model))
+    };
+    let mut tried: Vec<(f64, Bench, Model)> = Vec::new();
+    for (_, b) in &laws {
+        if let Some((ground, model)) = model_of(b) {
+            let left = plain(&ground, &model);
+            if left.is_finite() {
+                tried.push((left, ground, model));
+            }
+        }
+    }
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut settled: Vec<(f64, Bench, Model)> = Vec::new();
+    for (left, ground, model) in tried.into_iter().take(FITTED) {
+        let fitted = descended(&ground, &model, None, &whole).unwrap_or(model);
+        settled.push((plain(&ground, &fitted).min(left), ground, fitted));
+    }
+    settled.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut best: Option<(f64, Cleared)> = None;
+    let cleared = |ground: &Bench, m: &Model| Cleared {
+        plant: not_too_slow(ground.form.plant(&m.refitted.p)),
+        law: m.chosen.first().cloned(),
+    };
+    if let Some((least, ground, model)) = settled.first() {
+        best = Some((*least, cleared(ground, model)));
+        let fuller = |law: &Chosen| {
+            let of =
+                |full: AnyLaw| Chosen { setting: Setting::new(full, law.setting.strengths.clone()), ..law.clone() };
+            law.setting.law.fuller(&own.scene).into_iter().map(of).collect::<Vec<_>>()
+        };
+        for full in model.chosen.first().map(fuller).unwrap_or_default() {
+            let model = Model { chosen: vec![with_freedom(full, &own.scene)], ..model.clone() };
+            let Some(fitted) = descended(ground, &model, None, &whole) else { continue };
+            let after = plain(ground, &fitted);
+            if after < CLEARED_FULLER * best.as_ref().map_or(f64::MAX, |b| b.0) {
+                best = Some((after, cleared(ground, &fitted)));
+            }
+        }
+    }
+    best.filter(|(left, _)| *left < CLEARED_BETTER * CLEARED_BETTER * least).map(|(_, cleared)| cleared)
+}
+
+/// The same acceleration and viscous rate on a spring that a plant may have: a fit may end at none.
+fn not_too_slow(plant: Plant) -> Plant {
+    let Body::SecondOrder { dc_gain, natural_frequency_rad_s: w, damping_ratio } = plant.body else { return plant };
+    let by = SLOWEST_RAD_S / w;
+    if by <= 1.0 {
+        return plant;
+    }
+    let (dc_gain, damping_ratio) = (dc_gain / (by * by), damping_ratio / by);
+    Plant { body: Body::SecondOrder { dc_gain, natural_frequency_rad_s: SLOWEST_RAD_S, damping_ratio }, ..plant }
+}
+
+/// The same ground around another plant, for simulations of plain errors: its noise and its motion stay.
+fn around(bench: &Bench, plant: &Plant) -> Bench {
+    let mut ground = bench.clone();
+    ground.form = crate::diagnose::data::linear_form::LinearForm::new(plant, bench.scene.sample_time_s);
+    ground.scene.plant = plant.clone();
+    ground
+}
