@@ -1,19 +1,19 @@
 //! Whether records and plant are a ground on which anything can be computed.
 //!
-//! In: the bench, before the first fit. Out: nothing, or a refusal: numbers that overflowed would be none everywhere after, and decompositions of them need not end.
+//! In: the diagnosis data, before the first fit. Out: nothing, or a refusal: numbers that overflowed would be none everywhere after, and decompositions of them need not end.
 
 use super::DiagnoseError;
 use super::rules::BEYOND_MOTION;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 
 /// Refuses a ground on which nothing can be computed.
-pub(super) fn check(bench: &Bench) -> Result<(), DiagnoseError> {
+pub(super) fn check(bench: &DiagnosisData) -> Result<(), DiagnoseError> {
     alike(bench)?;
     finite(bench)
 }
 
 /// Refuses a ground on which nothing can be computed: what is no number here would be none everywhere after.
-fn finite(bench: &Bench) -> Result<(), DiagnoseError> {
+fn finite(bench: &DiagnosisData) -> Result<(), DiagnoseError> {
     let (l, s) = (&bench.levels, &bench.scene);
     let numbers = [
         ("the level of the sensor's noise", l.sensor_rms),
@@ -33,7 +33,7 @@ fn finite(bench: &Bench) -> Result<(), DiagnoseError> {
 }
 
 /// Refuses a plant that simulates something else than these records.
-fn alike(bench: &Bench) -> Result<(), DiagnoseError> {
+fn alike(bench: &DiagnosisData) -> Result<(), DiagnoseError> {
     let none = vec![0.0; bench.form.knobs.len()];
     for (record, error) in bench.means.iter().zip(bench.clone().fit(vec![]).errors(&none)) {
         let mean = record.position.iter().sum::<f64>() / record.len() as f64;

@@ -5,7 +5,7 @@
 //! does not.
 
 use super::run::Run;
-use super::stacked_records::Basis;
+use super::stacked_records::NuisanceBasis;
 use crate::controller::Law;
 use crate::diagnose::rules::{JUMP_STEPS, REPLAY_ERROR, STUCK_STEPS};
 use crate::lti::step_chain;
@@ -152,7 +152,7 @@ fn factors(law: &Law, with: &[(&Run, &[f64])]) -> (f64, f64, f64) {
         let through = |memory: &mut [[f64; 2]], input: &dyn Fn(usize) -> f64| -> Vec<f64> {
             (0..n).map(|k| mask(k) * step_chain(&law.chain, memory, input(k))).collect()
         };
-        let mut basis = Basis::default();
+        let mut basis = NuisanceBasis::default();
         for i in 0..2 * law.chain.len() {
             let mut memory = law.rest();
             memory[i / 2][i % 2] = 1.0;

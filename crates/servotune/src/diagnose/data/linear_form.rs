@@ -7,7 +7,7 @@ use crate::physics::Sample;
 
 /// One parameter of the linear plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Knob {
+pub enum FreeParameter {
     /// Logarithm of the acceleration gain's ratio.
     Gain,
     /// Change of the stiffness over the given one.
@@ -32,7 +32,7 @@ pub struct LinearForm {
     /// The plant of the case.
     pub given: Plant,
     /// Free parameters, in order.
-    pub knobs: Vec<Knob>,
+    pub knobs: Vec<FreeParameter>,
     pub(in crate::diagnose) sample_time_s: f64,
 }
 
@@ -42,7 +42,7 @@ const HIGHEST_MODE: f64 = 0.95;
 /// The plant that carries a simulation: gain, delay and modes as the parameters have them, the body's spring and damper as
 /// given. Their change acts as a torque along the recorded motion, which is exact for any change and linear in it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Carrier {
+pub struct NominalModel {
     /// The plant.
     pub plant: Plant,
     /// Torque per position (command_unit per position_unit).
@@ -51,7 +51,7 @@ pub struct Carrier {
     pub damper: f64,
 }
 
-impl Carrier {
+impl NominalModel {
     /// The arm's own position over the recorded one, both at rest: 1 over the modes' gain at rest.
     pub fn arm_over_record(&self) -> f64 {
         self.plant.modes.iter().map(|m| (m.pole_rad_s / m.zero_rad_s).powi(2)).product()
@@ -69,35 +69,40 @@ impl Carrier {
 impl LinearForm {
     /// All parameters that records at this sample time can tell.
     pub fn new(given: &Plant, sample_time_s: f64) -> LinearForm {
-        let mut knobs = vec![Knob::Gain];
+        let mut knobs = vec![FreeParameter::Gain];
         if matches!(given.body, Body::SecondOrder { .. }) {
-            knobs.push(Knob::Stiffness);
+            knobs.push(FreeParameter::Stiffness);
         }
-        knobs.extend([Knob::Viscous, Knob::Delay]);
+        knobs.extend([FreeParameter::Viscous, FreeParameter::Delay]);
         let highest = HIGHEST_MODE * std::f64::consts::PI / sample_time_s;
         for (i, m) in given.modes.iter().enumerate() {
             if m.pole_rad_s < highest {
-                knobs.extend([Knob::Pole(i), Knob::PoleDamping(i), Knob::Zero(i), Knob::ZeroDamping(i)]);
+                knobs.extend([
+                    FreeParameter::Pole(i),
+                    FreeParameter::PoleDamping(i),
+                    FreeParameter::Zero(i),
+                    FreeParameter::ZeroDamping(i),
+                ]);
             }
         }
         LinearForm { given: given.clone(), knobs, sample_time_s }
     }
 
     /// The plant that carries a simulation at these parameters.
-    pub fn carrier(&self, p: &[f64]) -> Carrier {
+    pub fn carrier(&self, p: &[f64]) -> NominalModel {
         let mut held = p.to_vec();
         let (mut spring, mut damper) = (0.0, 0.0);
         let (b, k, _) = body_numbers(&self.given.body);
         let mut gain = b * self.given.resonance_gain;
         for (knob, value) in self.knobs.iter().zip(held.iter_mut()) {
             match knob {
-                Knob::Gain => gain *= value.exp(),
-                Knob::Stiffness => spring = -k * std::mem::take(value),
-                Knob::Viscous => damper = -rate_of(&self.given.body) * std::mem::take(value),
+                FreeParameter::Gain => gain *= value.exp(),
+                FreeParameter::Stiffness => spring = -k * std::mem::take(value),
+                FreeParameter::Viscous => damper = -rate_of(&self.given.body) * std::mem::take(value),
                 _ => {}
             }
         }
-        Carrier { plant: self.plant(&held), spring: spring / gain, damper: damper / gain }
+        NominalModel { plant: self.plant(&held), spring: spring / gain, damper: damper / gain }
     }
 
     /// The plant at these parameters; values that make no plant are taken to the nearest that do.
@@ -107,14 +112,14 @@ impl LinearForm {
         let (k0, rate) = (stiffness, rate_of(&plant.body));
         for (knob, &value) in self.knobs.iter().zip(p) {
             match *knob {
-                Knob::Gain => gain *= value.exp(),
-                Knob::Stiffness => stiffness = k0 * (1.0 + value),
-                Knob::Viscous => viscous += rate * value,
-                Knob::Delay => plant.delay_s = (plant.delay_s + value * self.sample_time_s).max(0.0),
-                Knob::Pole(i) => plant.modes[i].pole_rad_s *= value.exp(),
-                Knob::PoleDamping(i) => plant.modes[i].pole_damping_ratio *= value.exp(),
-                Knob::Zero(i) => plant.modes[i].zero_rad_s *= value.exp(),
-                Knob::ZeroDamping(i) => {
+                FreeParameter::Gain => gain *= value.exp(),
+                FreeParameter::Stiffness => stiffness = k0 * (1.0 + value),
+                FreeParameter::Viscous => viscous += rate * value,
+                FreeParameter::Delay => plant.delay_s = (plant.delay_s + value * self.sample_time_s).max(0.0),
+                FreeParameter::Pole(i) => plant.modes[i].pole_rad_s *= value.exp(),
+                FreeParameter::PoleDamping(i) => plant.modes[i].pole_damping_ratio *= value.exp(),
+                FreeParameter::Zero(i) => plant.modes[i].zero_rad_s *= value.exp(),
+                FreeParameter::ZeroDamping(i) => {
                     plant.modes[i].zero_damping_ratio += value * self.given.modes[i].pole_damping_ratio;
                 }
             }

@@ -5,7 +5,7 @@ use super::checks::SampleFault;
 use super::linear_form::{Sampled, free_motions};
 use super::run::Run;
 use super::slip::slips_of_answer;
-use super::stacked_records::Basis;
+use super::stacked_records::NuisanceBasis;
 use super::time_shift::shifted;
 use crate::diagnose::rules::{EARLY_LEFT, OTHER_UNIT_EXPLAINED, OTHER_UNIT_GAIN};
 use crate::lti::{LtiError, Plant};
@@ -24,7 +24,7 @@ struct Answer<'a> {
     run: &'a Run,
     /// The answer, what is each record's own start taken out.
     answer: Vec<f64>,
-    start: Basis,
+    start: NuisanceBasis,
 }
 
 /// How the positions follow the answers.
@@ -40,7 +40,7 @@ impl<'a> Answers<'a> {
     pub(in crate::diagnose) fn of(given: &Plant, runs: &'a [Run], sample_time_s: f64) -> Result<Answers<'a>, LtiError> {
         let sampled = Sampled::of(given, sample_time_s)?;
         let record = |run: &'a Run| {
-            let mut start = Basis::default();
+            let mut start = NuisanceBasis::default();
             free_motions(&given.body, sample_time_s, run.len()).into_iter().for_each(|c| start.add_local(0, c));
             let input: Vec<f64> = run.input.iter().map(|u| u - run.before).collect();
             let mut answer = vec![0.0; run.len()];

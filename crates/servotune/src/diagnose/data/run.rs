@@ -33,7 +33,7 @@ pub struct Run {
     /// Whether it stood at rest as the record began: the forces on it were in balance then.
     pub rested: bool,
     /// Whether a push from outside falls into it, which no repeat shares: no model is fitted to it nor judged by it.
-    pub bumped: bool,
+    pub shocked: bool,
     /// PES where recorded; NaN between servo samples.
     pub pes: Option<Vec<f64>>,
     /// Spindle angle (rad), where recorded.
@@ -76,7 +76,7 @@ impl Run {
             name: self.name.clone(),
             role: self.role,
             group: self.group,
-            bumped: self.bumped,
+            shocked: self.shocked,
         }
     }
 
@@ -163,7 +163,7 @@ pub fn runs(case: &Case) -> Vec<Run> {
                 from_s: 0.0,
                 group,
                 rested: still(record.reference.as_deref().unwrap_or_default()) >= AT_REST.min(record.position.len()),
-                bumped: false,
+                shocked: false,
                 before,
                 origin,
                 reference: record.reference.clone(),

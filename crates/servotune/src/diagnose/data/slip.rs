@@ -6,7 +6,7 @@
 
 use super::checks::{SampleFault, between};
 use super::run::Run;
-use super::stacked_records::Basis;
+use super::stacked_records::NuisanceBasis;
 use crate::controller::Law;
 use crate::diagnose::rules::{
     REPLAY_FAILS, REPLAY_FAILS_OF_COMMAND, ROWS_MOVE, ROWS_WHOLE, SHIFT_LEFT, SLIP_TAKEN, SLIPS_LEFT, STILL_SAMPLES,
@@ -163,7 +163,7 @@ pub fn slips_of_answer(run: &Run, nuisances: &[Vec<f64>], clock: &[f64], sample_
         return Vec::new();
     }
     let n = run.len() - ends;
-    let mut basis = Basis::default();
+    let mut basis = NuisanceBasis::default();
     nuisances.iter().for_each(|c| basis.add_local(0, c[..n].to_vec()));
     let mut drifting = basis.clone();
     drifting.add_local(0, clock[..n].to_vec());
@@ -212,7 +212,7 @@ pub fn slips_of_answer(run: &Run, nuisances: &[Vec<f64>], clock: &[f64], sample_
 struct Log<'a> {
     y: &'a [f64],
     n: usize,
-    basis: Basis,
+    basis: NuisanceBasis,
 }
 
 impl Log<'_> {

@@ -24,16 +24,16 @@ pub struct Segment {
 
 /// The layout of a stacked vector.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stack {
+pub struct StackedRecords {
     /// Its stretches.
     pub segments: Vec<Segment>,
     /// Samples in all.
     pub total: usize,
 }
 
-impl Stack {
+impl StackedRecords {
     /// Repeats of equal length together, the others each of its own.
-    pub fn grouped(runs: &[Run], wanted: &[usize]) -> Stack {
+    pub fn grouped(runs: &[Run], wanted: &[usize]) -> StackedRecords {
         let mut groups: Vec<(Vec<usize>, usize)> = Vec::new();
         for &i in wanted {
             let len = runs[i].len();
@@ -52,7 +52,7 @@ impl Stack {
                 segment
             })
             .collect();
-        Stack { segments, total: start }
+        StackedRecords { segments, total: start }
     }
 
     /// Stacks `count` columns of every segment, weighted.
@@ -74,7 +74,7 @@ impl Stack {
 
 /// Orthonormal directions that a fit has already used up: some live in one stretch only, the others in the whole vector.
 #[derive(Clone, Debug, Default)]
-pub struct Basis {
+pub struct NuisanceBasis {
     local: Vec<(usize, Vec<f64>)>,
     global: Vec<Vec<f64>>,
 }
@@ -87,7 +87,7 @@ fn axpy(out: &mut [f64], a: f64, x: &[f64]) {
     out.iter_mut().zip(x).for_each(|(o, x)| *o += a * x);
 }
 
-impl Basis {
+impl NuisanceBasis {
     /// Directions in all.
     pub fn dimension(&self) -> usize {
         self.local.len() + self.global.len()
@@ -195,7 +195,7 @@ pub struct Normal {
 
 impl Normal {
     /// Of `columns`, each non-zero within `spans[i]` only, against `residual` (basis already taken out).
-    pub fn of(basis: &Basis, residual: &[f64], columns: &[Vec<f64>], spans: &[[usize; 2]]) -> Normal {
+    pub fn of(basis: &NuisanceBasis, residual: &[f64], columns: &[Vec<f64>], spans: &[[usize; 2]]) -> Normal {
         let m = columns.len();
         let part = |i: usize| &columns[i][..];
         // What the basis takes of each column, as coordinates: the projected column itself is never needed.

@@ -3,7 +3,7 @@
 //! Where a bearing that sticks takes over the spring of the body, little or less than nothing of that spring is left; the body
 //! then is a free inertia and the rest stands as a plain cable spring, of either sign.
 
-use super::selected_effect::Chosen;
+use super::selected_effect::SelectedEffect;
 use crate::diagnose::data::linear_form::{LinearForm, body_numbers};
 use crate::diagnose::rules::FREE_BODY;
 use crate::lti::{Body, PhysicsEntry, Plant};
@@ -20,7 +20,7 @@ pub struct Corrected {
 }
 
 /// Makes the corrected model of a fit; `per_record` effects belong to records, not to the machine, and stay out.
-pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[Chosen], scene: &Scene) -> Corrected {
+pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[SelectedEffect], scene: &Scene) -> Corrected {
     let mut plant = form.plant(p);
     let mut effects: Vec<Setting> = Vec::new();
     let mut entries = Vec::new();

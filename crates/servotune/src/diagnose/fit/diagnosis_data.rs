@@ -4,12 +4,12 @@ use super::equation_error_fit::simulation_error;
 use super::fit_inputs::Fit;
 use super::model::Model;
 use super::regressors::{Drive, drive, raw_columns};
-use super::selected_effect::Chosen;
+use super::selected_effect::SelectedEffect;
 use super::trajectory::{Smoother, Trajectory, acting, apart};
 use crate::diagnose::data::checks::{Grid, quantum};
-use crate::diagnose::data::linear_form::{Carrier, LinearForm, Sampled, body_numbers, free_motions, free_scales};
+use crate::diagnose::data::linear_form::{LinearForm, NominalModel, Sampled, body_numbers, free_motions, free_scales};
 use crate::diagnose::data::run::{Run, mean_run};
-use crate::diagnose::data::stacked_records::{Basis, Stack};
+use crate::diagnose::data::stacked_records::{NuisanceBasis, StackedRecords};
 use crate::diagnose::noise::lines::{Line, take_lines};
 use crate::diagnose::noise::whitening::{NoiseLevels, Whitener};
 use crate::diagnose::rules::ROUNDING_ALIKE;
@@ -22,7 +22,7 @@ use std::f64::consts::TAU;
 
 /// The ground of a diagnosis.
 #[derive(Clone, Debug)]
-pub struct Bench {
+pub struct DiagnosisData {
     /// The linear plant's free parameters around the given plant.
     pub form: LinearForm,
     /// All runs, hold-out included.
@@ -40,7 +40,7 @@ pub struct Bench {
     /// The motion behind each of them.
     pub trajectories: Vec<Trajectory>,
     /// Repeats together.
-    pub stack: Stack,
+    pub stack: StackedRecords,
     /// Machine and size of its motion.
     pub scene: Scene,
     /// What repeats differ by, whitened, with the run it belongs to; empty without repeats.
@@ -48,7 +48,7 @@ pub struct Bench {
     /// The encoder's count, where every fitted position lies on one.
     pub grid: Option<Grid>,
     /// The law that the plant was cleared of before the search, where it was.
-    pub foretold: Option<Chosen>,
+    pub foretold: Option<SelectedEffect>,
 }
 
 /// The finest count of some runs, where all of them lie on one.
@@ -96,10 +96,10 @@ pub(super) fn without_start(
 ) -> Vec<(usize, Vec<f64>)> {
     let mut out = series.to_vec();
     // Records of one length start in the same motions.
-    let mut starts: BTreeMap<usize, Basis> = BTreeMap::new();
+    let mut starts: BTreeMap<usize, NuisanceBasis> = BTreeMap::new();
     for (_, e) in &mut out {
         let basis = starts.entry(e.len()).or_insert_with(|| {
-            let mut basis = Basis::default();
+            let mut basis = NuisanceBasis::default();
             for mut c in free(e.len()) {
                 filter(&mut c);
                 basis.add_local(0, c);
@@ -142,7 +142,7 @@ fn noise_of(
 }
 
 /// Weights for the noise of each segment as its own repeats show it: a fast move may be noisier than a slow one.
-fn weigh(stack: &mut Stack, repeats: &[(usize, Vec<f64>)]) {
+fn weigh(stack: &mut StackedRecords, repeats: &[(usize, Vec<f64>)]) {
     for s in &mut stack.segments {
         let own = repeats.iter().filter(|(r, _)| s.runs.contains(r));
         let (sum, n) = own.fold((0.0, 0), |(sum, n), (_, e)| (sum + e.iter().map(|v| v * v).sum::<f64>(), n + e.len()));
@@ -179,18 +179,23 @@ pub fn scene(given: &Plant, runs: &[Run], sample_time_s: f64, spindle_hz: Option
     }
 }
 
-impl Bench {
+impl DiagnosisData {
     /// Sets up a diagnosis of `given` on these runs.
-    pub fn new(given: &Plant, runs: Vec<Run>, sample_time_s: f64, spindle_hz: Option<f64>) -> Result<Bench, LtiError> {
+    pub fn new(
+        given: &Plant,
+        runs: Vec<Run>,
+        sample_time_s: f64,
+        spindle_hz: Option<f64>,
+    ) -> Result<DiagnosisData, LtiError> {
         let form = LinearForm::new(given, sample_time_s);
-        let fit_runs: Vec<usize> = (0..runs.len()).filter(|&i| runs[i].role == Role::Fit && !runs[i].bumped).collect();
-        let mut stack = Stack::grouped(&runs, &fit_runs);
+        let fit_runs: Vec<usize> = (0..runs.len()).filter(|&i| runs[i].role == Role::Fit && !runs[i].shocked).collect();
+        let mut stack = StackedRecords::grouped(&runs, &fit_runs);
         let scene = scene(given, &runs, sample_time_s, spindle_hz);
         let p = vec![0.0; form.knobs.len()];
         let carrier = form.carrier(&p);
         let sampled = Sampled::of(&carrier.plant, sample_time_s)?;
         // Repeats differ by noise only, so that the linear answer to the difference of their commands is all that counts.
-        let plain = Carrier { spring: 0.0, damper: 0.0, ..carrier.clone() };
+        let plain = NominalModel { spring: 0.0, damper: 0.0, ..carrier.clone() };
         let still = Trajectory { samples: Vec::new(), unexplained: Vec::new(), repeats: Vec::new() };
         let free = |n: usize| free_motions(&given.body, sample_time_s, n).to_vec();
         let mut errors: Vec<(usize, Vec<f64>)> =
@@ -228,7 +233,7 @@ impl Bench {
                 }
                 None => (levels, whitener),
             };
-        let mut bench = Bench {
+        let mut bench = DiagnosisData {
             form,
             runs,
             fit_runs,
@@ -252,7 +257,7 @@ impl Bench {
 
     /// Without repeats there is only what a model leaves: noise and filter anew from the errors of the best one so far.
     /// Verdicts are weaker for it.
-    pub fn renew(&mut self, p: &[f64], chosen: &[Chosen]) {
+    pub fn renew(&mut self, p: &[f64], chosen: &[SelectedEffect]) {
         let t = self.scene.sample_time_s;
         let left: Vec<(usize, Vec<f64>)> = self.fit(chosen.to_vec()).errors(p).into_iter().enumerate().collect();
         let body = self.form.carrier(p).plant.body;
@@ -261,7 +266,7 @@ impl Bench {
     }
 
     /// The motion behind each mean run, with a known torque beside the carrier.
-    fn smooth(&mut self, carrier: &Carrier, sampled: &Sampled, means: &[Run], known: &[Vec<f64>]) {
+    fn smooth(&mut self, carrier: &NominalModel, sampled: &Sampled, means: &[Run], known: &[Vec<f64>]) {
         let spindle_hz = self.scene.spindle_hz.unwrap_or(0.0);
         let noise = self.levels.sensor_rms;
         let smoother = Smoother::of(&carrier.plant, &sampled.delayed, noise, means, known);
@@ -274,7 +279,7 @@ impl Bench {
 
     /// The motion anew for a model that was found: what the sensor adds is taken out of the position, because laws act on where
     /// the arm is and not on what the encoder says; and the torques of the model help the smoother.
-    pub fn correct(&mut self, p: &[f64], chosen: &[Chosen]) {
+    pub fn correct(&mut self, p: &[f64], chosen: &[SelectedEffect]) {
         let carrier = self.form.carrier(p);
         let Ok(sampled) = Sampled::of(&carrier.plant, self.scene.sample_time_s) else { return };
         let arm = carrier.arm_over_record();
@@ -314,13 +319,13 @@ impl Bench {
     }
 
     /// The error of a model on any run along its recorded motion, effects of each record's own left out.
-    fn raw_along(&self, run: &Run, model: &Model) -> Result<(Carrier, Vec<f64>), LtiError> {
+    fn raw_along(&self, run: &Run, model: &Model) -> Result<(NominalModel, Vec<f64>), LtiError> {
         let carrier = self.form.carrier(&model.refitted.p);
         let sampled = Sampled::of(&carrier.plant, self.scene.sample_time_s)?;
         let alone = std::slice::from_ref(run);
         let smoother = Smoother::of(&carrier.plant, &sampled.delayed, self.levels.sensor_rms, alone, &[Vec::new()]);
         let motion = [smoother.smooth(run, &[], &sampled.delayed, self.scene.spindle_hz.unwrap_or(0.0))];
-        let lasting: Vec<&Chosen> = model.chosen.iter().filter(|c| !c.setting.facts().per_record).collect();
+        let lasting: Vec<&SelectedEffect> = model.chosen.iter().filter(|c| !c.setting.facts().per_record).collect();
         let drives: Vec<Drive> = lasting.iter().map(|c| drive(&c.setting.law, &self.scene, &motion)).collect();
         let parts: Vec<(&Drive, &[f64])> =
             drives.iter().zip(lasting.iter().map(|c| &c.setting.strengths[..])).collect();
@@ -331,7 +336,7 @@ impl Bench {
     /// The whitened error of a model on any run along its recorded motion, with `own` columns of the record taken out.
     pub fn along(&self, run: &Run, model: &Model, own: &[Vec<f64>]) -> Result<Vec<f64>, LtiError> {
         let (_, mut e) = self.raw_along(run, model)?;
-        let mut basis = Basis::default();
+        let mut basis = NuisanceBasis::default();
         for mut c in own.iter().cloned() {
             self.whitener.apply(&mut c);
             basis.add_local(0, c);
@@ -375,7 +380,7 @@ impl Bench {
     }
 
     /// A fit on the stack with these effects.
-    pub fn fit(&self, chosen: Vec<Chosen>) -> Fit<'_> {
+    pub fn fit(&self, chosen: Vec<SelectedEffect>) -> Fit<'_> {
         Fit {
             form: &self.form,
             means: &self.means,

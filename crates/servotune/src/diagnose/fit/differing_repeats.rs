@@ -3,9 +3,9 @@
 //!
 //! The mean over repeats and what they differ by are independent under white noise, so that gains of both add up.
 
-use super::diagnosis_data::{Bench, noise_series, without_start};
+use super::diagnosis_data::{DiagnosisData, noise_series, without_start};
 use super::regressors::columns_along;
-use super::selected_effect::Chosen;
+use super::selected_effect::SelectedEffect;
 use crate::diagnose::data::linear_form::{Sampled, free_motions};
 use crate::diagnose::data::repeat_difference::Difference;
 use crate::numeric::least_squares::dot;
@@ -18,7 +18,7 @@ impl Difference {
     }
 
     /// The differences of a law among the repeats; zero where it answers in proportion to the command.
-    pub fn of(bench: &Bench, sampled: &Sampled, law: &AnyLaw) -> Difference {
+    pub fn of(bench: &DiagnosisData, sampled: &Sampled, law: &AnyLaw) -> Difference {
         let mut sum = Difference::default();
         if !law.effect().is_hard_nonlinearity() || law.facts().entry != Entry::Command {
             return sum;
@@ -54,7 +54,7 @@ impl Difference {
 }
 
 /// What all effects of a model take of what repeats differ by.
-pub fn differing(bench: &Bench, chosen: &[Chosen], p: &[f64]) -> f64 {
+pub fn differing(bench: &DiagnosisData, chosen: &[SelectedEffect], p: &[f64]) -> f64 {
     if !chosen.iter().any(|c| c.effect().is_hard_nonlinearity()) {
         return 0.0;
     }

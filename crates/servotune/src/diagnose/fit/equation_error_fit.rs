@@ -5,9 +5,9 @@ use super::fit_inputs::Fit;
 use super::regressors::{Drive, Entering, drive, entering};
 use super::slopes::Slopes;
 use super::trajectory::Trajectory;
-use crate::diagnose::data::linear_form::{Carrier, Sampled, free_motions};
+use crate::diagnose::data::linear_form::{NominalModel, Sampled, free_motions};
 use crate::diagnose::data::run::Run;
-use crate::diagnose::data::stacked_records::{Basis, Segment};
+use crate::diagnose::data::stacked_records::{NuisanceBasis, Segment};
 use crate::lti::Plant;
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
 use crate::physics::{AnyLaw, Setting};
@@ -50,7 +50,7 @@ const NUMBER_STEP: f64 = 1e-3;
 struct Problem<'a, 'f> {
     fit: &'a Fit<'f>,
     /// Directions of each record's own, those of the effects aside: they move with the numbers of the laws.
-    local: Basis,
+    local: NuisanceBasis,
     /// Numbers to refine: effect and place.
     numbers: Vec<(usize, usize)>,
     /// Strengths: effect and place.
@@ -121,7 +121,7 @@ impl Problem<'_, '_> {
     }
 
     /// Every direction of each record's own.
-    fn taken(&self, settings: &[Setting]) -> Cow<'_, Basis> {
+    fn taken(&self, settings: &[Setting]) -> Cow<'_, NuisanceBasis> {
         let chosen: Vec<&AnyLaw> = settings.iter().map(|s| &s.law).collect();
         let mut basis = Cow::Borrowed(&self.local);
         for (start, column) in self.fit.free(&chosen) {
@@ -136,7 +136,7 @@ impl Problem<'_, '_> {
 /// record.
 pub fn simulation_error(
     sampled: &Sampled,
-    carrier: &Carrier,
+    carrier: &NominalModel,
     effects: &[(&Drive, &[f64])],
     run: &Run,
     trajectory: &Trajectory,
@@ -209,15 +209,15 @@ impl Residuals for Problem<'_, '_> {
         if i >= p {
             return Limit { low: f64::NEG_INFINITY, high: f64::INFINITY, step: f64::INFINITY };
         }
-        use crate::diagnose::data::linear_form::Knob;
+        use crate::diagnose::data::linear_form::FreeParameter;
         let (low, high, step) = match self.fit.form.knobs[i] {
-            Knob::Gain => (-6.0, 6.0, 0.5),
-            Knob::Stiffness => (-50.0, 50.0, 5.0),
-            Knob::Viscous => (-50.0, 50.0, 5.0),
-            Knob::Delay => (-50.0, 50.0, 0.5),
-            Knob::Pole(_) | Knob::Zero(_) => (-0.25, 0.25, 0.02),
-            Knob::PoleDamping(_) => (-2.5, 2.5, 0.4),
-            Knob::ZeroDamping(_) => (-20.0, 20.0, 0.5),
+            FreeParameter::Gain => (-6.0, 6.0, 0.5),
+            FreeParameter::Stiffness => (-50.0, 50.0, 5.0),
+            FreeParameter::Viscous => (-50.0, 50.0, 5.0),
+            FreeParameter::Delay => (-50.0, 50.0, 0.5),
+            FreeParameter::Pole(_) | FreeParameter::Zero(_) => (-0.25, 0.25, 0.02),
+            FreeParameter::PoleDamping(_) => (-2.5, 2.5, 0.4),
+            FreeParameter::ZeroDamping(_) => (-20.0, 20.0, 0.5),
         };
         Limit { low, high, step }
     }
@@ -238,15 +238,15 @@ impl Fit<'_> {
     }
 
     /// Directions of each record's own start, constant torque and lines, and of what the effects may begin it in.
-    pub fn local_basis(&self) -> Basis {
+    pub fn local_basis(&self) -> NuisanceBasis {
         let mut basis = self.plain_basis();
         let chosen: Vec<&AnyLaw> = self.chosen.iter().map(|c| &c.setting.law).collect();
         self.free(&chosen).into_iter().for_each(|(start, c)| basis.add_local(start, c));
         basis
     }
 
-    fn plain_basis(&self) -> Basis {
-        let mut basis = Basis::default();
+    fn plain_basis(&self) -> NuisanceBasis {
+        let mut basis = NuisanceBasis::default();
         for (s, run) in self.stack.segments.iter().zip(self.means) {
             let t = self.scene.sample_time_s;
             let lines = self.lines.iter().flat_map(|l| l.columns(run, t));
@@ -330,7 +330,7 @@ impl Fit<'_> {
 
     /// The whitened error at `p` with every direction of the fit taken out of it, and those directions: each record's own,
     /// the linear parameters, and the chosen effects.
-    pub fn screen_basis(&self, p: &[f64]) -> (Vec<f64>, Basis) {
+    pub fn screen_basis(&self, p: &[f64]) -> (Vec<f64>, NuisanceBasis) {
         let mut problem = self.problem();
         let x = self.start(p, &problem);
         problem.keep(&x);

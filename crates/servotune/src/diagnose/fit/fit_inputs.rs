@@ -1,10 +1,10 @@
 //! What a refit works on.
 
-use super::selected_effect::Chosen;
+use super::selected_effect::SelectedEffect;
 use super::trajectory::Trajectory;
 use crate::diagnose::data::linear_form::LinearForm;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::data::stacked_records::Stack;
+use crate::diagnose::data::stacked_records::StackedRecords;
 use crate::diagnose::noise::lines::Line;
 use crate::diagnose::noise::whitening::Whitener;
 use crate::physics::Scene;
@@ -20,11 +20,11 @@ pub struct Fit<'a> {
     /// The filter.
     pub whitener: &'a Whitener,
     /// How they are stacked.
-    pub stack: &'a Stack,
+    pub stack: &'a StackedRecords,
     /// Lines of a phase of their own in every record.
     pub lines: &'a [Line],
     /// Machine and size of its motion.
     pub scene: &'a Scene,
     /// Effects in the model.
-    pub chosen: Vec<Chosen>,
+    pub chosen: Vec<SelectedEffect>,
 }

@@ -1,18 +1,18 @@
 //! A model fitted to the records, and the linear refit from which the search sets out.
 //!
-//! In: a bench, effects, where to begin. Out: the model with its cost, likelihood and freedom.
+//! In: the diagnosis data, effects, where to begin. Out: the model with its cost, likelihood and freedom.
 
-use super::diagnosis_data::Bench;
+use super::diagnosis_data::DiagnosisData;
 use super::differing_repeats::differing;
 use super::model::Model;
-use super::selected_effect::Chosen;
-use crate::diagnose::data::linear_form::Knob;
+use super::selected_effect::SelectedEffect;
+use crate::diagnose::data::linear_form::FreeParameter;
 use crate::physics::AnyLaw;
 use rayon::prelude::*;
 use std::f64::consts::LN_2;
 
 /// Numbers of each record's own that an effect brings with it: motions that a record may begin in.
-pub(in crate::diagnose) fn begun(bench: &Bench, law: &AnyLaw) -> usize {
+pub(in crate::diagnose) fn begun(bench: &DiagnosisData, law: &AnyLaw) -> usize {
     law.free_motions(&bench.scene, 1).len() * bench.stack.segments.len()
 }
 
@@ -21,7 +21,12 @@ const SETTLING: usize = 8;
 /// Change of the linear parameters, relative or in samples, below which they have settled.
 const SETTLED: f64 = 1e-3;
 
-pub(in crate::diagnose) fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64], iterations: usize) -> Model {
+pub(in crate::diagnose) fn fitted(
+    bench: &DiagnosisData,
+    chosen: Vec<SelectedEffect>,
+    p: &[f64],
+    iterations: usize,
+) -> Model {
     let mut fit = bench.fit(chosen);
     let refitted = fit.refit(p, iterations);
     let chosen = fit.chosen;
@@ -36,7 +41,7 @@ pub(in crate::diagnose) fn fitted(bench: &Bench, chosen: Vec<Chosen>, p: &[f64],
 }
 
 /// A model with the noise that it leaves, where no repeat tells what noise is.
-pub(in crate::diagnose) fn settled(bench: &Bench, model: Model, iterations: usize) -> Model {
+pub(in crate::diagnose) fn settled(bench: &DiagnosisData, model: Model, iterations: usize) -> Model {
     let mut own = bench.clone();
     own.renew(&model.refitted.p, &model.chosen);
     fitted(&own, model.chosen, &model.refitted.p, iterations)
@@ -44,7 +49,7 @@ pub(in crate::diagnose) fn settled(bench: &Bench, model: Model, iterations: usiz
 
 /// What the last effect of a model takes under the noise that the model leaves, where no repeat tells what noise is: fall of the sum of
 /// squares. Another noise for each of two models may tell them apart where their errors do not.
-pub(in crate::diagnose) fn taken_by_last(bench: &Bench, model: &Model, iterations: usize) -> f64 {
+pub(in crate::diagnose) fn taken_by_last(bench: &DiagnosisData, model: &Model, iterations: usize) -> f64 {
     let mut own = bench.clone();
     own.renew(&model.refitted.p, &model.chosen);
     let p = &model.refitted.p;
@@ -58,7 +63,12 @@ pub(in crate::diagnose) fn taken_by_last(bench: &Bench, model: &Model, iteration
 const TRIAL: usize = 3;
 
 /// The better of a fit from where the search stands and one from the given plant.
-pub(in crate::diagnose) fn fitted_from_both(bench: &Bench, chosen: &[Chosen], p: &[f64], iterations: usize) -> Model {
+pub(in crate::diagnose) fn fitted_from_both(
+    bench: &DiagnosisData,
+    chosen: &[SelectedEffect],
+    p: &[f64],
+    iterations: usize,
+) -> Model {
     let first = iterations.div_ceil(TRIAL);
     let on = |m: Model| match m.refitted.converged {
         true => m,
@@ -89,11 +99,11 @@ const TO_A_DOUBLING: usize = 4;
 
 /// The given plant with the delay or the gain at which it fits best, where that is not its own: a log that slipped by many samples, or is in
 /// other units, is too far for a method that goes downhill.
-fn far(bench: &Bench, knob: Knob) -> Option<Vec<f64>> {
+fn far(bench: &DiagnosisData, knob: FreeParameter) -> Option<Vec<f64>> {
     let knobs = &bench.form.knobs;
     let at = knobs.iter().position(|k| *k == knob)?;
     let values: Vec<f64> = match knob {
-        Knob::Delay => (1..=FARTHEST / STRIDE).map(|i| (i * STRIDE) as f64).collect(),
+        FreeParameter::Delay => (1..=FARTHEST / STRIDE).map(|i| (i * STRIDE) as f64).collect(),
         _ => {
             let steps = (MOST_GAIN.log2() * TO_A_DOUBLING as f64) as i32;
             (-steps..=steps).filter(|i| *i != 0).map(|i| f64::from(i) / TO_A_DOUBLING as f64 * LN_2).collect()
@@ -118,7 +128,7 @@ const ON: usize = 6;
 const CREEP: f64 = 0.01;
 
 /// A linear refit that goes on until it meets its tolerance or only creeps.
-fn to_its_end(bench: &Bench, mut model: Model, iterations: usize) -> Model {
+fn to_its_end(bench: &DiagnosisData, mut model: Model, iterations: usize) -> Model {
     for _ in 0..ON {
         if model.refitted.converged {
             break;
@@ -133,16 +143,16 @@ fn to_its_end(bench: &Bench, mut model: Model, iterations: usize) -> Model {
 }
 
 /// The linear refit from the given plant.
-pub fn refit(bench: &mut Bench, iterations: usize) -> Model {
+pub fn refit(bench: &mut DiagnosisData, iterations: usize) -> Model {
     let given = vec![0.0; bench.form.knobs.len()];
     refit_from(bench, &given, iterations)
 }
 
 /// The linear refit. A refit moves the motion that it was made along: once more, from there. Without repeats it moves the noise
 /// too.
-pub(in crate::diagnose) fn refit_from(bench: &mut Bench, start: &[f64], iterations: usize) -> Model {
+pub(in crate::diagnose) fn refit_from(bench: &mut DiagnosisData, start: &[f64], iterations: usize) -> Model {
     let mut baseline = to_its_end(bench, fitted(bench, vec![], start, iterations), iterations);
-    for knob in [Knob::Delay, Knob::Gain] {
+    for knob in [FreeParameter::Delay, FreeParameter::Gain] {
         let Some(start) = Some(&baseline).filter(|b| b.excess_sigma() > FAR_OFF).and_then(|_| far(bench, knob)) else {
             continue;
         };

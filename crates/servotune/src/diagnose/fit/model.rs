@@ -4,13 +4,13 @@
 //! under noise alone. Spec: `specs/mismatch.md`.
 
 use super::equation_error_fit::Refitted;
-use super::selected_effect::Chosen;
+use super::selected_effect::SelectedEffect;
 
 /// A model that was fitted: effects, linear parameters and what is left.
 #[derive(Clone)]
 pub struct Model {
     /// Effects.
-    pub chosen: Vec<Chosen>,
+    pub chosen: Vec<SelectedEffect>,
     /// Where the refit ended.
     pub refitted: Refitted,
     /// Sum of squares of the whitened error.

@@ -7,12 +7,12 @@
 //! Every repeat is simulated under its own command, and the errors are averaged then: noise that the controller sends into the motor
 //! shakes a drag loose at every reversal, and a mean command shakes less.
 
-use super::diagnosis_data::Bench;
+use super::diagnosis_data::DiagnosisData;
 use super::equation_error_fit::Refitted;
 use super::model::Model;
 use super::output_error_problem::{Problem, places};
 use super::simulation::size;
-use crate::diagnose::data::linear_form::Knob;
+use crate::diagnose::data::linear_form::FreeParameter;
 use crate::diagnose::rules::{RUNS_AWAY, SIMULATION_SILENT};
 use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
 
@@ -28,7 +28,7 @@ const FURTHER: f64 = 3e-4;
 const UNSETTLED: f64 = 5.0;
 
 /// The whitened simulation error of a model, stacked, each segment's own directions taken out.
-pub(in crate::diagnose) fn simulation_error(bench: &Bench, model: &Model) -> Vec<f64> {
+pub(in crate::diagnose) fn simulation_error(bench: &DiagnosisData, model: &Model) -> Vec<f64> {
     let mut problem = Problem::whitened_error(bench, model);
     let x = problem.start();
     problem.settle(&x)
@@ -37,9 +37,9 @@ pub(in crate::diagnose) fn simulation_error(bench: &Bench, model: &Model) -> Vec
 /// The least simulation error of the model with only some of its body and delay free, all else of the linear plant as given: sum of
 /// squares and linear parameters.
 pub(in crate::diagnose) fn simulated_with(
-    bench: &Bench,
+    bench: &DiagnosisData,
     model: &Model,
-    keep: impl Fn(Knob) -> bool,
+    keep: impl Fn(FreeParameter) -> bool,
 ) -> (f64, Vec<f64>) {
     let mut start = model.clone();
     let kept = |i: usize| keep(bench.form.knobs[i]);
@@ -57,7 +57,7 @@ pub(in crate::diagnose) fn simulated_with(
 ///
 /// Modes stay where the search left them, and along a noisy motion they may have taken what a drag owes. Where the fit does not come down
 /// to the noise, one from the linear parameters as given is made beside it: the better counts.
-pub(in crate::diagnose) fn simulated(bench: &Bench, model: &Model) -> Option<Model> {
+pub(in crate::diagnose) fn simulated(bench: &DiagnosisData, model: &Model) -> Option<Model> {
     let found = descended(bench, model);
     if found.as_ref().unwrap_or(model).excess_sigma() < UNSETTLED {
         return found;
@@ -69,7 +69,7 @@ pub(in crate::diagnose) fn simulated(bench: &Bench, model: &Model) -> Option<Mod
 }
 
 /// The fit by simulation from where a model stands.
-fn descended(bench: &Bench, model: &Model) -> Option<Model> {
+fn descended(bench: &DiagnosisData, model: &Model) -> Option<Model> {
     if model.chosen.is_empty() {
         return None;
     }

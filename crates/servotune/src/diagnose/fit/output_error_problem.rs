@@ -4,15 +4,15 @@
 //! reported, in closed loop where the loop is known; and its slopes.
 
 use super::corrected_model::corrected;
-use super::diagnosis_data::Bench;
+use super::diagnosis_data::DiagnosisData;
 use super::model::Model;
-use super::selected_effect::Chosen;
+use super::selected_effect::SelectedEffect;
 use super::simulation::size;
-use super::simulation::{Begun, Judged, Started};
+use super::simulation::{Begun, SimulatedModel, Started};
 use crate::controller::Law;
-use crate::diagnose::data::linear_form::Knob;
+use crate::diagnose::data::linear_form::FreeParameter;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::data::stacked_records::{Basis, Segment};
+use crate::diagnose::data::stacked_records::{NuisanceBasis, Segment};
 use crate::diagnose::noise::lines::Line;
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
 use rayon::prelude::*;
@@ -43,13 +43,13 @@ pub(in crate::diagnose) enum Error<'a> {
 
 /// A fit by simulation.
 pub(in crate::diagnose) struct Problem<'a> {
-    bench: &'a Bench,
+    bench: &'a DiagnosisData,
     model: &'a Model,
     error: Error<'a>,
     pub free: Free,
     /// Where each stretch of the error stands.
     layout: Vec<Segment>,
-    local: Basis,
+    local: NuisanceBasis,
     /// Every record of every segment.
     records: Vec<Record<'a>>,
 }
@@ -83,7 +83,7 @@ impl Problem<'_> {
     }
 
     /// Linear parameters and effects of these numbers.
-    pub fn unpack(&self, x: &[f64]) -> (Vec<f64>, Vec<Chosen>) {
+    pub fn unpack(&self, x: &[f64]) -> (Vec<f64>, Vec<SelectedEffect>) {
         let (mut p, mut chosen) = (self.model.refitted.p.clone(), self.model.chosen.clone());
         let (knobs, rest) = x.split_at(self.free.knobs.len());
         let (strengths, numbers) = rest.split_at(self.free.strengths.len());
@@ -116,12 +116,12 @@ impl Problem<'_> {
     }
 
     /// Does something with every record under the model at `x`, in parallel.
-    fn each<T: Send>(&self, x: &[f64], of: impl Fn(&Record, &Judged) -> T + Sync) -> Vec<T> {
+    fn each<T: Send>(&self, x: &[f64], of: impl Fn(&Record, &SimulatedModel) -> T + Sync) -> Vec<T> {
         let bench = self.bench;
         let (p, chosen) = self.unpack(x);
         let made = corrected(&bench.form, &p, &chosen, &bench.scene);
         let own = chosen.iter().filter(|c| c.setting.facts().per_record);
-        let judged = Judged {
+        let judged = SimulatedModel {
             plant: &made.plant,
             effects: made.effects.iter().collect(),
             own: own.map(|c| &c.setting.law).collect(),
@@ -249,8 +249,10 @@ impl Residuals for Problem<'_> {
 
 impl<'a> Problem<'a> {
     /// The whitened error in open loop; modes stay.
-    pub fn whitened_error(bench: &'a Bench, model: &'a Model) -> Problem<'a> {
-        let body = |k: &Knob| matches!(k, Knob::Gain | Knob::Stiffness | Knob::Viscous | Knob::Delay);
+    pub fn whitened_error(bench: &'a DiagnosisData, model: &'a Model) -> Problem<'a> {
+        let body = |k: &FreeParameter| {
+            matches!(k, FreeParameter::Gain | FreeParameter::Stiffness | FreeParameter::Viscous | FreeParameter::Delay)
+        };
         let segments = &bench.stack.segments;
         let all = segments.iter().enumerate().flat_map(|(i, s)| s.runs.iter().map(move |&r| (i, r)));
         let record =
@@ -268,7 +270,7 @@ impl<'a> Problem<'a> {
 
     /// The plain error on these runs, each with the number of records that it stands for; everything is free.
     pub fn plain_error(
-        bench: &'a Bench,
+        bench: &'a DiagnosisData,
         model: &'a Model,
         law: Option<&'a Law<'a>>,
         runs: &[(&'a Run, usize)],
@@ -285,14 +287,14 @@ impl<'a> Problem<'a> {
             error: Error::Plain(law),
             free: Free::of(bench, model, |_| true),
             layout,
-            local: Basis::default(),
+            local: NuisanceBasis::default(),
             records: runs.iter().enumerate().map(|(i, (run, _))| Record::of(bench, model, run, i, 1.0)).collect(),
         }
     }
 }
 
 impl<'a> Record<'a> {
-    fn of(bench: &Bench, model: &Model, run: &'a Run, segment: usize, share: f64) -> Record<'a> {
+    fn of(bench: &DiagnosisData, model: &Model, run: &'a Run, segment: usize, share: f64) -> Record<'a> {
         let asked = !run.rested && !model.chosen.is_empty();
         let constant = asked.then(|| bench.constant_torque(run, model).ok()).flatten();
         Record { run, segment, share, start: vec![0.0; run.len()], felt: None, constant }
@@ -300,7 +302,7 @@ impl<'a> Record<'a> {
 }
 
 impl Free {
-    fn of(bench: &Bench, model: &Model, moves: impl Fn(&Knob) -> bool) -> Free {
+    fn of(bench: &DiagnosisData, model: &Model, moves: impl Fn(&FreeParameter) -> bool) -> Free {
         let knobs: Vec<usize> = (0..bench.form.knobs.len()).filter(|&i| moves(&bench.form.knobs[i])).collect();
         let (mut strengths, mut numbers) = (Vec::new(), Vec::new());
         for (e, c) in model.chosen.iter().enumerate() {
@@ -346,7 +348,7 @@ const TOLERANCE: f64 = 1e-5;
 
 /// The model fitted by the plain error from where it stands, on these runs, each with the number of records that it stands for.
 pub(in crate::diagnose) fn descended(
-    bench: &Bench,
+    bench: &DiagnosisData,
     model: &Model,
     law: Option<&Law>,
     runs: &[(&Run, usize)],

@@ -1,9 +1,9 @@
 //! The encoder's count as a part of the noise.
 
-use super::diagnosis_data::Bench;
+use super::diagnosis_data::DiagnosisData;
 use crate::diagnose::rules::COUNT_OF_NOISE;
 
-impl Bench {
+impl DiagnosisData {
     /// Whether the encoder's count makes a part of the noise that is worth a word.
     pub fn coarse(&self) -> bool {
         // Rounding to a grid makes noise of step/√12.

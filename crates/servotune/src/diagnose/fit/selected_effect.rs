@@ -4,7 +4,7 @@ use crate::physics::{Effect, Setting};
 
 /// An effect that is part of the model, with its numbers.
 #[derive(Clone)]
-pub struct Chosen {
+pub struct SelectedEffect {
     /// Its law, with numbers and strengths.
     pub setting: Setting,
     /// Which numbers of the law may be refined.
@@ -15,13 +15,13 @@ pub struct Chosen {
     pub step: usize,
 }
 
-impl std::fmt::Debug for Chosen {
+impl std::fmt::Debug for SelectedEffect {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} {:?}", self.setting.facts().name, self.setting)
     }
 }
 
-impl Chosen {
+impl SelectedEffect {
     /// The effect that it is one of.
     pub fn effect(&self) -> &'static dyn Effect {
         self.setting.law.effect()

@@ -3,10 +3,10 @@
 //! In: what repeats differ by, whitened. Out: the record, the time and the strength of the push. The mean over repeats would carry
 //! it into every fit and their spread would count it as noise, so such a record is kept out of both.
 
-use super::diagnosis_data::{Bench, without_start};
+use super::diagnosis_data::{DiagnosisData, without_start};
 use super::fitted_model::refit;
 use super::regressors::raw_columns;
-use super::simulation::{Judged, error};
+use super::simulation::{SimulatedModel, error};
 use super::trajectory::Trajectory;
 use crate::diagnose::data::linear_form::{Sampled, free_motions};
 use crate::diagnose::data::repeat_difference::Difference;
@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 /// A push that falls into one record.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bump {
+pub struct DetectedShock {
     /// Which run.
     pub run: usize,
     /// When it begins, from the start of the record (s).
@@ -55,7 +55,7 @@ struct Answer {
 }
 
 /// The answer to one push, over `n` samples.
-fn answer(bench: &Bench, sampled: &Sampled, n: usize, width_s: f64) -> Option<Answer> {
+fn answer(bench: &DiagnosisData, sampled: &Sampled, n: usize, width_s: f64) -> Option<Answer> {
     let t = bench.scene.sample_time_s;
     let samples = (0..n).map(|k| Sample { t: k as f64 * t, ..Sample::default() }).collect();
     let motion = Trajectory { samples, unexplained: Vec::new(), repeats: Vec::new() };
@@ -72,7 +72,7 @@ fn answer(bench: &Bench, sampled: &Sampled, n: usize, width_s: f64) -> Option<An
 }
 
 /// Answers to pushes of several lengths.
-fn answers(bench: &Bench, sampled: &Sampled, n: usize) -> Vec<Answer> {
+fn answers(bench: &DiagnosisData, sampled: &Sampled, n: usize) -> Vec<Answer> {
     let (low, high) = ((SHORTEST * n as f64).max(FEWEST), LONGEST * n as f64);
     let width = |i: usize| low * (high / low).powf(i as f64 / (WIDTHS - 1) as f64);
     if high <= low {
@@ -98,12 +98,12 @@ fn best(answers: &[Answer], x: &[f64], sigma: f64) -> Option<(f64, usize, usize,
 }
 
 /// The clearest push among the repeats that is at least suspected, if there is one.
-fn strongest(bench: &Bench) -> Option<Bump> {
+fn strongest(bench: &DiagnosisData) -> Option<DetectedShock> {
     let sampled = Sampled::of(&bench.form.given, bench.scene.sample_time_s).ok()?;
     let longest = bench.repeats.iter().map(|r| r.1.len()).max()?;
     let answers = answers(bench, &sampled, longest);
     let points: usize = answers.iter().map(|a| 4 * longest / a.samples.max(4)).sum::<usize>() * bench.repeats.len();
-    let mut found: Option<(f64, Bump)> = None;
+    let mut found: Option<(f64, DetectedShock)> = None;
     for (run, x) in &bench.repeats {
         let mates = bench.stack.segments.iter().find(|s| s.runs.contains(run)).map_or(0, |s| s.runs.len());
         if mates < 2 {
@@ -125,7 +125,7 @@ fn strongest(bench: &Bench) -> Option<Bump> {
             let t = bench.scene.sample_time_s;
             let answer = &answers[which];
             let error = sigma / (answer.energy[x.len() - from - 1].sqrt() * part);
-            let bump = Bump {
+            let shock = DetectedShock {
                 run: *run,
                 time_s: from as f64 * t,
                 width_s: answer.samples as f64 * t,
@@ -133,21 +133,21 @@ fn strongest(bench: &Bench) -> Option<Bump> {
                 gain,
                 log_p,
             };
-            found = Some((gain, bump));
+            found = Some((gain, shock));
         }
     }
-    let bump = found?.1;
-    Some(of_two(bench, &answers, bump))
+    let shock = found?.1;
+    Some(of_two(bench, &answers, shock))
 }
 
 /// Of two repeats each differs from the mean as much as the other: the bumped one is where the push shows beside the model.
-fn of_two(bench: &Bench, answers: &[Answer], bump: Bump) -> Bump {
-    let Some(at) = bench.stack.segments.iter().position(|s| s.runs.contains(&bump.run)) else { return bump };
-    let [a, b] = bench.stack.segments[at].runs[..] else { return bump };
+fn of_two(bench: &DiagnosisData, answers: &[Answer], shock: DetectedShock) -> DetectedShock {
+    let Some(at) = bench.stack.segments.iter().position(|s| s.runs.contains(&shock.run)) else { return shock };
+    let [a, b] = bench.stack.segments[at].runs[..] else { return shock };
     let t = bench.scene.sample_time_s;
-    let from = (bump.time_s / t).round() as usize;
-    let Some(answer) = answers.iter().min_by_key(|x| x.samples.abs_diff((bump.width_s / t).round() as usize)) else {
-        return bump;
+    let from = (shock.time_s / t).round() as usize;
+    let Some(answer) = answers.iter().min_by_key(|x| x.samples.abs_diff((shock.width_s / t).round() as usize)) else {
+        return shock;
     };
     let fit = bench.fit(vec![]);
     let along = |run: usize| -> f64 {
@@ -160,20 +160,20 @@ fn of_two(bench: &Bench, answers: &[Answer], bump: Bump) -> Bump {
         dot(&answer.whitened[..n], &e[from..]).abs()
     };
     let run = if along(a) > along(b) { a } else { b };
-    let sign = if run == bump.run { 1.0 } else { -1.0 };
-    Bump { run, peak: [sign * bump.peak[0], bump.peak[1]], ..bump }
+    let sign = if run == shock.run { 1.0 } else { -1.0 };
+    DetectedShock { run, peak: [sign * shock.peak[0], shock.peak[1]], ..shock }
 }
 
 /// The clearest push, if it is clear as it stands or once the noise is taken from the other records.
-fn clear(bench: &Bench, plant: &Plant, spindle_hz: Option<f64>) -> Option<Bump> {
-    let bump = strongest(bench)?;
-    if bump.log_p < PUSH_CHANCE.ln() {
-        return Some(bump);
+fn clear(bench: &DiagnosisData, plant: &Plant, spindle_hz: Option<f64>) -> Option<DetectedShock> {
+    let shock = strongest(bench)?;
+    if shock.log_p < PUSH_CHANCE.ln() {
+        return Some(shock);
     }
     let mut runs = bench.runs.clone();
-    runs[bump.run].bumped = true;
-    let without = Bench::new(plant, runs, bench.scene.sample_time_s, spindle_hz).ok()?;
-    let run = &without.runs[bump.run];
+    runs[shock.run].shocked = true;
+    let without = DiagnosisData::new(plant, runs, bench.scene.sample_time_s, spindle_hz).ok()?;
+    let run = &without.runs[shock.run];
     let mates = |s: &Segment| without.runs[s.runs[0]].group == run.group && s.len == run.len();
     let at = without.stack.segments.iter().position(mates).filter(|_| without.levels.from_repeats)?;
     let mut stand: Vec<Run> = without.means.clone();
@@ -183,23 +183,23 @@ fn clear(bench: &Bench, plant: &Plant, spindle_hz: Option<f64>) -> Option<Bump> 
     let [own, mean] = [&stand, &without.means].map(|runs| fit.errors_of(&p, runs).swap_remove(at));
     let apart: Vec<f64> = own.iter().zip(&mean).map(|(a, b)| a - b).collect();
     let free = |n: usize| free_motions(&without.form.given.body, without.scene.sample_time_s, n).to_vec();
-    let whitened = without_start(&[(bump.run, apart)], &free, &|x| without.whitener.apply(x)).swap_remove(0).1;
+    let whitened = without_start(&[(shock.run, apart)], &free, &|x| without.whitener.apply(x)).swap_remove(0).1;
     // The mean of the others has noise of its own.
-    let gain = bump.gain(&without, &whitened)? / (1.0 + 1.0 / without.stack.segments[at].runs.len() as f64);
-    let log_p = bump.log_p + log_tail(gain, 1) - log_tail(bump.gain, 1);
-    (log_p < PUSH_CHANCE.ln()).then_some(Bump { gain, log_p, ..bump })
+    let gain = shock.gain(&without, &whitened)? / (1.0 + 1.0 / without.stack.segments[at].runs.len() as f64);
+    let log_p = shock.log_p + log_tail(gain, 1) - log_tail(shock.gain, 1);
+    (log_p < PUSH_CHANCE.ln()).then_some(DetectedShock { gain, log_p, ..shock })
 }
 
-/// Finds records into which a push from outside falls, and makes the bench again without them.
+/// Finds records into which a push from outside falls, and makes the diagnosis data again without them.
 ///
 /// Looked for under the refitted plant: in a loop repeats differ in their commands too, and a wrong plant's answer to that difference
 /// looks like a push.
 pub(in crate::diagnose) fn set_aside(
-    bench: &mut Bench,
+    bench: &mut DiagnosisData,
     given: &Plant,
     spindle_hz: Option<f64>,
     iterations: usize,
-) -> Result<Vec<Bump>, LtiError> {
+) -> Result<Vec<DetectedShock>, LtiError> {
     // Around a plant that was cleared of a law that sticks, repeats differ by when it lets go.
     let sticks = bench.foretold.as_ref().is_some_and(|law| law.effect().is_hard_nonlinearity());
     if sticks || bench.repeats.is_empty() || strongest(bench).is_none() {
@@ -208,50 +208,55 @@ pub(in crate::diagnose) fn set_aside(
     let sample_time_s = bench.scene.sample_time_s;
     let most = (PUSHED_RECORDS * bench.fit_runs.len() as f64).floor().max(1.0) as usize;
     let plant = refit(&mut bench.clone(), iterations).refitted.plant;
-    let mut cleaner = Bench::new(&plant, bench.runs.clone(), sample_time_s, spindle_hz)?;
+    let mut cleaner = DiagnosisData::new(&plant, bench.runs.clone(), sample_time_s, spindle_hz)?;
     let mut found = Vec::new();
     while let Some(b) = clear(&cleaner, &plant, spindle_hz) {
         if found.len() == most || bent(&cleaner, &b) {
             return Ok(Vec::new());
         }
         let mut runs = cleaner.runs.clone();
-        runs[b.run].bumped = true;
+        runs[b.run].shocked = true;
         found.push(b);
-        cleaner = Bench::new(&plant, runs, sample_time_s, spindle_hz)?;
+        cleaner = DiagnosisData::new(&plant, runs, sample_time_s, spindle_hz)?;
     }
     if !found.is_empty() {
-        *bench = Bench::new(given, cleaner.runs, sample_time_s, spindle_hz)?;
+        *bench = DiagnosisData::new(given, cleaner.runs, sample_time_s, spindle_hz)?;
     }
     Ok(found)
 }
 
 /// Whether the repeats may differ by what an amplifier does to their commands: at a limit a peak more or less looks like a push.
-fn bent(bench: &Bench, bump: &Bump) -> bool {
+fn bent(bench: &DiagnosisData, shock: &DetectedShock) -> bool {
     let Ok(sampled) = Sampled::of(&bench.form.given, bench.scene.sample_time_s) else { return false };
     let explains = |e: &dyn Effect| {
         let gain = |law: &AnyLaw| Difference::of(bench, &sampled, law).gain();
         e.grid(&bench.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
     };
-    library().iter().filter(|e| e.is_hard_nonlinearity()).any(|e| explains(*e) > PUSH_BY_AMPLIFIER * bump.gain)
+    library().iter().filter(|e| e.is_hard_nonlinearity()).any(|e| explains(*e) > PUSH_BY_AMPLIFIER * shock.gain)
 }
 
 /// The pushes that the final model does not do without: at a limit or at the end of a slip repeats differ too, and look like pushes.
-pub(in crate::diagnose) fn beyond(bench: &Bench, bumps: Vec<Bump>, linear: &Judged, found: &Judged) -> Vec<Bump> {
-    let stays = |b: &Bump| {
+pub(in crate::diagnose) fn beyond(
+    bench: &DiagnosisData,
+    shocks: Vec<DetectedShock>,
+    linear: &SimulatedModel,
+    found: &SimulatedModel,
+) -> Vec<DetectedShock> {
+    let stays = |b: &DetectedShock| {
         let run = &bench.runs[b.run];
-        let left = |model: &Judged| {
+        let left = |model: &SimulatedModel| {
             let mut e = error(model, run, None).ok()?;
             bench.whitener.apply(&mut e);
             b.gain(bench, &e)
         };
         left(linear).zip(left(found)).is_none_or(|(before, after)| after > PUSH_STAYS * before)
     };
-    bumps.into_iter().filter(stays).collect()
+    shocks.into_iter().filter(stays).collect()
 }
 
-impl Bump {
+impl DetectedShock {
     /// What the push takes of a whitened error of its record: fall of the sum of squares.
-    fn gain(&self, bench: &Bench, error: &[f64]) -> Option<f64> {
+    fn gain(&self, bench: &DiagnosisData, error: &[f64]) -> Option<f64> {
         let sampled = Sampled::of(&bench.form.given, bench.scene.sample_time_s).ok()?;
         let from = (self.time_s / bench.scene.sample_time_s).round() as usize;
         let answer = answer(bench, &sampled, error.len(), self.width_s)?;

@@ -3,7 +3,7 @@
 //! Closed loop from reference and excitation where a controller is known and its law holds; open loop from the recorded
 //! command otherwise. The start of each record is estimated.
 
-use super::diagnosis_data::Bench;
+use super::diagnosis_data::DiagnosisData;
 use super::model::Model;
 use super::regressors::raw_columns;
 use super::trajectory::Trajectory;
@@ -29,7 +29,7 @@ pub enum Simulation {
 }
 
 /// A model to be judged.
-pub struct Judged<'a> {
+pub struct SimulatedModel<'a> {
     /// The plant.
     pub plant: &'a Plant,
     /// Its effects.
@@ -39,14 +39,14 @@ pub struct Judged<'a> {
     pub own: Vec<&'a AnyLaw>,
     /// Lines whose phase is each record's own.
     pub lines: &'a [Line],
-    /// The bench and the fit that the model comes from, for records that do not begin at rest: the constant torque on them is
+    /// The diagnosis data and the fit that the model comes from, for records that do not begin at rest: the constant torque on them is
     /// then found along the recorded motion.
-    pub fit: Option<(&'a Bench, &'a Model)>,
+    pub fit: Option<(&'a DiagnosisData, &'a Model)>,
     /// Machine and size of its motion.
     pub scene: &'a Scene,
 }
 
-impl Judged<'_> {
+impl SimulatedModel<'_> {
     /// The constant torque on a record that does not begin at rest, where laws feel it (command_unit).
     pub fn constant_torque(&self, run: &Run) -> Result<Option<f64>, LtiError> {
         let asked = self.fit.filter(|_| !run.rested && !self.effects.is_empty());
@@ -112,7 +112,7 @@ const NUDGE: f64 = 0.5;
 /// The machine starts at rest where the record does, the controller with the memory that the first recorded commands ask for;
 /// what is left of the start is taken out as free motions of body or loop, by least squares. Laws beyond the linear feel the
 /// start: with them the simulation is made again with the free motions in it, until they stay (Gauss and Newton).
-pub fn error(model: &Judged, run: &Run, closed: Option<&Law>) -> Result<Vec<f64>, LtiError> {
+pub fn error(model: &SimulatedModel, run: &Run, closed: Option<&Law>) -> Result<Vec<f64>, LtiError> {
     let constant = model.constant_torque(run)?;
     let begun = Begun::new(model, run, closed, constant)?;
     let rest = vec![0.0; run.len()];
@@ -148,7 +148,7 @@ pub struct Started {
 
 /// One record under one model, its start still to be found.
 pub struct Begun<'a> {
-    model: &'a Judged<'a>,
+    model: &'a SimulatedModel<'a>,
     run: &'a Run,
     closed: Option<&'a Law<'a>>,
     /// The constant torque on it (command_unit); none for a record that begins at rest.
@@ -162,7 +162,7 @@ pub struct Begun<'a> {
 impl<'a> Begun<'a> {
     /// Makes the motions that a start is made of.
     pub fn new(
-        model: &'a Judged<'a>,
+        model: &'a SimulatedModel<'a>,
         run: &'a Run,
         closed: Option<&'a Law<'a>>,
         constant: Option<f64>,
@@ -292,7 +292,7 @@ fn least_squares(columns: &[Vec<f64>], which: &[usize], series: &[f64]) -> Vec<f
 
 /// Recorded less simulated position with a free motion of the machine, the controller hearing noise of the sensor where it is given.
 fn simulate(
-    model: &Judged,
+    model: &SimulatedModel,
     run: &Run,
     closed: Option<&Law>,
     constant_torque: Option<f64>,
@@ -346,7 +346,7 @@ fn in_loop(plant: &DiscretePlant, law: &Law, disturbance: &[f64]) -> Vec<f64> {
 }
 
 /// Errors of several records; infinite where the simulation cannot run or runs away.
-pub fn errors(model: &Judged, runs: &[&Run], closed: Option<&Law>) -> Vec<Vec<f64>> {
+pub fn errors(model: &SimulatedModel, runs: &[&Run], closed: Option<&Law>) -> Vec<Vec<f64>> {
     runs.par_iter()
         .map(|run| {
             error(model, run, closed)

@@ -6,7 +6,7 @@
 
 use super::fit_inputs::Fit;
 use super::regressors::{Drive, Entering, entering};
-use crate::diagnose::data::linear_form::{Carrier, Knob, Sampled};
+use crate::diagnose::data::linear_form::{FreeParameter, NominalModel, Sampled};
 use crate::lti::TermAnswers;
 use crate::physics::Entry;
 
@@ -14,7 +14,7 @@ use crate::physics::Entry;
 pub(in crate::diagnose) struct Slopes<'a> {
     fit: &'a Fit<'a>,
     p: &'a [f64],
-    carrier: Carrier,
+    carrier: NominalModel,
     sampled: Sampled,
     drives: &'a [(&'a Drive, &'a [f64])],
     records: Vec<Answers>,
@@ -33,7 +33,13 @@ struct Answers {
 }
 
 impl Answers {
-    fn of(fit: &Fit, carrier: &Carrier, sampled: &Sampled, drives: &[(&Drive, &[f64])], segment: usize) -> Answers {
+    fn of(
+        fit: &Fit,
+        carrier: &NominalModel,
+        sampled: &Sampled,
+        drives: &[(&Drive, &[f64])],
+        segment: usize,
+    ) -> Answers {
         let run = &fit.means[segment];
         let Entering { command, torque, .. } = entering(drives, run, segment, None);
         let body = (carrier.spring != 0.0 || carrier.damper != 0.0)
@@ -74,14 +80,14 @@ impl<'a> Slopes<'a> {
         moved[i] += step;
         let there = self.fit.form.carrier(&moved);
         let here = &self.carrier;
-        if matches!(self.fit.form.knobs[i], Knob::Stiffness | Knob::Viscous) {
+        if matches!(self.fit.form.knobs[i], FreeParameter::Stiffness | FreeParameter::Viscous) {
             let [spring, damper] = [there.spring - here.spring, there.damper - here.damper].map(|d| -d / step);
-            let less = Carrier { spring, damper, ..there };
+            let less = NominalModel { spring, damper, ..there };
             let along = self.fit.trajectories.iter();
             return along.map(|t| self.answer(Entry::Torque, &less.torque(&t.samples))).collect();
         }
         // Gain and modes weigh spring and damper alike.
-        let weigh = |c: &Carrier| c.arm_over_record() * if c.spring != 0.0 { c.spring } else { c.damper };
+        let weigh = |c: &NominalModel| c.arm_over_record() * if c.spring != 0.0 { c.spring } else { c.damper };
         let body = if weigh(here) != 0.0 { weigh(&there) / weigh(here) } else { 1.0 };
         let Ok(sampled) = Sampled::of(&there.plant, self.fit.scene.sample_time_s) else {
             return self.records.iter().map(|r| vec![0.0; r.sum.len()]).collect();
@@ -125,9 +131,9 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::diagnose::data::run::Run;
-    use crate::diagnose::fit::diagnosis_data::Bench;
+    use crate::diagnose::fit::diagnosis_data::DiagnosisData;
     use crate::diagnose::fit::regressors::drive;
-    use crate::diagnose::fit::selected_effect::Chosen;
+    use crate::diagnose::fit::selected_effect::SelectedEffect;
     use crate::numeric::random::Random;
     use crate::physics::dead_band::DeadBand;
     use crate::physics::offset_drift::OffsetDrift;
@@ -163,7 +169,7 @@ mod tests {
             before: 0.0,
             origin: 0.0,
             rested: true,
-            bumped: false,
+            shocked: false,
             pes: None,
             spindle_rad: None,
             temperature: None,
@@ -177,7 +183,7 @@ mod tests {
         let controller = nominal_controller().unwrap();
         let scene = scene(&plant, controller.sample_time_s, 5.0, SAMPLES, 3e-3);
         let run = Run { position: vec![1e200; SAMPLES], rested: false, ..run(0, 1) };
-        let judged = crate::diagnose::fit::simulation::Judged {
+        let judged = crate::diagnose::fit::simulation::SimulatedModel {
             plant: &plant,
             effects: Vec::new(),
             own: Vec::new(),
@@ -190,10 +196,10 @@ mod tests {
         assert!(errors[0].iter().all(|e| *e == f64::INFINITY), "{:?}", &errors[0][..3]);
     }
 
-    fn chosen(law: impl Into<AnyLaw>, strengths: &[f64]) -> Chosen {
+    fn chosen(law: impl Into<AnyLaw>, strengths: &[f64]) -> SelectedEffect {
         let setting = Setting::new(law, strengths.to_vec());
         let count = setting.law.numbers().len();
-        Chosen { setting, continuous: vec![false; count], range: vec![[0.1, 10.0]; count], step: 0 }
+        SelectedEffect { setting, continuous: vec![false; count], range: vec![[0.1, 10.0]; count], step: 0 }
     }
 
     /// Against central differences of the simulation error, which is made without any of this.
@@ -202,7 +208,7 @@ mod tests {
         let plant = paper_machine(MachineClass::Tunable).unwrap();
         let t = nominal_controller().unwrap().sample_time_s;
         let runs = vec![run(0, 1), run(0, 2), run(1, 3), run(1, 4)];
-        let bench = Bench::new(&plant, runs, t, None).unwrap();
+        let bench = DiagnosisData::new(&plant, runs, t, None).unwrap();
         let laws = || {
             vec![
                 chosen(PivotFriction { sliding_length: 2.5, loading: Loading::Dahl }, &[0.012]),

@@ -1,7 +1,7 @@
 //! The missing law itself, where no name explains the records: a smooth curve at each port of the machine, estimated together with the
 //! linear plant by simulation; the one that foretells best what it was not fitted to.
 //!
-//! In: a bench, linear parameters to set out from. Out: the curve in its plain form with its errors, and how well it foretells.
+//! In: the diagnosis data, linear parameters to set out from. Out: the curve in its plain form with its errors, and how well it foretells.
 //! Spec: `specs/mismatch.md`, "Curves without a name".
 
 use super::gauge::{Plain, plain};
@@ -9,7 +9,7 @@ use super::left_out::LeftOut;
 use super::shape::Shape;
 use super::stretches::Stretches;
 use super::trial::Trial;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::rules::{CURVE_CLEARLY, CURVE_LAG, FOLD_NAMED, SECOND_CURVE};
 use crate::numeric::spline::{Spline, roughness_rows};
 use crate::physics::CurvePort;
@@ -95,7 +95,7 @@ fn better<'a>(a: Option<Foretelling<'a>>, b: Option<Foretelling<'a>>) -> Option<
 
 /// The best fit of a shape from several linear parameters.
 fn from_each<'a>(
-    bench: &'a Bench,
+    bench: &'a DiagnosisData,
     stretches: &'a Stretches,
     starts: &[Vec<f64>],
     shape: &Shape,
@@ -118,7 +118,7 @@ fn doubled(at: &[f64]) -> Vec<f64> {
 }
 
 /// The same curve over more knots, where it foretells clearly better: what acts at one place only falls between few.
-fn finer<'a>(bench: &'a Bench, ground: &'a Stretches, mut found: Foretelling<'a>) -> Foretelling<'a> {
+fn finer<'a>(bench: &'a DiagnosisData, ground: &'a Stretches, mut found: Foretelling<'a>) -> Foretelling<'a> {
     for _ in 0..FINER {
         let Shape::Curve(port, at, value) = &found.trial.shape else { break };
         if *port == CurvePort::SensorOverPosition {
@@ -138,8 +138,8 @@ fn finer<'a>(bench: &'a Bench, ground: &'a Stretches, mut found: Foretelling<'a>
 }
 
 /// Linear parameters with other gains: what is read may be a part of the motion only.
-fn other_gains(bench: &Bench, starts: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let gain = bench.form.knobs.iter().position(|k| *k == crate::diagnose::data::linear_form::Knob::Gain);
+fn other_gains(bench: &DiagnosisData, starts: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let gain = bench.form.knobs.iter().position(|k| *k == crate::diagnose::data::linear_form::FreeParameter::Gain);
     let moved = |p: &Vec<f64>, by: f64| {
         let mut p = p.clone();
         if let Some(i) = gain {
@@ -151,7 +151,7 @@ fn other_gains(bench: &Bench, starts: &[Vec<f64>]) -> Vec<Vec<f64>> {
 }
 
 /// Readings that fold or end at limits, each fitted from several starts.
-fn readings<'a>(bench: &'a Bench, stretches: &'a Stretches, starts: &[Vec<f64>]) -> Vec<Foretelling<'a>> {
+fn readings<'a>(bench: &'a DiagnosisData, stretches: &'a Stretches, starts: &[Vec<f64>]) -> Vec<Foretelling<'a>> {
     let mut all: Vec<f64> = stretches.runs.iter().flat_map(|r| r.position.iter().copied()).collect();
     all.sort_by(f64::total_cmp);
     let at = |share: f64| all.get((share * all.len() as f64) as usize).copied().unwrap_or(0.0);
@@ -175,7 +175,7 @@ fn readings<'a>(bench: &'a Bench, stretches: &'a Stretches, starts: &[Vec<f64>])
 
 /// The sensor's curve: from a straight one, and from the readings that fold or end.
 fn sensor<'a>(
-    bench: &'a Bench,
+    bench: &'a DiagnosisData,
     stretches: &'a Stretches,
     starts: &[Vec<f64>],
     readings: &[Foretelling<'a>],
@@ -204,14 +204,14 @@ fn sensor<'a>(
     bent.fold(straight, |best, b| better(best, Some(b)))
 }
 
-fn range(bench: &Bench) -> f64 {
+fn range(bench: &DiagnosisData) -> f64 {
     let all = bench.means.iter().flat_map(|r| &r.position);
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     high - low
 }
 
 /// Stretches for the linear plant and most ports, and for the sensor's curve.
-pub(in crate::diagnose) fn grounds(bench: &Bench) -> [Stretches; 2] {
+pub(in crate::diagnose) fn grounds(bench: &DiagnosisData) -> [Stretches; 2] {
     let plain = Stretches::of(bench);
     let one_place = plain.standing_alike();
     [plain, one_place]
@@ -219,7 +219,7 @@ pub(in crate::diagnose) fn grounds(bench: &Bench) -> [Stretches; 2] {
 
 /// Estimates the curve at every port and takes the best.
 pub(in crate::diagnose) fn estimated<'a>(
-    bench: &'a Bench,
+    bench: &'a DiagnosisData,
     [ground, one_place]: [&'a Stretches; 2],
     starts: &[Vec<f64>],
     progress: &mut dyn FnMut(&str),

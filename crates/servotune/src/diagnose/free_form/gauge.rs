@@ -4,8 +4,8 @@
 //! where the plant has a spring or a damper for it (the line of least squares over the samples); a gain has the mean 1; an amplifier gives 0
 //! for 0 and rises by 1 on the mean; a sensor rises or falls by 1 on the mean.
 
-use crate::diagnose::data::linear_form::{Knob, LinearForm, body_numbers, rate_of};
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::data::linear_form::{FreeParameter, LinearForm, body_numbers, rate_of};
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::numeric::spline::Spline;
 use crate::physics::CurvePort;
 use nalgebra::{DMatrix, DVector};
@@ -30,7 +30,7 @@ const LEAST: f64 = 1e-3;
 const LEFT: f64 = 0.02;
 
 /// How many samples lie near each knot; even for a sensor, behind whose curve nobody saw the arm.
-fn weights(bench: &Bench, port: CurvePort, at: &[f64]) -> Vec<f64> {
+fn weights(bench: &DiagnosisData, port: CurvePort, at: &[f64]) -> Vec<f64> {
     let mut count = vec![0.0; at.len()];
     if port == CurvePort::SensorOverPosition {
         count.fill(1.0);
@@ -50,11 +50,11 @@ fn weights(bench: &Bench, port: CurvePort, at: &[f64]) -> Vec<f64> {
 /// What a curve's line may move in the plant: knob and its change per slope.
 fn knob(form: &LinearForm, p: &[f64], port: CurvePort) -> Option<(usize, f64)> {
     let (b, k, _) = body_numbers(&form.given.body);
-    let ratio = form.knobs.iter().zip(p).find(|(k, _)| **k == Knob::Gain).map_or(1.0, |(_, v)| v.exp());
+    let ratio = form.knobs.iter().zip(p).find(|(k, _)| **k == FreeParameter::Gain).map_or(1.0, |(_, v)| v.exp());
     let gain = b * form.given.resonance_gain * ratio;
     let (wanted, unit) = match port {
-        CurvePort::TorqueOverPosition => (Knob::Stiffness, k),
-        CurvePort::TorqueOverVelocity => (Knob::Viscous, rate_of(&form.given.body)),
+        CurvePort::TorqueOverPosition => (FreeParameter::Stiffness, k),
+        CurvePort::TorqueOverVelocity => (FreeParameter::Viscous, rate_of(&form.given.body)),
         _ => return None,
     };
     form.knobs.iter().position(|k| *k == wanted).map(|i| (i, -gain / unit))
@@ -78,7 +78,7 @@ fn value_of(at: &[f64], x: f64) -> DVector<f64> {
 
 /// The plain form.
 pub(in crate::diagnose) fn plain(
-    bench: &Bench,
+    bench: &DiagnosisData,
     port: CurvePort,
     at: &[f64],
     value: &[f64],
@@ -91,7 +91,7 @@ pub(in crate::diagnose) fn plain(
     let ones = DVector::from_element(n, 1.0);
     let places = DVector::from_column_slice(at);
     let mut out = Plain { port, at: at.to_vec(), value: vec![], spread: vec![], weight: weight.clone(), p: p.to_vec() };
-    let gain = bench.form.knobs.iter().position(|k| *k == Knob::Gain);
+    let gain = bench.form.knobs.iter().position(|k| *k == FreeParameter::Gain);
     let slope = slope_of(at, &weight);
     let mut map = DMatrix::identity(n, n);
     let plain = match port {
@@ -137,7 +137,7 @@ pub(in crate::diagnose) fn plain(
 }
 
 /// Least value of the damping's knob.
-fn least_damping(bench: &Bench) -> f64 {
+fn least_damping(bench: &DiagnosisData) -> f64 {
     let (_, _, c) = body_numbers(&bench.form.given.body);
     -c / rate_of(&bench.form.given.body) + LEFT * f64::from(u8::from(c > 0.0)) * c / rate_of(&bench.form.given.body)
 }

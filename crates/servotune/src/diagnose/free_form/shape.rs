@@ -3,7 +3,7 @@
 //!
 //! In: numbers. Out: effects with their settings, as a machine takes them.
 
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::physics::amplifier_lag::AmplifierLag;
 use crate::physics::sensor_curve::SensorCurve;
 use crate::physics::{CurvePort, Setting};
@@ -64,7 +64,7 @@ impl Shape {
     }
 
     /// Knots of a curve at a port over the range of the records; none where nothing moves there.
-    pub fn knots(bench: &Bench, port: CurvePort) -> Option<Vec<f64>> {
+    pub fn knots(bench: &DiagnosisData, port: CurvePort) -> Option<Vec<f64>> {
         let arm = match port {
             CurvePort::AmplifierOverCommand | CurvePort::SensorOverPosition => 1.0,
             _ => bench.scene.arm_over_record(),

@@ -1,10 +1,10 @@
 //! The stretches of the records that a curve is estimated from: all mean runs where they are few, evenly spread pieces of them where
 //! they are many.
 //!
-//! In: a bench. Out: runs, and which of them are left out together.
+//! In: the diagnosis data. Out: runs, and which of them are left out together.
 
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 
 /// Most samples: a curve has a few dozen numbers, and every one of them costs a simulation of all samples at each step.
 const MOST: usize = 40_000;
@@ -46,8 +46,8 @@ fn piece(run: &Run, from: usize, to: usize, sample_time_s: f64) -> Run {
 }
 
 impl Stretches {
-    /// Of the mean runs of a bench.
-    pub fn of(bench: &Bench) -> Stretches {
+    /// Of the mean runs of the diagnosis data.
+    pub fn of(bench: &DiagnosisData) -> Stretches {
         let total: usize = bench.means.iter().map(Run::len).sum();
         let runs = if total <= MOST { bench.means.clone() } else { spread(&bench.means, total, bench) };
         let whole = runs.len() >= MANY;
@@ -84,7 +84,7 @@ impl Stretches {
 }
 
 /// Evenly spread pieces of long records.
-fn spread(means: &[Run], total: usize, bench: &Bench) -> Vec<Run> {
+fn spread(means: &[Run], total: usize, bench: &DiagnosisData) -> Vec<Run> {
     let share = MOST as f64 / total as f64;
     let mut all = Vec::new();
     for run in means {

@@ -6,10 +6,10 @@
 
 use super::shape::{Shape, effects};
 use super::stretches::Stretches;
-use crate::diagnose::data::linear_form::Knob;
+use crate::diagnose::data::linear_form::FreeParameter;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::diagnosis_data::Bench;
-use crate::diagnose::fit::simulation::{Begun, Judged};
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::simulation::{Begun, SimulatedModel};
 use crate::lti::{Body, Plant};
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
 use crate::numeric::spline::roughness_rows;
@@ -41,7 +41,7 @@ const LOOKED: usize = 64;
 /// A fit under way.
 #[derive(Clone)]
 pub(in crate::diagnose) struct Trial<'a> {
-    pub bench: &'a Bench,
+    pub bench: &'a DiagnosisData,
     pub stretches: &'a Stretches,
     /// All linear parameters; those that are not free stay as they stand here.
     pub p: Vec<f64>,
@@ -71,22 +71,24 @@ struct Made {
 }
 
 /// Linear parameters that the shape leaves free: what it can hold itself stays.
-fn knobs(bench: &Bench, shape: &Shape) -> Vec<usize> {
+fn knobs(bench: &DiagnosisData, shape: &Shape) -> Vec<usize> {
     let held = match shape {
-        Shape::Curve(CurvePort::TorqueOverPosition, ..) => Some(Knob::Stiffness),
-        Shape::Curve(CurvePort::TorqueOverVelocity, ..) => Some(Knob::Viscous),
-        Shape::Curve(..) => Some(Knob::Gain),
+        Shape::Curve(CurvePort::TorqueOverPosition, ..) => Some(FreeParameter::Stiffness),
+        Shape::Curve(CurvePort::TorqueOverVelocity, ..) => Some(FreeParameter::Viscous),
+        Shape::Curve(..) => Some(FreeParameter::Gain),
         _ => None,
     };
     let few = bench.form.knobs.len() <= FEW;
-    let body = |k: Knob| matches!(k, Knob::Gain | Knob::Stiffness | Knob::Viscous | Knob::Delay);
+    let body = |k: FreeParameter| {
+        matches!(k, FreeParameter::Gain | FreeParameter::Stiffness | FreeParameter::Viscous | FreeParameter::Delay)
+    };
     let all = bench.form.knobs.iter().enumerate();
     all.filter(|(_, k)| Some(**k) != held && (few || body(**k))).map(|(i, _)| i).collect()
 }
 
 impl<'a> Trial<'a> {
     /// A fit from these linear parameters.
-    pub fn new(bench: &'a Bench, stretches: &'a Stretches, p: &[f64], shape: Shape) -> Trial<'a> {
+    pub fn new(bench: &'a DiagnosisData, stretches: &'a Stretches, p: &[f64], shape: Shape) -> Trial<'a> {
         Trial {
             bench,
             stretches,
@@ -157,12 +159,13 @@ impl<'a> Trial<'a> {
     }
 
     /// Does something with every stretch under the model at `x`, in parallel.
-    fn each<T: Send>(&self, x: &[f64], of: impl Fn(usize, &Run, &Judged) -> T + Sync) -> Vec<T> {
+    fn each<T: Send>(&self, x: &[f64], of: impl Fn(usize, &Run, &SimulatedModel) -> T + Sync) -> Vec<T> {
         let made = self.made(x);
         let effects = || made.effects.iter().collect();
         let scene = &self.bench.scene;
         let one = |(i, run): (usize, &Run)| {
-            let judged = Judged { plant: &made.plant, effects: effects(), own: vec![], lines: &[], fit: None, scene };
+            let judged =
+                SimulatedModel { plant: &made.plant, effects: effects(), own: vec![], lines: &[], fit: None, scene };
             of(i, run, &judged)
         };
         self.stretches.runs.par_iter().enumerate().map(one).collect()
@@ -312,7 +315,7 @@ fn seen(all: &[Vec<f64>], reads: bool) -> Vec<Vec<f64>> {
 }
 
 /// Places of the arm, less where it stood, from which a record may begin.
-fn start_places(judged: &Judged, run: &Run, reads: bool) -> Vec<f64> {
+fn start_places(judged: &SimulatedModel, run: &Run, reads: bool) -> Vec<f64> {
     let mut all = vec![0.0];
     let Some(setting) = judged.effects.last().filter(|_| reads) else { return all };
     let law = setting.law.in_motion(judged.scene);

@@ -6,7 +6,7 @@
 
 use super::chance::log_tail;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::data::stacked_records::Basis;
+use crate::diagnose::data::stacked_records::NuisanceBasis;
 use crate::diagnose::rules::{LINE_CHANCE, LINE_SNAP};
 use crate::diagnose::rules::{MAINS_MULTIPLES, MAINS_OFF_HZ};
 use crate::numeric::golden::golden_section;
@@ -43,7 +43,7 @@ impl Line {
 
     /// The line in part of `error`, fitted beside free motions of the body over that part: its cosine and sine.
     pub fn fit(&self, run: &Run, over: Range<usize>, free: &[Vec<f64>], sample_time_s: f64, error: &[f64]) -> [f64; 2] {
-        let mut basis = Basis::default();
+        let mut basis = NuisanceBasis::default();
         free.iter().for_each(|c| basis.add_local(0, c.clone()));
         let mut e = error[over.clone()].to_vec();
         basis.project(&mut e);

@@ -84,7 +84,7 @@ fn mixture(p: &Periodogram, sample_time_s: f64, gain: &dyn Fn(f64) -> f64, corne
 }
 
 /// Torque noise that repeats show clearly. No mismatch by itself: every machine has some, and the model says nothing of it.
-pub(in crate::diagnose) struct Unrest {
+pub(in crate::diagnose) struct TorqueNoise {
     pub rms_command: f64,
     pub corner_hz: f64,
     /// Corners that the spectrum does not tell from that one.
@@ -95,7 +95,7 @@ pub(in crate::diagnose) struct Unrest {
     pub ahead: f64,
 }
 
-impl Unrest {
+impl TorqueNoise {
     /// In a sentence.
     pub fn says(&self, command_unit: &str) -> String {
         format!(
@@ -106,12 +106,12 @@ impl Unrest {
 }
 
 /// Torque noise, where whitened differences of repeats show it clearly.
-pub(in crate::diagnose) fn unrest(
+pub(in crate::diagnose) fn torque_noise(
     repeats: &[(usize, Vec<f64>)],
     whitener: &Whitener,
     given: &Plant,
     sample_time_s: f64,
-) -> Option<Unrest> {
+) -> Option<TorqueNoise> {
     if repeats.is_empty() {
         return None;
     }
@@ -144,7 +144,7 @@ pub(in crate::diagnose) fn unrest(
     // Neighbours that were not tried may be as good.
     let corners_hz = [low * (-STEP).exp(), high * STEP.exp()];
     let bins: f64 = p.w_rad_s.iter().zip(&p.count).filter(|(w, _)| **w < TAU * 3.0 * best.corner_hz).map(|b| b.1).sum();
-    Some(Unrest {
+    Some(TorqueNoise {
         rms_command: best.parts[1].sqrt(),
         corner_hz: best.corner_hz,
         corners_hz,

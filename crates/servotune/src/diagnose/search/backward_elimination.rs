@@ -4,19 +4,19 @@ use super::rival::more;
 use super::rival_model::Rival;
 use super::selection::{Step, gain_of};
 use super::step_scan::scan_at;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::begun;
 use crate::diagnose::fit::fitted_model::{fitted, fitted_from_both};
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_fit::simulated;
-use crate::diagnose::fit::selected_effect::Chosen;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::rules::{
     OWN_OF_RECORD, RIVAL_BETTER, RIVAL_TRIED, RIVAL_TRIED_WITHOUT_REPEATS, SECOND_ADDS, SMALL_BESIDE_DRAG,
 };
 use crate::physics::{Effect, library};
 
 /// Takes effects out again that later ones made needless.
-pub(super) fn prune(bench: &Bench, model: &mut Model, before: f64, iterations: usize) {
+pub(super) fn prune(bench: &DiagnosisData, model: &mut Model, before: f64, iterations: usize) {
     let price = (bench.stack.total as f64).ln();
     while model.chosen.len() > 1 {
         let without = |i: usize| {
@@ -38,7 +38,7 @@ pub(super) fn prune(bench: &Bench, model: &mut Model, before: f64, iterations: u
 /// Takes out what stands beside a drag only because the drag's column, made along a noisy motion, falls short of the drag: simulated,
 /// the model does without.
 pub(super) fn spare(
-    bench: &Bench,
+    bench: &DiagnosisData,
     model: &mut Model,
     by_simulation: &mut Model,
     rivals: &mut Vec<Vec<Rival>>,
@@ -46,9 +46,9 @@ pub(super) fn spare(
     before: f64,
     iterations: usize,
 ) {
-    let drag = |c: &Chosen| c.effect().is_drag();
+    let drag = |c: &SelectedEffect| c.effect().is_drag();
     let most = model.chosen.iter().map(|c| gain_of(steps, c)).fold(0.0, f64::max);
-    let small = |c: &Chosen| gain_of(steps, c) < SMALL_BESIDE_DRAG * most;
+    let small = |c: &SelectedEffect| gain_of(steps, c) < SMALL_BESIDE_DRAG * most;
     let price = (bench.stack.total as f64).ln();
     while model.chosen.len() > 1 && model.chosen.iter().any(drag) {
         let mut without = Vec::new();
@@ -75,19 +75,26 @@ pub(super) fn spare(
 const FORMS: usize = 2;
 
 /// What tells two forms of one law apart: how many numbers they have, and which of several things they are.
-fn form(c: &Chosen) -> (&'static str, usize, usize) {
+fn form(c: &SelectedEffect) -> (&'static str, usize, usize) {
     (c.setting.facts().name, c.numbers(), c.setting.law.member())
 }
 
 /// Laws that may stand in the place of effect `at`, simpler forms of its own first: those that came near it in its own step, and where
 /// other laws stand beside it than did then, those it is confused with that explain as much beside these.
-fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, iterations: usize) -> Vec<Chosen> {
+fn others(
+    bench: &DiagnosisData,
+    model: &Model,
+    at: usize,
+    step: &Step,
+    gain: f64,
+    iterations: usize,
+) -> Vec<SelectedEffect> {
     let near = if bench.levels.from_repeats { RIVAL_TRIED } else { RIVAL_TRIED_WITHOUT_REPEATS };
     let own = &model.chosen[at];
     let facts = own.setting.facts();
-    let in_place = |c: &Chosen| Chosen { step: own.step, ..c.clone() };
+    let in_place = |c: &SelectedEffect| SelectedEffect { step: own.step, ..c.clone() };
     let close = step.tried.iter().filter(|(_, tried)| step.before - tried.evidence >= near * gain);
-    let mut all: Vec<Chosen> = close.filter_map(|(_, tried)| tried.chosen.last()).map(in_place).collect();
+    let mut all: Vec<SelectedEffect> = close.filter_map(|(_, tried)| tried.chosen.last()).map(in_place).collect();
     let mut company = model.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| c.setting.facts().name);
     let before = step.tried.first().and_then(|(_, t)| t.chosen.split_last()).map_or(&[][..], |(_, rest)| rest);
     // Whether the step in which it was taken had the same others beside it.
@@ -105,7 +112,7 @@ fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, itera
         let seen = scan_at(bench, &alike, &without, &without.refitted.p);
         let close = seen.iter().filter(|c| c.gain >= near * (without.cost - model.cost));
         let possible = close.filter(|c| c.setting.is_possible(&[]));
-        let mut afresh: Vec<(f64, Chosen)> = possible.map(|c| (c.gain, c.chosen(own.step))).collect();
+        let mut afresh: Vec<(f64, SelectedEffect)> = possible.map(|c| (c.gain, c.chosen(own.step))).collect();
         afresh.sort_by(|a, b| b.0.total_cmp(&a.0));
         for (_, c) in afresh {
             let forms = all.iter().filter(|o| o.setting.facts().name == c.setting.facts().name).count();
@@ -114,7 +121,7 @@ fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, itera
             }
         }
     }
-    let stays = |c: &Chosen| match c.setting.facts().name {
+    let stays = |c: &SelectedEffect| match c.setting.facts().name {
         name if name == facts.name => form(c) != form(own),
         name => model.chosen.iter().all(|m| m.setting.facts().name != name),
     };
@@ -124,7 +131,7 @@ fn others(bench: &Bench, model: &Model, at: usize, step: &Step, gain: f64, itera
 }
 
 /// Tries the rivals of each effect in its place, everything else refitted, and takes them where they fit better now.
-pub(super) fn exchange(bench: &Bench, model: &mut Model, steps: &[Step], iterations: usize) -> Vec<Vec<Rival>> {
+pub(super) fn exchange(bench: &DiagnosisData, model: &mut Model, steps: &[Step], iterations: usize) -> Vec<Vec<Rival>> {
     let mut all = Vec::new();
     for at in 0..model.chosen.len() {
         let step = &steps[model.chosen[at].step];

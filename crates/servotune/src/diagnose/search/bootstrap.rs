@@ -1,6 +1,6 @@
 //! How often the search finds something where nothing is: the whole first search on records made from the linear refit and its noise.
 //!
-//! In: the bench as it stood before the search, and the linear refit. Each draw simulates every mean record by the refitted plant, adds
+//! In: the diagnosis data as it stood before the search, and the linear refit. Each draw simulates every mean record by the refitted plant, adds
 //! coloured noise of the measured levels, refits the linear parameters, smooths the motion anew and scans the whole library. The
 //! statistic is the smallest chance of any candidate, as the search weighs it (parametric bootstrap of a maximum; Davison &
 //! Hinkley 1997, ch. 4). Spec: `specs/mismatch.md`.
@@ -8,10 +8,10 @@
 use super::bootstrap_chance::Bootstrap;
 use super::shortlist::strongest;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit_from;
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::simulation::{Judged, error};
+use crate::diagnose::fit::simulation::{SimulatedModel, error};
 use crate::numeric::random::Random;
 use crate::physics::Effect;
 use rayon::prelude::*;
@@ -21,7 +21,7 @@ const SEED: u64 = 0x5ca1_ab1e;
 
 /// Runs the search on `draws` records without physics; `limit` is the chance below which a candidate counts as seen.
 pub(in crate::diagnose) fn bootstrap(
-    bench: &Bench,
+    bench: &DiagnosisData,
     library: &[&'static dyn Effect],
     baseline: &Model,
     iterations: usize,
@@ -31,8 +31,14 @@ pub(in crate::diagnose) fn bootstrap(
     let observed_log_p = strongest(bench, library, baseline);
     // Simulated by the refitted plant itself: what it answers along the recorded motion holds what is wrong with that motion.
     let refitted = &baseline.refitted.plant;
-    let model =
-        Judged { plant: refitted, effects: Vec::new(), own: Vec::new(), lines: &[], fit: None, scene: &bench.scene };
+    let model = SimulatedModel {
+        plant: refitted,
+        effects: Vec::new(),
+        own: Vec::new(),
+        lines: &[],
+        fit: None,
+        scene: &bench.scene,
+    };
     let along = bench.fit(vec![]).errors(&baseline.refitted.p);
     let simulated = |(run, along): (&Run, Vec<f64>)| error(&model, run, None).unwrap_or(along);
     let errors: Vec<Vec<f64>> = bench.means.iter().zip(along).map(simulated).collect();

@@ -1,6 +1,6 @@
 //! The best that one effect can do for the error of a model.
 
-use crate::diagnose::fit::selected_effect::Chosen;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{PUSH_MOVES, PUSH_TOGETHER};
 use crate::physics::{Effect, Setting};
@@ -31,8 +31,13 @@ impl Candidate {
     }
 
     /// As an effect of a model, taken in a step.
-    pub fn chosen(&self, step: usize) -> Chosen {
-        Chosen { setting: self.setting.clone(), continuous: self.continuous.clone(), range: self.range.clone(), step }
+    pub fn chosen(&self, step: usize) -> SelectedEffect {
+        SelectedEffect {
+            setting: self.setting.clone(),
+            continuous: self.continuous.clone(),
+            range: self.range.clone(),
+            step,
+        }
     }
 
     /// Logarithm of an upper bound of the chance that noise alone gives this gain somewhere on the grid, for `effects`

@@ -6,11 +6,11 @@
 
 use super::torque_balance::{Balance, Balanced, SLOWEST_RAD_S, with_freedom};
 use crate::diagnose::data::run::{Run, mean_run};
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_problem::{Problem, descended};
-use crate::diagnose::fit::selected_effect::Chosen;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::fit::simulation::size;
 use crate::diagnose::rules::{CLEARED_BETTER, CLEARED_FAR, CLEARED_FULLER};
 use crate::lti::{Body, Plant};
@@ -28,11 +28,15 @@ const SLIDES: [f64; 2] = [0.0, 6.0];
 /// A plant from which the search sets out, and the law that it was cleared of.
 pub(in crate::diagnose) struct Cleared {
     pub plant: Plant,
-    pub law: Option<Chosen>,
+    pub law: Option<SelectedEffect>,
 }
 
 /// The plant to set out from, where the given one conceals what acts; none where the given one, or a refit of it, does.
-pub(in crate::diagnose) fn cleared(bench: &Bench, iterations: usize, say: &mut dyn FnMut(&str)) -> Option<Cleared> {
+pub(in crate::diagnose) fn cleared(
+    bench: &DiagnosisData,
+    iterations: usize,
+    say: &mut dyn FnMut(&str),
+) -> Option<Cleared> {
     let means: Vec<Run> = bench.stack.segments.iter().map(|s| mean_run(&bench.runs, &s.runs)).collect();
     let balances = SMOOTHINGS.iter().flat_map(|&w| SLIDES.map(|s| Balance::of(bench, &means, w, s)));
     let mut laws: Vec<(f64, Balanced)> = balances.flat_map(|b| b.laws()).collect();
@@ -47,7 +51,7 @@ pub(in crate::diagnose) fn cleared(bench: &Bench, iterations: usize, say: &mut d
     let whole: Vec<(&Run, usize)> = means.iter().zip(&own.stack.segments).map(|(m, s)| (m, s.runs.len())).collect();
     let mut given = linear.clone();
     given.refitted.p.fill(0.0);
-    let plain = |b: &Bench, m: &Model| {
+    let plain = |b: &DiagnosisData, m: &Model| {
         let mut problem = Problem::plain_error(b, m, None, &whole);
         let x = problem.start();
         size(&problem.settle(&x))
@@ -62,7 +66,7 @@ pub(in crate::diagnose) fn cleared(bench: &Bench, iterations: usize, say: &mut d
     say("a plant cleared of what bends it");
     laws.sort_by(|a, b| a.0.total_cmp(&b.0));
     laws.truncate(TRIED);
-    let model_of = |b: &Balanced| -> Option<(Bench, Model)> {
+    let model_of = |b: &Balanced| -> Option<(DiagnosisData, Model)> {
         let ground = around(&own, &b.plant);
         let zero = vec![0.0; ground.form.knobs.len()];
         let mut model = linear.clone();
@@ -70,7 +74,7 @@ pub(in crate::diagnose) fn cleared(bench: &Bench, iterations: usize, say: &mut d
         (model.refitted.p, model.refitted.plant) = (zero, b.plant.clone());
         Some((ground, model))
     };
-    let mut tried: Vec<(f64, Bench, Model)> = Vec::new();
+    let mut tried: Vec<(f64, DiagnosisData, Model)> = Vec::new();
     for (_, b) in &laws {
         if let Some((ground, model)) = model_of(b) {
             let left = plain(&ground, &model);
@@ -80,22 +84,24 @@ pub(in crate::diagnose) fn cleared(bench: &Bench, iterations: usize, say: &mut d
         }
     }
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut settled: Vec<(f64, Bench, Model)> = Vec::new();
+    let mut settled: Vec<(f64, DiagnosisData, Model)> = Vec::new();
     for (left, ground, model) in tried.into_iter().take(FITTED) {
         let fitted = descended(&ground, &model, None, &whole).unwrap_or(model);
         settled.push((plain(&ground, &fitted).min(left), ground, fitted));
     }
     settled.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best: Option<(f64, Cleared)> = None;
-    let cleared = |ground: &Bench, m: &Model| Cleared {
+    let cleared = |ground: &DiagnosisData, m: &Model| Cleared {
         plant: not_too_slow(ground.form.plant(&m.refitted.p)),
         law: m.chosen.first().cloned(),
     };
     if let Some((least, ground, model)) = settled.first() {
         best = Some((*least, cleared(ground, model)));
-        let fuller = |law: &Chosen| {
-            let of =
-                |full: AnyLaw| Chosen { setting: Setting::new(full, law.setting.strengths.clone()), ..law.clone() };
+        let fuller = |law: &SelectedEffect| {
+            let of = |full: AnyLaw| SelectedEffect {
+                setting: Setting::new(full, law.setting.strengths.clone()),
+                ..law.clone()
+            };
             law.setting.law.fuller(&own.scene).into_iter().map(of).collect::<Vec<_>>()
         };
         for full in model.chosen.first().map(fuller).unwrap_or_default() {
@@ -122,7 +128,7 @@ fn not_too_slow(plant: Plant) -> Plant {
 }
 
 /// The same ground around another plant, for simulations of plain errors: its noise and its motion stay.
-fn around(bench: &Bench, plant: &Plant) -> Bench {
+fn around(bench: &DiagnosisData, plant: &Plant) -> DiagnosisData {
     let mut ground = bench.clone();
     ground.form = crate::diagnose::data::linear_form::LinearForm::new(plant, bench.scene.sample_time_s);
     ground.scene.plant = plant.clone();

@@ -4,8 +4,8 @@
 //! its own way differs as much from repeat to repeat as from move to move, or is the same everywhere.
 
 use crate::diagnose::data::linear_form::Sampled;
-use crate::diagnose::data::stacked_records::Basis;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::data::stacked_records::NuisanceBasis;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::regressors::white_columns;
 use crate::diagnose::rules::{DRIFT_FOLLOWS_MOTION, DRIFT_REPEATS};
@@ -13,7 +13,7 @@ use crate::numeric::least_squares::dot;
 use nalgebra::{DMatrix, DVector};
 
 /// Whether the strengths of effect `at`, which are each record's own, follow the motion; false where too few repeats tell.
-pub(super) fn follows_motion(bench: &Bench, model: &Model, at: usize) -> bool {
+pub(super) fn follows_motion(bench: &DiagnosisData, model: &Model, at: usize) -> bool {
     let chosen = &model.chosen[at];
     let facts = chosen.setting.facts();
     if !facts.per_record || !chosen.effect().independent_of_motion() {
@@ -31,7 +31,7 @@ pub(super) fn follows_motion(bench: &Bench, model: &Model, at: usize) -> bool {
         let motion = &bench.trajectories[i];
         let law = &chosen.setting.law;
         let columns = white_columns(law, &bench.scene, motion, &sampled, &bench.whitener);
-        let mut basis = Basis::default();
+        let mut basis = NuisanceBasis::default();
         let free: Vec<Vec<f64>> = columns
             .into_iter()
             .map(|mut c| {

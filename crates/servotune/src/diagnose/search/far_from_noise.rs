@@ -3,10 +3,10 @@
 use super::candidate::Candidate;
 use super::residual_screen::in_simulation;
 use super::selection::Step;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_fit::simulated;
-use crate::diagnose::fit::selected_effect::Chosen;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::rules::FAR_FROM_NOISE;
 use crate::physics::Effect;
 
@@ -20,7 +20,7 @@ pub(super) fn deep(step: &Step) -> bool {
 
 /// Fits the best laws of a step by simulation, drags first, and keeps what is better: much is left, and along a noisy or a stuck motion a law that
 /// bends falls far short of itself.
-pub(super) fn by_simulation_first(bench: &Bench, step: &mut Step) {
+pub(super) fn by_simulation_first(bench: &DiagnosisData, step: &mut Step) {
     let last = |m: &Model| {
         m.chosen.last().map(|c| (c.setting.facts().name, c.effect().is_drag() || c.effect().is_hard_nonlinearity()))
     };
@@ -40,16 +40,16 @@ pub(super) fn by_simulation_first(bench: &Bench, step: &mut Step) {
 }
 
 /// The scan of what a model leaves in simulation.
-pub(super) fn felt_scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
+pub(super) fn felt_scan(bench: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> Step {
     let mut candidates = in_simulation(bench, library, model);
     candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     Step { before: model.evidence, candidates, tried: Vec::new(), taken: None }
 }
 
 /// A model with one law more, all of it fitted by simulation; none where nothing is won.
-pub(super) fn felt_trial(bench: &Bench, model: &Model, chosen: Vec<Chosen>) -> Option<Model> {
-    let numbers = |c: &[Chosen]| -> usize {
-        let strengths = |c: &Chosen| if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
+pub(super) fn felt_trial(bench: &DiagnosisData, model: &Model, chosen: Vec<SelectedEffect>) -> Option<Model> {
+    let numbers = |c: &[SelectedEffect]| -> usize {
+        let strengths = |c: &SelectedEffect| if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
         c.iter().map(|c| strengths(c) + c.continuous.iter().filter(|c| **c).count()).sum()
     };
     let mut start = model.clone();
@@ -64,7 +64,7 @@ pub(super) fn felt_trial(bench: &Bench, model: &Model, chosen: Vec<Chosen>) -> O
 }
 
 /// The law that the plant was cleared of, fitted by simulation as a first step; whether there is one.
-pub(in crate::diagnose) fn foretold(bench: &Bench, model: &Model, step: &mut Step) -> bool {
+pub(in crate::diagnose) fn foretold(bench: &DiagnosisData, model: &Model, step: &mut Step) -> bool {
     let Some(law) = bench.foretold.clone() else { return false };
     let mut start = model.clone();
     start.refitted.p.fill(0.0);

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// The strongest thing that is still seen.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Leftover {
+pub struct ResidualEffect {
     /// The law that takes most of it: its nearest likeness, no finding.
     pub effect: String,
     /// What that law takes: fall of the sum of squares of the whitened error.

@@ -2,12 +2,12 @@
 //! could take.
 
 use super::candidate::Candidate;
-use super::residual_effect::Leftover;
+use super::residual_effect::ResidualEffect;
 use super::scan::Ground;
 use super::selection::Step;
 use super::shortlist::hums;
 use super::step_scan::scan;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_fit::simulation_error;
 use crate::physics::Effect;
@@ -17,13 +17,13 @@ use crate::physics::Effect;
 /// Along the recorded motion laws see the sensor's noise and fall a little short of themselves, in open-loop simulation a free body
 /// may drift away: what counts is seen in both.
 pub(in crate::diagnose) fn leftover(
-    bench: &Bench,
+    bench: &DiagnosisData,
     library: &[&'static dyn Effect],
     model: &Model,
     simulated: Option<&Model>,
     steps: &[Step],
     (before, limit): (f64, f64),
-) -> Option<Leftover> {
+) -> Option<ResidualEffect> {
     if model.chosen.is_empty() || !bench.levels.from_repeats {
         return None;
     }
@@ -44,7 +44,7 @@ pub(in crate::diagnose) fn leftover(
         None => along,
     };
     let taken = (before - simulated.map_or(model.cost, |s| s.cost.min(model.cost))).max(f64::MIN_POSITIVE);
-    Some(Leftover {
+    Some(ResidualEffect {
         effect: left.setting.facts().name.into(),
         gain: left.gain,
         share: left.gain / taken,
@@ -53,7 +53,7 @@ pub(in crate::diagnose) fn leftover(
 }
 
 /// The scan of the simulation's error.
-pub(super) fn in_simulation(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Vec<Candidate> {
+pub(super) fn in_simulation(bench: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> Vec<Candidate> {
     let fit = bench.fit(model.chosen.clone());
     let (_, basis) = fit.screen_basis(&model.refitted.p);
     let mut error = simulation_error(bench, model);

@@ -5,18 +5,18 @@
 
 use super::rival_model::{Rival, family_width};
 use super::selection::{Step, gain_of};
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::begun;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_fit::simulated;
-use crate::diagnose::fit::selected_effect::Chosen;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::rules::{OWN_OF_RECORD, RIVAL_BETTER, RIVAL_DOUBT, SIMULATION_NO_JUDGE, USUAL_LAW};
 
 /// What one law must take more than another because it has more numbers (Schwarz 1978) or because machines seldom follow it; less where
 /// it has fewer, or most machines do.
-pub(in crate::diagnose) fn more(bench: &Bench, law: &Chosen, than: &Chosen) -> f64 {
+pub(in crate::diagnose) fn more(bench: &DiagnosisData, law: &SelectedEffect, than: &SelectedEffect) -> f64 {
     let price = (bench.stack.total as f64).ln();
-    let of = |c: &Chosen| {
+    let of = |c: &SelectedEffect| {
         let numbers = c.numbers() + begun(bench, &c.setting.law);
         price * numbers as f64 - if c.effect().is_on_every_machine() { USUAL_LAW } else { 0.0 }
     };
@@ -25,7 +25,7 @@ pub(in crate::diagnose) fn more(bench: &Bench, law: &Chosen, than: &Chosen) -> f
 
 /// Costs of the rivals of one family by simulation; one that is better there takes the place.
 pub(in crate::diagnose) fn by_simulation(
-    bench: &Bench,
+    bench: &DiagnosisData,
     model: &mut Model,
     by_simulation: &mut Model,
     rivals: &mut [Vec<Rival>],

@@ -7,8 +7,8 @@
 use super::candidate::Candidate;
 use crate::diagnose::data::linear_form::Sampled;
 use crate::diagnose::data::repeat_difference::Difference;
-use crate::diagnose::data::stacked_records::{Basis, Explained, Normal};
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::data::stacked_records::{Explained, Normal, NuisanceBasis};
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fit_inputs::Fit;
 use crate::diagnose::fit::regressors::{raw_columns, white_columns};
 use crate::lti::Plant;
@@ -102,11 +102,11 @@ pub struct Ground<'a, 'f> {
     fit: &'a Fit<'f>,
     sampled: Sampled,
     error: Vec<f64>,
-    basis: Basis,
+    basis: NuisanceBasis,
     /// The error seen from where columns enter: command, torque, position.
     seen: [Vec<f64>; 3],
     /// Where the repeats are, whose differences count too.
-    repeats: Option<&'a Bench>,
+    repeats: Option<&'a DiagnosisData>,
 }
 
 /// Points of a grid from one that is worked out in full to the next.
@@ -126,7 +126,7 @@ const BESIDE: usize = 1;
 
 impl<'a, 'f> Ground<'a, 'f> {
     /// The ground of a fit: `error` is whitened and has `basis` taken out; torques and commands are seen through `plant`.
-    pub fn new(fit: &'a Fit<'f>, plant: &Plant, error: Vec<f64>, basis: Basis) -> Option<Ground<'a, 'f>> {
+    pub fn new(fit: &'a Fit<'f>, plant: &Plant, error: Vec<f64>, basis: NuisanceBasis) -> Option<Ground<'a, 'f>> {
         let sampled = Sampled::of(plant, fit.scene.sample_time_s).ok()?;
         // The adjoint of a filter from rest is the same filter backwards in time.
         let back = |entry: Entry| {
@@ -149,7 +149,7 @@ impl<'a, 'f> Ground<'a, 'f> {
     }
 
     /// With what repeats differ by as further evidence.
-    pub fn beside(self, repeats: &'a Bench) -> Ground<'a, 'f> {
+    pub fn beside(self, repeats: &'a DiagnosisData) -> Ground<'a, 'f> {
         Ground { repeats: Some(repeats), ..self }
     }
 

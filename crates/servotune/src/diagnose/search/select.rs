@@ -1,6 +1,6 @@
 //! Which effects the model lacks: scan, refit with each of the best, keep the best, scan again.
 //!
-//! In: the bench and the laws. Out: a [`Selection`]. Convention: a step is judged by minus twice the log-likelihood, each free number paid for.
+//! In: the diagnosis data and the laws. Out: a [`Selection`]. Convention: a step is judged by minus twice the log-likelihood, each free number paid for.
 //! Spec: `specs/mismatch.md`, steps 7 and 8.
 
 use super::backward_elimination::{exchange, prune, spare};
@@ -13,9 +13,9 @@ use super::residual_screen::leftover;
 use super::rival::by_simulation;
 use super::select_settings::SelectSettings;
 use super::selection::{Selection, Step};
-use super::shortlist::{Worth, hums, numbers};
+use super::shortlist::{Shortlist, hums, numbers};
 use super::step_scan::scan;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::begun;
 use crate::diagnose::fit::fitted_model::{fitted, fitted_from_both, refit, settled, taken_by_last};
 use crate::diagnose::fit::model::Model;
@@ -34,7 +34,7 @@ const AGAIN: usize = 3;
 
 /// The search on its way.
 struct Search<'a> {
-    bench: &'a mut Bench,
+    bench: &'a mut DiagnosisData,
     library: &'a [&'static dyn Effect],
     settings: &'a SelectSettings,
     baseline: Model,
@@ -57,7 +57,7 @@ enum Onward {
 
 /// Searches the library for what the linear model lacks.
 pub fn select(
-    bench: &mut Bench,
+    bench: &mut DiagnosisData,
     library: &[&'static dyn Effect],
     settings: &SelectSettings,
     mut progress: impl FnMut(&str),
@@ -104,7 +104,7 @@ impl Search<'_> {
     /// Refits the model with each candidate that is worth it.
     fn try_each(&self, step: &mut Step, progress: &mut dyn FnMut(&str)) {
         let Search { bench, settings, model, felt, .. } = self;
-        let worth = Worth { bench, laws: self.library.len(), settings, model, felt: *felt };
+        let worth = Shortlist { bench, laws: self.library.len(), settings, model, felt: *felt };
         for i in worth.of(step) {
             let c = &step.candidates[i];
             progress(&format!("refit with {}", c.setting.facts().name));

@@ -2,13 +2,13 @@
 
 use super::bootstrap_chance::Bootstrap;
 use super::candidate::Candidate;
-use super::residual_effect::Leftover;
+use super::residual_effect::ResidualEffect;
 use super::rival_model::Rival;
 use crate::diagnose::fit::corrected_model::Corrected;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::selected_effect::Chosen;
-use crate::diagnose::fit::simulation::Judged;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
+use crate::diagnose::fit::simulation::SimulatedModel;
 use crate::diagnose::rules::{MIXTURE_LAWS, MIXTURE_LEADS};
 
 /// One step of the search.
@@ -42,7 +42,7 @@ pub struct Selection {
     /// For each effect of the model, others in its place.
     pub rivals: Vec<Vec<Rival>>,
     /// What is still seen in the error of the final model, beyond chance.
-    pub leftover: Option<Leftover>,
+    pub leftover: Option<ResidualEffect>,
     /// The search on records without physics, where it was asked for.
     pub bootstrap: Option<Bootstrap>,
 }
@@ -79,9 +79,13 @@ impl Selection {
 
 impl Corrected {
     /// The same as a model to be judged, with what is each record's own.
-    pub(in crate::diagnose) fn judged<'a>(&'a self, bench: &'a Bench, selection: &'a Selection) -> Judged<'a> {
+    pub(in crate::diagnose) fn judged<'a>(
+        &'a self,
+        bench: &'a DiagnosisData,
+        selection: &'a Selection,
+    ) -> SimulatedModel<'a> {
         let own = selection.model.chosen.iter().filter(|c| c.setting.facts().per_record);
-        Judged {
+        SimulatedModel {
             plant: &self.plant,
             effects: self.effects.iter().collect(),
             own: own.map(|c| &c.setting.law).collect(),
@@ -93,7 +97,7 @@ impl Corrected {
 }
 
 /// What an effect explained when it was taken.
-pub(super) fn gain_of(steps: &[Step], chosen: &Chosen) -> f64 {
+pub(super) fn gain_of(steps: &[Step], chosen: &SelectedEffect) -> f64 {
     let step = &steps[chosen.step];
     step.taken.map_or(0.0, |t| step.before - step.tried[t].1.evidence)
 }

@@ -7,14 +7,14 @@ use super::candidate::Candidate;
 use super::select_settings::SelectSettings;
 use super::selection::Step;
 use super::step_scan::scan;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::rules::{CONFOUNDED, CONFOUNDED_NEAR_NOISE, FAR_FROM_NOISE, GAIN_WITHOUT_REPEATS, NEAR_NOISE};
 use crate::physics::{Effect, Setting, effect};
 
 /// What the candidates of one step are judged by.
-pub(super) struct Worth<'a> {
-    pub bench: &'a Bench,
+pub(super) struct Shortlist<'a> {
+    pub bench: &'a DiagnosisData,
     /// Laws that are scanned.
     pub laws: usize,
     pub settings: &'a SelectSettings,
@@ -24,7 +24,7 @@ pub(super) struct Worth<'a> {
     pub felt: bool,
 }
 
-impl Worth<'_> {
+impl Shortlist<'_> {
     /// Places of the candidates that are refitted in full.
     pub fn of(&self, step: &Step) -> Vec<usize> {
         let mut worth: Vec<usize> = Vec::new();
@@ -103,7 +103,7 @@ pub(in crate::diagnose) fn numbers(c: &Candidate) -> f64 {
 
 /// Logarithm of the chance of a hum's gain where the noise itself is stronger near its frequency, a narrow band of it being no hum;
 /// -infinity for all other effects.
-pub(in crate::diagnose) fn hums(bench: &Bench, c: &Candidate, gain: f64, effects: usize) -> f64 {
+pub(in crate::diagnose) fn hums(bench: &DiagnosisData, c: &Candidate, gain: f64, effects: usize) -> f64 {
     if !c.effect().is_tone() {
         return f64::NEG_INFINITY;
     }
@@ -118,7 +118,7 @@ fn again(c: &Candidate, first: &Setting) -> bool {
 }
 
 /// Logarithm of the closed-form bound of the strongest candidate beside a model.
-pub(in crate::diagnose) fn strongest(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> f64 {
+pub(in crate::diagnose) fn strongest(bench: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> f64 {
     let step = scan(bench, library, model);
     let possible = step.candidates.iter().filter(|c| c.setting.is_possible(&[]) && c.concealed < CONFOUNDED);
     possible.map(|c| c.log_p_value(library.len())).fold(0.0, f64::min)

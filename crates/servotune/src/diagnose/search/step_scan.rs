@@ -3,13 +3,18 @@
 use super::candidate::Candidate;
 use super::scan::Ground;
 use super::selection::Step;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::rules::{FAR_FROM_NOISE, REFIT_HIDES};
 use crate::physics::{Effect, Port};
 
 /// The scan around linear parameters `p`; gains count from where the model stands.
-pub(super) fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Model, p: &[f64]) -> Vec<Candidate> {
+pub(super) fn scan_at(
+    bench: &DiagnosisData,
+    library: &[&'static dyn Effect],
+    model: &Model,
+    p: &[f64],
+) -> Vec<Candidate> {
     let fit = bench.fit(model.chosen.clone());
     let (error, basis) = fit.screen_basis(p);
     let plant = bench.form.carrier(p).plant;
@@ -21,7 +26,7 @@ pub(super) fn scan_at(bench: &Bench, library: &[&'static dyn Effect], model: &Mo
 }
 
 /// The scan around where the model stands, and around the given plant where the refit may have bent what is looked for.
-pub(in crate::diagnose) fn scan(bench: &Bench, library: &[&'static dyn Effect], model: &Model) -> Step {
+pub(in crate::diagnose) fn scan(bench: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> Step {
     let mut candidates = scan_at(bench, library, model, &model.refitted.p);
     // A law without a strength of its own (a lag, a limit), or a vibration that a known mode has moved to stand in for, is not straight
     // in the linear parameters: it is looked for around the given plant too.

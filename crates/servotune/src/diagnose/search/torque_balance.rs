@@ -3,9 +3,9 @@
 //! In: mean runs and the given plant, of which nothing but its modes is used. Out: body and delay with the strengths of a law. Both sides are smoothed alike (filtered equation error; Ljung 1999, section 7).
 
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::regressors::columns_along;
-use crate::diagnose::fit::selected_effect::Chosen;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::rules::CLEARED_TELLS;
 use crate::lti::{Body, Plant};
 use crate::numeric::least_squares::Qr;
@@ -84,7 +84,7 @@ fn roughness(means: &[Run]) -> f64 {
 
 /// The balance of all mean runs at one smoothing.
 pub(super) struct Balance<'a> {
-    bench: &'a Bench,
+    bench: &'a DiagnosisData,
     /// Mean runs as recorded: what was taken out of them around a bent plant (lines) is none of theirs.
     means: &'a [Run],
     /// The machine with the size of the motion as it is seen here.
@@ -96,12 +96,12 @@ pub(super) struct Balance<'a> {
 /// What a balance comes to: the plant, the law's strengths, and the square of what is left.
 pub(super) struct Balanced {
     pub plant: Plant,
-    pub law: Option<Chosen>,
+    pub law: Option<SelectedEffect>,
     pub left: f64,
 }
 
 impl<'a> Balance<'a> {
-    pub fn of(bench: &'a Bench, means: &'a [Run], width: f64, slides: f64) -> Balance<'a> {
+    pub fn of(bench: &'a DiagnosisData, means: &'a [Run], width: f64, slides: f64) -> Balance<'a> {
         let t = bench.scene.sample_time_s;
         let spindle = std::f64::consts::TAU * bench.scene.spindle_hz.unwrap_or(0.0);
         // White noise behind a Gaussian of this width: the root mean square of its slope.
@@ -179,7 +179,7 @@ impl<'a> Balance<'a> {
                 false => numbers[4..4 + own].iter().map(|s| s / gain).collect(),
             };
             let setting = Setting::new(law.clone(), strengths);
-            with_freedom(Chosen { setting, continuous: Vec::new(), range: Vec::new(), step: 0 }, scene)
+            with_freedom(SelectedEffect { setting, continuous: Vec::new(), range: Vec::new(), step: 0 }, scene)
         });
         if law.as_ref().is_some_and(|l| !l.setting.is_possible(&[])) {
             return None;
@@ -230,8 +230,8 @@ impl<'a> Balance<'a> {
 }
 
 /// A law with the numbers that its effect's grid leaves free.
-pub(super) fn with_freedom(law: Chosen, scene: &Scene) -> Chosen {
+pub(super) fn with_freedom(law: SelectedEffect, scene: &Scene) -> SelectedEffect {
     let own = &law.setting.law;
     let (continuous, range) = super::scan::freedom(&own.effect().grid(scene), own);
-    Chosen { continuous, range, ..law }
+    SelectedEffect { continuous, range, ..law }
 }

@@ -4,9 +4,9 @@
 
 use super::finding::{Estimate, Finding};
 use super::naming::everywhere;
-use crate::diagnose::data::linear_form::{Knob, body_numbers, rate_of};
+use crate::diagnose::data::linear_form::{FreeParameter, body_numbers, rate_of};
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::ONE_NUMBER;
 use crate::numeric::golden::golden_section;
@@ -29,23 +29,23 @@ pub(super) struct Clock {
 }
 
 /// The linear parameters under a clock that makes all frequencies 1 + e times as high.
-fn scaled(bench: &Bench, e: f64) -> Vec<f64> {
+fn scaled(bench: &DiagnosisData, e: f64) -> Vec<f64> {
     let form = &bench.form;
     let (_, _, c) = body_numbers(&form.given.body);
-    let knob = |knob: &Knob| match knob {
-        Knob::Gain => 2.0 * e.ln_1p(),
-        Knob::Stiffness => e * (2.0 + e),
-        Knob::Viscous => c * e / rate_of(&form.given.body),
-        Knob::Delay => -form.given.delay_s * e / (1.0 + e) / bench.scene.sample_time_s,
-        Knob::Pole(_) | Knob::Zero(_) => e.ln_1p(),
-        Knob::PoleDamping(_) | Knob::ZeroDamping(_) => 0.0,
+    let knob = |knob: &FreeParameter| match knob {
+        FreeParameter::Gain => 2.0 * e.ln_1p(),
+        FreeParameter::Stiffness => e * (2.0 + e),
+        FreeParameter::Viscous => c * e / rate_of(&form.given.body),
+        FreeParameter::Delay => -form.given.delay_s * e / (1.0 + e) / bench.scene.sample_time_s,
+        FreeParameter::Pole(_) | FreeParameter::Zero(_) => e.ln_1p(),
+        FreeParameter::PoleDamping(_) | FreeParameter::ZeroDamping(_) => 0.0,
     };
     form.knobs.iter().map(knob).collect()
 }
 
 impl Clock {
     /// The scale under which the given plant fits best.
-    pub fn of(bench: &Bench, given: f64) -> Clock {
+    pub fn of(bench: &DiagnosisData, given: f64) -> Clock {
         let fit = bench.fit(vec![]);
         let cost = |e: f64| fit.cost(&scaled(bench, e));
         // Farther off the error has more than one valley.
@@ -66,7 +66,7 @@ impl Clock {
     }
 
     /// The finding.
-    pub fn finding(&self, bench: &Bench) -> Finding {
+    pub fn finding(&self, bench: &DiagnosisData) -> Finding {
         let &Facts { name: effect, says, port, .. } = &time_base_drift::FACTS;
         let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
         let off = 1.96 * self.sigma;

@@ -7,11 +7,11 @@
 
 use super::held_out::HeldOut;
 use crate::diagnose::fit::corrected_model::Corrected;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::fitted;
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::selected_effect::Chosen;
-use crate::diagnose::fit::simulation::Judged;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
+use crate::diagnose::fit::simulation::SimulatedModel;
 use crate::diagnose::rules::{LAW_FAR, LAW_SAYS, LAW_SHORT};
 use crate::diagnose::search::selection::Selection;
 use crate::lti::LtiError;
@@ -40,7 +40,7 @@ impl Confirmation {
 /// Every law of the final model, asked of the held-out records within the fit's range. Where one of them is each record's own, or goes by a
 /// clock, the model says nothing of other records.
 pub(in crate::diagnose) fn confirm(
-    bench: &Bench,
+    bench: &DiagnosisData,
     selection: &Selection,
     fixed: &Corrected,
     held_out: &[HeldOut],
@@ -52,13 +52,13 @@ pub(in crate::diagnose) fn confirm(
         let carrier = bench.form.carrier(&model.refitted.p).plant;
         let mut all = Vec::new();
         for run in &asked {
-            let own = Judged { plant: &carrier, ..fixed.judged(bench, selection) }.columns(run)?;
+            let own = SimulatedModel { plant: &carrier, ..fixed.judged(bench, selection) }.columns(run)?;
             all.extend(bench.along(run, model, &own)?);
         }
         Ok(all)
     };
     let mut out = Vec::new();
-    let strays = |c: &Chosen| c.setting.facts().per_record || c.effect().has_own_clock();
+    let strays = |c: &SelectedEffect| c.setting.facts().per_record || c.effect().has_own_clock();
     if asked.is_empty() || model.chosen.iter().any(strays) {
         return Ok(out);
     }

@@ -2,7 +2,7 @@
 
 use super::diagnosis_json::Diagnosis;
 use crate::diagnose::fit::corrected_model::Corrected;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::search::selection::Selection;
 use crate::lti::Plant;
 
@@ -11,7 +11,7 @@ pub struct Diagnosed {
     /// What stands in diagnosis.json.
     pub diagnosis: Diagnosis,
     /// The ground it was made on.
-    pub bench: Bench,
+    pub bench: DiagnosisData,
     /// The search.
     pub selection: Selection,
     /// The corrected model.

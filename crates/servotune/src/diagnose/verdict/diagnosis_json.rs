@@ -7,7 +7,7 @@ use crate::diagnose::data::checks::{Replay, SampleFault};
 use crate::diagnose::free_form::curve::FreeForm;
 use crate::diagnose::noise::whitening::NoiseLevels;
 use crate::diagnose::search::bootstrap_chance::Bootstrap;
-use crate::diagnose::search::residual_effect::Leftover;
+use crate::diagnose::search::residual_effect::ResidualEffect;
 use serde::Serialize;
 
 /// The whole diagnosis.
@@ -46,7 +46,7 @@ pub struct Diagnosis {
     pub confirmed: Vec<Confirmation>,
     /// What the library still sees in the error of the final model, beyond chance.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub leftover: Option<Leftover>,
+    pub leftover: Option<ResidualEffect>,
     /// Natural frequency, damping and gain before and after, and other remarks in plain words.
     pub remarks: Vec<String>,
     /// The search.

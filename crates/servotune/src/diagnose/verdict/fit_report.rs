@@ -4,7 +4,7 @@ use super::finding::{FitFigures, FitReport, RecordFigures};
 use super::offered_models::{Offer, Reported, Reporting};
 use crate::controller::Law;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::{Simulation, floor, rms};
 use crate::lti::Plant;
 use crate::recording::Role;
@@ -14,7 +14,7 @@ pub(in crate::diagnose) type Errors = [Vec<Vec<f64>>; 3];
 
 /// The figures, and the errors of all runs under the three models: as the report shows them, and in open loop.
 pub(in crate::diagnose) fn fit_report(
-    bench: &Bench,
+    bench: &DiagnosisData,
     given: &Plant,
     reporting: &Reporting,
     reported: &Reported,
@@ -32,13 +32,13 @@ pub(in crate::diagnose) fn fit_report(
 
 /// The figures of these errors: given, refit, corrected; in open loop and as the report shows them.
 pub(in crate::diagnose) fn figures_of(
-    bench: &Bench,
+    bench: &DiagnosisData,
     every: &[&Run],
     [open, chosen]: [&Errors; 2],
     closed: bool,
 ) -> FitReport {
     let of_role = |e: &Errors, role: Role| -> Option<FitFigures> {
-        let which: Vec<usize> = (0..every.len()).filter(|&i| every[i].role == role && !every[i].bumped).collect();
+        let which: Vec<usize> = (0..every.len()).filter(|&i| every[i].role == role && !every[i].shocked).collect();
         if which.is_empty() {
             return None;
         }
@@ -89,6 +89,6 @@ pub(in crate::diagnose) fn figures_of(
 }
 
 /// Without repeats the floor is the sensor's noise as the spectrum shows it, never more than what the best model leaves.
-fn fallback_floor(bench: &Bench, after: f64) -> f64 {
+fn fallback_floor(bench: &DiagnosisData, after: f64) -> f64 {
     bench.levels.sensor_rms.min(after)
 }

@@ -8,8 +8,8 @@ use super::line_finding::left;
 use super::naming::everywhere;
 use crate::diagnose::data::linear_form::{Sampled, free_motions};
 use crate::diagnose::data::run::Run;
-use crate::diagnose::data::stacked_records::{Basis, Normal};
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::data::stacked_records::{Normal, NuisanceBasis};
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::trajectory::acting;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::noise::lines::peak;
@@ -26,7 +26,7 @@ struct Ready {
     /// What acts on the arm (command_unit), and the error, whitened, start and constant torque taken out.
     acting: Vec<f64>,
     error: Vec<f64>,
-    local: Basis,
+    local: NuisanceBasis,
 }
 
 /// The swing in one run: fall of the sum of squares, depth and its variance.
@@ -37,8 +37,8 @@ struct Swung {
 }
 
 impl Ready {
-    fn of(bench: &Bench, sampled: &Sampled, run: &Run, error: &[f64]) -> Ready {
-        let mut local = Basis::default();
+    fn of(bench: &DiagnosisData, sampled: &Sampled, run: &Run, error: &[f64]) -> Ready {
+        let mut local = NuisanceBasis::default();
         let t = bench.scene.sample_time_s;
         // Lines are looked for elsewhere: at a frequency that the command has too, a swing would take them.
         let lines = bench.lines.iter().flat_map(|l| l.columns(run, t));
@@ -53,7 +53,7 @@ impl Ready {
     }
 
     /// The command times the error sent back to where the command acts.
-    fn product(&self, bench: &Bench, sampled: &Sampled) -> Vec<f64> {
+    fn product(&self, bench: &DiagnosisData, sampled: &Sampled) -> Vec<f64> {
         // The adjoint of a filter that does not change in time is itself, run backwards.
         let mut back: Vec<f64> = self.error.iter().rev().copied().collect();
         bench.whitener.apply(&mut back);
@@ -62,7 +62,7 @@ impl Ready {
         self.acting.iter().zip(torque.iter().rev()).map(|(i, w)| i * w).collect()
     }
 
-    fn swung(&self, bench: &Bench, sampled: &Sampled, hz: f64) -> Swung {
+    fn swung(&self, bench: &DiagnosisData, sampled: &Sampled, hz: f64) -> Swung {
         let t = bench.scene.sample_time_s;
         let column = |of: fn(f64) -> f64| {
             let torque: Vec<f64> =
@@ -81,7 +81,7 @@ impl Ready {
 }
 
 /// A swing of the gain that all runs show, each in its own phase.
-pub(in crate::diagnose) fn swing(bench: &Bench, selection: &Selection) -> Option<Finding> {
+pub(in crate::diagnose) fn gain_modulation(bench: &DiagnosisData, selection: &Selection) -> Option<Finding> {
     let t = bench.scene.sample_time_s;
     let plant = bench.form.carrier(&selection.model.refitted.p).plant;
     let sampled = Sampled::of(&plant, t).ok()?;

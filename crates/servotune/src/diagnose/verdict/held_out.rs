@@ -6,9 +6,9 @@ use crate::diagnose::data::linear_form::free_motions;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::Segment;
 use crate::diagnose::fit::corrected_model::Corrected;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::simulation::{Judged, error};
+use crate::diagnose::fit::simulation::{SimulatedModel, error};
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{
     ASTRAY_SHARE, ASTRAY_SIGMA, BEYOND_FAR, BEYOND_LEFT, HELD_OUT_CLEAR, HELD_OUT_FAR, HELD_OUT_LEFT,
@@ -47,7 +47,7 @@ fn within(inner: [f64; 2], outer: [f64; 2]) -> bool {
 
 /// Every record that was not used, under the linear refit and the final model.
 pub(in crate::diagnose) fn held_out(
-    bench: &Bench,
+    bench: &DiagnosisData,
     selection: &Selection,
     fixed: &Corrected,
 ) -> Result<Vec<HeldOut>, LtiError> {
@@ -58,7 +58,7 @@ pub(in crate::diagnose) fn held_out(
         let per_sample = |model: &Model| -> Result<f64, LtiError> {
             // Along the recorded motion the arm answers as the carrier does, so it starts as the carrier does.
             let carrier = bench.form.carrier(&model.refitted.p).plant;
-            let own = Judged { plant: &carrier, ..fixed.judged(bench, selection) }.columns(run)?;
+            let own = SimulatedModel { plant: &carrier, ..fixed.judged(bench, selection) }.columns(run)?;
             let e = bench.along(run, model, &own)?;
             Ok(dot(&e, &e) / run.len() as f64)
         };
@@ -89,7 +89,7 @@ pub(in crate::diagnose) fn mean(all: &[HeldOut]) -> Option<[f64; 2]> {
 
 /// Power of the noise of the noisiest segment over that of what the filter makes white: where some of the fit's records are noisier than
 /// the filter says, so may one that was not used be.
-fn loudest(bench: &Bench) -> f64 {
+fn loudest(bench: &DiagnosisData) -> f64 {
     let noise = |s: &Segment| s.runs.len() as f64 / (s.weight * s.weight);
     bench.stack.segments.iter().map(noise).fold(1.0, f64::max)
 }
@@ -98,7 +98,7 @@ fn loudest(bench: &Bench) -> f64 {
 /// take too little of what the linear refit leaves there.
 ///
 /// None where a law goes by a clock of its own, which each record starts anew.
-pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) -> Option<&'a HeldOut> {
+pub(super) fn contradicts<'a>(bench: &DiagnosisData, all: &'a [HeldOut], model: &Model) -> Option<&'a HeldOut> {
     if model.chosen.iter().any(|c| c.setting.facts().per_record || c.effect().has_own_clock()) {
         return None;
     }
@@ -122,7 +122,7 @@ pub(super) fn contradicts<'a>(bench: &Bench, all: &'a [HeldOut], model: &Model) 
 }
 
 /// The record that the linear refit misses most, by far more than noise.
-pub(super) fn astray<'a>(bench: &Bench, all: &'a [HeldOut]) -> Option<&'a HeldOut> {
+pub(super) fn astray<'a>(bench: &DiagnosisData, all: &'a [HeldOut]) -> Option<&'a HeldOut> {
     let loudest = loudest(bench);
     let left = |h: &HeldOut| h.whitened[0] - loudest;
     let far = |h: &&HeldOut| left(h) > loudest * ASTRAY_SHARE.max(ASTRAY_SIGMA * (2.0 / h.samples as f64).sqrt());
@@ -130,7 +130,7 @@ pub(super) fn astray<'a>(bench: &Bench, all: &'a [HeldOut]) -> Option<&'a HeldOu
 }
 
 /// What acts on a record that was not used and shows on no other: the finding without a name.
-pub(super) fn unseen(bench: &Bench, selection: &Selection, h: &HeldOut) -> Option<Finding> {
+pub(super) fn unseen(bench: &DiagnosisData, selection: &Selection, h: &HeldOut) -> Option<Finding> {
     let run = bench.runs.iter().find(|r| r.name == h.record)?;
     let carrier = bench.form.carrier(&selection.baseline.refitted.p).plant;
     let free = free_motions(&carrier.body, bench.scene.sample_time_s, run.len());

@@ -2,13 +2,13 @@
 
 use super::diagnosis_json::Diagnosis;
 use super::finding::{Finding, FitFigures, Verdict};
-use super::gain_modulation::swing;
+use super::gain_modulation::gain_modulation;
 use super::held_out::{HeldOut, astray, contradicts, unseen};
 use super::line_finding::{line_findings, same_line};
-use super::linear_verdict::linear_story;
+use super::linear_verdict::linear_verdict;
 use super::naming::{finding, unexplained};
 use super::offered_models::Reported;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::simulation::Simulation;
 use crate::diagnose::rules::{
@@ -24,13 +24,13 @@ use crate::physics::{AnyLaw, Port, library};
 /// Findings that the search has no part in.
 pub(in crate::diagnose) struct ByOthers {
     pub logs: Option<Finding>,
-    pub bumps: Vec<Finding>,
+    pub shocks: Vec<Finding>,
     pub noise: Vec<Finding>,
 }
 
 /// What stands for and against the model of the search.
 struct Evidence<'a> {
-    bench: &'a Bench,
+    bench: &'a DiagnosisData,
     selection: &'a Selection,
     model: &'a Model,
     /// Share of the error in excess of noise that it explains.
@@ -44,7 +44,7 @@ struct Evidence<'a> {
 }
 
 impl<'a> Evidence<'a> {
-    fn of(d: &Diagnosis, bench: &'a Bench, selection: &'a Selection, reported: &Reported) -> Evidence<'a> {
+    fn of(d: &Diagnosis, bench: &'a DiagnosisData, selection: &'a Selection, reported: &Reported) -> Evidence<'a> {
         let (base, model) = (&selection.baseline, selection.best());
         let explained = if base.excess() > 0.0 { 1.0 - model.excess().max(0.0) / base.excess() } else { 1.0 };
         // Down to the noise, and not only because there was little above it; or as near as its level may err, no law seeing anything more.
@@ -157,7 +157,7 @@ impl<'a> Evidence<'a> {
     fn unnamed(&self, d: &mut Diagnosis, explained: f64) {
         // A swing in one phase for all records may have taken the first step of one that has a phase in each.
         let of_the_gain = self.model.chosen.iter().all(|c| matches!(c.setting.law, AnyLaw::ParametricGain(_)));
-        match of_the_gain.then(|| swing(self.bench, self.selection)).flatten() {
+        match of_the_gain.then(|| gain_modulation(self.bench, self.selection)).flatten() {
             Some(f) => {
                 d.verdict = Verdict::Named;
                 d.findings.push(f);
@@ -173,14 +173,14 @@ impl<'a> Evidence<'a> {
 /// From findings to a verdict.
 pub(in crate::diagnose) fn judge(
     d: &mut Diagnosis,
-    bench: &Bench,
+    bench: &DiagnosisData,
     selection: &Selection,
     given: &Plant,
     reported: &Reported,
     by_others: ByOthers,
 ) {
     let evidence = Evidence::of(d, bench, selection, reported);
-    let ByOthers { logs, bumps, noise } = by_others;
+    let ByOthers { logs, shocks, noise } = by_others;
     if let Some(f) = logs {
         d.verdict = if f.port == Port::Controller { Verdict::Named } else { Verdict::DataFault };
         d.findings.push(f);
@@ -202,7 +202,7 @@ pub(in crate::diagnose) fn judge(
             evidence.unnamed(d, evidence.explained);
         }
     } else if d.findings.is_empty()
-        && let Some(f) = swing(bench, selection)
+        && let Some(f) = gain_modulation(bench, selection)
     {
         d.verdict = Verdict::Named;
         d.findings.push(f);
@@ -211,9 +211,9 @@ pub(in crate::diagnose) fn judge(
         d.findings.push(unexplained(bench, selection, 0.0));
     }
     if d.verdict != Verdict::DataFault {
-        take_lines(d, bench, selection, bumps);
+        take_lines(d, bench, selection, shocks);
     }
-    linear_story(d, bench, selection, given);
+    linear_verdict(d, bench, selection, given);
     if d.verdict == Verdict::Refit && !reported.refits {
         // The given plant stands; whether it agrees, its own error says.
         let far = d.fit.fit.rms_before > GIVEN_FAR * d.fit.fit.noise_floor;
@@ -226,7 +226,7 @@ pub(in crate::diagnose) fn judge(
 }
 
 /// Nothing is said to be explained while several times what repeats differ by stays in closed loop, where nothing drifts.
-fn far_from_noise(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
+fn far_from_noise(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection) {
     let says = matches!(d.verdict, Verdict::Named | Verdict::Family | Verdict::NoMismatch | Verdict::Refit);
     let figures = d.fit.holdout.unwrap_or(d.fit.fit);
     if !(says && bench.levels.from_repeats && loop_left(d, figures)) {
@@ -247,9 +247,9 @@ fn loop_left(d: &Diagnosis, figures: FitFigures) -> bool {
 }
 
 /// Pushes and lines, which were found before the search.
-fn take_lines(d: &mut Diagnosis, bench: &Bench, selection: &Selection, bumps: Vec<Finding>) {
+fn take_lines(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection, shocks: Vec<Finding>) {
     let (lines, unsteady) = line_findings(bench, selection);
-    for f in bumps.into_iter().chain(lines) {
+    for f in shocks.into_iter().chain(lines) {
         if d.findings.is_empty() {
             d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
         }
@@ -264,7 +264,7 @@ fn take_lines(d: &mut Diagnosis, bench: &Bench, selection: &Selection, bumps: Ve
 }
 
 /// What the fitted records do not show, or cannot.
-fn beyond_the_fit(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
+fn beyond_the_fit(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection) {
     // Nothing missing on the records that were fitted, and yet one that was not used is far off.
     if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)
         && let Some(f) = astray(bench, &d.held_out).and_then(|h| unseen(bench, selection, h))
@@ -293,13 +293,13 @@ fn believed(d: &mut Diagnosis, selection: &Selection) -> bool {
 }
 
 /// Whether, no record being repeated, the simulation leaves far more than a noise of the sensor: noise of torque, or missing physics.
-fn coloured(d: &Diagnosis, bench: &Bench, noise: f64) -> bool {
+fn coloured(d: &Diagnosis, bench: &DiagnosisData, noise: f64) -> bool {
     !bench.levels.from_repeats && d.fit.open_loop.is_some_and(|o| o.rms_after > COLOURED * noise)
 }
 
 /// Findings of the noise beside those of the search. What is left without a name is theirs where the linear refit comes down to their noise:
 /// a count of the encoder is no reason for what is a hundred times as large.
-fn take_noise(d: &mut Diagnosis, bench: &Bench, noise: Vec<Finding>) {
+fn take_noise(d: &mut Diagnosis, bench: &DiagnosisData, noise: Vec<Finding>) {
     let rounding = bench.grid.map_or(0.0, |g| g.step / 12f64.sqrt());
     let beyond = coloured(d, bench, bench.levels.sensor_rms.hypot(rounding));
     let wind = noise.iter().any(|f| f.port == Port::Torque);

@@ -4,7 +4,7 @@ use super::finding::{Estimate, Finding, Where};
 use super::naming::{HUM, RUNOUT, everywhere, text_of};
 use crate::diagnose::data::linear_form::{Sampled, free_motions};
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::noise::lines::Line;
 use crate::diagnose::noise::lines::mains;
 use crate::diagnose::rules::{HUM_COHERENCE, HUM_FADES, HUM_PERIODS, HUM_SPREAD};
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Every fit run with its error under the final model.
-pub(in crate::diagnose) fn left(bench: &Bench, selection: &Selection) -> Vec<(Run, Vec<f64>)> {
+pub(in crate::diagnose) fn left(bench: &DiagnosisData, selection: &Selection) -> Vec<(Run, Vec<f64>)> {
     let model = &selection.model;
     let mut out = Vec::new();
     // One repeat of every segment at a time stands in for its mean.
@@ -34,7 +34,7 @@ pub(in crate::diagnose) fn left(bench: &Bench, selection: &Selection) -> Vec<(Ru
 struct Phasors([Vec<[f64; 2]>; 3], f64);
 
 impl Phasors {
-    fn of(bench: &Bench, runs: &[(Run, Vec<f64>)], line: &Line) -> Phasors {
+    fn of(bench: &DiagnosisData, runs: &[(Run, Vec<f64>)], line: &Line) -> Phasors {
         let (t, body) = (bench.scene.sample_time_s, &bench.form.given.body);
         let over = |part: [usize; 2]| -> Vec<[f64; 2]> {
             let each = runs.iter().map(|(run, e)| {
@@ -84,21 +84,21 @@ fn estimate(values: &[f64], scale: f64, unit: &str) -> Estimate {
 }
 
 /// A line's place: as narrow as the longest record resolves (Hz).
-fn resolved(bench: &Bench, hz: f64) -> [f64; 2] {
+fn resolved(bench: &DiagnosisData, hz: f64) -> [f64; 2] {
     let width = 1.0 / bench.scene.duration_s.max(bench.scene.sample_time_s);
     [(hz - width).max(0.0), hz + width]
 }
 
 /// A line's frequency with its 95 % interval: the Cramér-Rao bound for a tone of the strength found, its phase each record's own
 /// (Rife & Boorstyn 1974).
-fn frequency(bench: &Bench, line: &Line) -> Estimate {
+fn frequency(bench: &DiagnosisData, line: &Line) -> Estimate {
     let off = 1.96 * (12.0 / (-2.0 * line.log_p).max(1.0)).sqrt() / (TAU * bench.scene.duration_s);
     Estimate { value: line.hz, low: line.hz - off, high: line.hz + off, unit: "Hz".into() }
 }
 
 /// One finding for all orders of the spindle, one for each other line; and the frequencies (Hz) of those that are none, but narrow
 /// bands of noise or something that rings.
-pub(super) fn line_findings(bench: &Bench, selection: &Selection) -> (Vec<Finding>, Vec<f64>) {
+pub(super) fn line_findings(bench: &DiagnosisData, selection: &Selection) -> (Vec<Finding>, Vec<f64>) {
     let errors = if bench.lines.is_empty() { Vec::new() } else { left(bench, selection) };
     let all: Vec<(&Line, Phasors)> = bench.lines.iter().map(|l| (l, Phasors::of(bench, &errors, l))).collect();
     let (hums, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|(_, p)| p.steady());
@@ -168,7 +168,7 @@ pub(super) fn same_line(a: &Finding, b: &Finding) -> bool {
 }
 
 /// What shows at some frequencies (Hz) in every repeat differently, and is no hum.
-pub(super) fn unsteady(bench: &Bench, frequencies_hz: &[f64]) -> Finding {
+pub(super) fn unsteady(bench: &DiagnosisData, frequencies_hz: &[f64]) -> Finding {
     let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
     let port = unexplained::FACTS.port;
     let strongest = bench.lines.iter().filter(|l| frequencies_hz.contains(&l.hz)).map(|l| l.log_p).fold(0.0, f64::min);

@@ -4,12 +4,12 @@ use super::clock::Clock;
 use super::diagnosis_json::Diagnosis;
 use super::finding::{Estimate, Finding, Verdict};
 use super::naming::{everywhere, text_of};
-use crate::diagnose::data::linear_form::{Knob, LinearForm, body_numbers};
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::data::linear_form::{FreeParameter, LinearForm, body_numbers};
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fit_inputs::Fit;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_fit::simulated_with;
-use crate::diagnose::fit::selected_effect::Chosen;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{FAMILY, LAGS_ALIKE, ONE_NUMBER};
 use crate::diagnose::search::selection::Selection;
@@ -42,7 +42,12 @@ impl Way<'_> {
     }
 
     /// Sum of squares with only some of the linear parameters free, and with one effect more where it is given; and those parameters.
-    fn restricted(self, bench: &Bench, keep: impl Fn(Knob) -> bool, more: Option<Chosen>) -> (f64, Vec<f64>) {
+    fn restricted(
+        self,
+        bench: &DiagnosisData,
+        keep: impl Fn(FreeParameter) -> bool,
+        more: Option<SelectedEffect>,
+    ) -> (f64, Vec<f64>) {
         match self {
             Way::Simulated(model) => {
                 let mut model = model.clone();
@@ -51,7 +56,7 @@ impl Way<'_> {
                 (cost, (0..p.len()).filter(|&i| keep(bench.form.knobs[i])).map(|i| p[i]).collect())
             }
             Way::Along(model) => {
-                let knobs: Vec<Knob> = bench.form.knobs.iter().copied().filter(|k| keep(*k)).collect();
+                let knobs: Vec<FreeParameter> = bench.form.knobs.iter().copied().filter(|k| keep(*k)).collect();
                 let form = LinearForm { knobs: knobs.clone(), ..bench.form.clone() };
                 let start = vec![0.0; knobs.len()];
                 let mut chosen = model.chosen.clone();
@@ -68,7 +73,7 @@ impl Way<'_> {
 }
 
 /// Lags that fit as well as a delay of `delay_s` does, beside linear parameters as given: a lag far above the band is a delay.
-fn lags_like(bench: &Bench, way: Way, delay_s: f64, cost: f64) -> Vec<String> {
+fn lags_like(bench: &DiagnosisData, way: Way, delay_s: f64, cost: f64) -> Vec<String> {
     let as_good = |law: &AnyLaw| way.restricted(bench, |_| false, Some(lag(law.clone(), delay_s))).0 < cost + FAMILY;
     lags(delay_s).into_iter().filter(as_good).map(|law| law.facts().name.to_owned()).collect()
 }
@@ -82,14 +87,14 @@ fn lags(time_constant_s: f64) -> [AnyLaw; 2] {
 const ITERATIONS: usize = 16;
 
 /// A lag whose time constant is looked for near a delay.
-fn lag(law: AnyLaw, near_s: f64) -> Chosen {
+fn lag(law: AnyLaw, near_s: f64) -> SelectedEffect {
     let range = vec![[0.1 * near_s, 10.0 * near_s]];
-    Chosen { setting: Setting::fixed(law), continuous: vec![true], range, step: 0 }
+    SelectedEffect { setting: Setting::fixed(law), continuous: vec![true], range, step: 0 }
 }
 
 /// A lag in the place of every change of the linear parameters.
 struct Lag {
-    chosen: Chosen,
+    chosen: SelectedEffect,
     /// Standard error of the logarithm of its time constant.
     spread: f64,
     cost: f64,
@@ -98,7 +103,7 @@ struct Lag {
 impl Lag {
     /// The lags of the library, each fitted beside linear parameters as given, the best first; `near_s` is a delay that does something
     /// like it.
-    fn alone(bench: &Bench, near_s: f64) -> Vec<Lag> {
+    fn alone(bench: &DiagnosisData, near_s: f64) -> Vec<Lag> {
         let form = LinearForm { knobs: Vec::new(), ..bench.form.clone() };
         let fitted = |law: AnyLaw| {
             let mut fit = Fit { form: &form, ..bench.fit(vec![lag(law, near_s)]) };
@@ -115,7 +120,7 @@ impl Lag {
     }
 
     /// The finding; `before` is the sum of squares of the given plant.
-    fn finding(&self, bench: &Bench, family: Vec<String>, before: f64) -> Finding {
+    fn finding(&self, bench: &DiagnosisData, family: Vec<String>, before: f64) -> Finding {
         let (says, port) = text_of(self.name());
         let given = &bench.form.given;
         let parameters = |by: f64| {
@@ -142,7 +147,7 @@ impl Lag {
 }
 
 /// What happened to the linear parameters of the `given` plant: nothing, the delay alone, one mode alone, or a refit.
-pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection, given: &Plant) {
+pub(super) fn linear_verdict(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection, given: &Plant) {
     if d.verdict == Verdict::LocatedUnexplained || d.verdict == Verdict::DataFault {
         return;
     }
@@ -163,7 +168,7 @@ pub(super) fn linear_story(d: &mut Diagnosis, bench: &Bench, selection: &Selecti
 }
 
 /// Whether the given numbers still do, but for one of them; says which.
-fn simple_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection) -> bool {
+fn simple_story(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection) -> bool {
     let all = bench.form.knobs.len() as f64;
     // Chi-square of as many parameters as were freed, and four of its standard deviations.
     let allowed = |free: usize| {
@@ -180,16 +185,20 @@ fn simple_story(d: &mut Diagnosis, bench: &Bench, selection: &Selection) -> bool
         fixed.push(cost);
     }
     for (way, &fixed) in Way::all(selection).zip(&fixed) {
-        let (delay, p) = way.restricted(bench, |k| k == Knob::Delay, None);
+        let (delay, p) = way.restricted(bench, |k| k == FreeParameter::Delay, None);
         let t = bench.scene.sample_time_s;
         let value = p[0] * t;
         if delay - way.full() >= allowed(1) {
             later_s = value;
             continue;
         }
-        let sigma =
-            bench.form.knobs.iter().position(|k| *k == Knob::Delay).map_or(0.0, |i| selection.model.refitted.spread(i))
-                * t;
+        let sigma = bench
+            .form
+            .knobs
+            .iter()
+            .position(|k| *k == FreeParameter::Delay)
+            .map_or(0.0, |i| selection.model.refitted.spread(i))
+            * t;
         let &Facts { name: effect, says, port, .. } = &extra_delay::FACTS;
         let mut family = vec![effect.to_owned()];
         if value > 0.0 {

@@ -1,8 +1,8 @@
 //! Where an effect shows: records, time, band, zone, direction; by the energy of what it adds to the whitened error.
 
 use super::finding::Where;
-use crate::diagnose::data::stacked_records::{Segment, Stack};
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::data::stacked_records::{Segment, StackedRecords};
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::trajectory::Trajectory;
 use crate::numeric::spectrum::forward;
 
@@ -80,7 +80,7 @@ pub struct Part<'a> {
 }
 
 /// Where `signal`, stacked and whitened, has its energy.
-pub fn place(bench: &Bench, stack: &Stack, signal: &[f64]) -> Where {
+pub fn place(bench: &DiagnosisData, stack: &StackedRecords, signal: &[f64]) -> Where {
     let part = |(s, motion): (&Segment, &Trajectory)| Part {
         records: s.runs.iter().map(|&r| bench.runs[r].name.clone()).collect(),
         signal: &signal[s.start..s.start + s.len],

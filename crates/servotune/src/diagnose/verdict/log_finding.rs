@@ -1,4 +1,4 @@
-//! Findings about the logs themselves, from what hygiene saw.
+//! Findings about the logs themselves, from what data checks saw.
 
 use super::finding::{Estimate, Finding, Where};
 use super::naming::{everywhere, plain};

@@ -10,8 +10,8 @@ use super::naming::everywhere;
 use crate::controller::Law;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::Corrected;
-use crate::diagnose::fit::diagnosis_data::Bench;
-use crate::diagnose::fit::simulation::{Judged, errors, rms};
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::simulation::{SimulatedModel, errors, rms};
 use crate::diagnose::free_form::curve::FreeForm;
 use crate::diagnose::free_form::estimation::{Estimated, Foretelling, estimated, grounds};
 use crate::diagnose::free_form::gauge::Plain;
@@ -49,7 +49,7 @@ pub(in crate::diagnose) struct Standing<'a> {
 
 /// Looks for a curve and takes it where it is worth it.
 pub(in crate::diagnose) fn stand_in(
-    bench: &Bench,
+    bench: &DiagnosisData,
     selection: &Selection,
     standing: &Standing,
     progress: &mut dyn FnMut(&str),
@@ -89,16 +89,16 @@ fn taken<'e, 'a>(found: &'e Estimated<'a>) -> Option<&'e Foretelling<'a>> {
 }
 
 /// The runs that judge: those that were not used, else those that were.
-fn judged_runs(bench: &Bench) -> Vec<usize> {
+fn judged_runs(bench: &DiagnosisData) -> Vec<usize> {
     let role = |role: Role| -> Vec<usize> {
-        (0..bench.runs.len()).filter(|&i| bench.runs[i].role == role && !bench.runs[i].bumped).collect()
+        (0..bench.runs.len()).filter(|&i| bench.runs[i].role == role && !bench.runs[i].shocked).collect()
     };
     Some(role(Role::Holdout)).filter(|h| !h.is_empty()).unwrap_or_else(|| role(Role::Fit))
 }
 
 /// Recorded less simulated position of every run under the model.
 fn shown(
-    bench: &Bench,
+    bench: &DiagnosisData,
     model: &Corrected,
     best: &Foretelling,
     one_place: &Stretches,
@@ -115,12 +115,12 @@ fn shown(
     let every: Vec<&Run> = bench.runs.iter().collect();
     let effects = model.effects.iter().collect();
     let scene = &bench.scene;
-    let judged = Judged { plant: &model.plant, effects, own: vec![], lines: &bench.lines, fit: None, scene };
+    let judged = SimulatedModel { plant: &model.plant, effects, own: vec![], lines: &bench.lines, fit: None, scene };
     errors(&judged, &every, closed)
 }
 
 /// The entry of an effect with named parameters.
-fn entry(bench: &Bench, setting: &Setting) -> PhysicsEntry {
+fn entry(bench: &DiagnosisData, setting: &Setting) -> PhysicsEntry {
     let parameters = setting.parameters(&bench.scene).into_iter().map(|q| (q.name.to_owned(), q.value));
     PhysicsEntry { effect: setting.facts().name.into(), parameters: parameters.collect(), curve: None }
 }
@@ -138,7 +138,7 @@ fn knots(c: &Plain) -> Vec<CurveKnot> {
 }
 
 /// The plant with everything that the fit put beside it.
-fn model(bench: &Bench, best: &Foretelling, c: &Plain) -> Corrected {
+fn model(bench: &DiagnosisData, best: &Foretelling, c: &Plain) -> Corrected {
     let trial = &best.trial;
     let curved = matches!(trial.shape, Shape::Curve(..));
     let mut plant: Plant = bench.form.plant(if curved { &c.p } else { &trial.p });
@@ -169,7 +169,7 @@ pub fn curve_title(port: &str, argument: &str) -> String {
     }
 }
 
-fn described(bench: &Bench, found: &Estimated, explained_share: f64) -> FreeForm {
+fn described(bench: &DiagnosisData, found: &Estimated, explained_share: f64) -> FreeForm {
     let c = &found.plain;
     let form = &bench.form.given;
     let [port, argument] = c.port.names();
@@ -198,7 +198,7 @@ fn described(bench: &Bench, found: &Estimated, explained_share: f64) -> FreeForm
 }
 
 /// The finding of a reading that folds or ends at limits.
-fn reading_finding(bench: &Bench, best: &Foretelling, found: &Estimated) -> Finding {
+fn reading_finding(bench: &DiagnosisData, best: &Foretelling, found: &Estimated) -> Finding {
     let &Facts { name: effect, says, port, .. } = &sensor_curve::FACTS;
     let none = || Setting::fixed(SensorCurve::Folded { lowest: 0.0, at: 0.0 });
     let setting = best.trial.reading.effect().unwrap_or_else(none);
@@ -246,7 +246,7 @@ pub struct MissingCurve {
 }
 
 /// The curve at the port where it foretells best, whatever the verdict; none where it foretells no better than a linear plant.
-pub fn missing_curve(bench: &Bench, selection: &Selection) -> Option<MissingCurve> {
+pub fn missing_curve(bench: &DiagnosisData, selection: &Selection) -> Option<MissingCurve> {
     let [ground, one_place] = grounds(bench);
     let found = estimated(bench, [&ground, &one_place], &starts(bench, selection), &mut |_| {})?;
     let best = taken(&found).filter(|b| matches!(b.trial.shape, Shape::Curve(..)))?;
@@ -256,7 +256,7 @@ pub fn missing_curve(bench: &Bench, selection: &Selection) -> Option<MissingCurv
 }
 
 /// Linear parameters from which curves are looked for: the given plant, the refit, and the plant beside the laws that were found.
-fn starts(bench: &Bench, selection: &Selection) -> Vec<Vec<f64>> {
+fn starts(bench: &DiagnosisData, selection: &Selection) -> Vec<Vec<f64>> {
     let mut starts = vec![vec![0.0; bench.form.knobs.len()]];
     for p in [&selection.baseline.refitted.p, &selection.last().refitted.p] {
         if starts.iter().all(|s| s != p) {

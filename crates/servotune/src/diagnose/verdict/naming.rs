@@ -4,9 +4,9 @@ use super::finding::{Estimate, Finding, Where};
 use super::localisation::place;
 use crate::diagnose::data::linear_form::Sampled;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::regressors::position_columns;
-use crate::diagnose::fit::selected_effect::Chosen;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::noise::lines::mains;
 use crate::diagnose::rules::{
@@ -49,7 +49,7 @@ pub(in crate::diagnose) fn everywhere(runs: &[&Run]) -> Where {
 }
 
 /// The finding about effect `at` of the final model; none where its step took nothing.
-pub(in crate::diagnose) fn finding(bench: &Bench, selection: &Selection, at: usize) -> Option<Finding> {
+pub(in crate::diagnose) fn finding(bench: &DiagnosisData, selection: &Selection, at: usize) -> Option<Finding> {
     let chosen = &selection.model.chosen[at];
     let step = &selection.steps[chosen.step];
     let c = &step.candidates[step.tried[step.taken?].0];
@@ -125,7 +125,7 @@ pub(in crate::diagnose) fn finding(bench: &Bench, selection: &Selection, at: usi
 
 /// Effects that do the same to the recorded position from another place of a linear machine: where a lag sits, before the plant or behind
 /// it, no record of the two ends tells.
-fn twins<'a>(bench: &'a Bench, chosen: &'a Chosen) -> impl Iterator<Item = &'static str> + 'a {
+fn twins<'a>(bench: &'a DiagnosisData, chosen: &'a SelectedEffect) -> impl Iterator<Item = &'static str> + 'a {
     let ratio = |s: &Setting, w: f64| match s.response_share(&bench.scene, w) {
         Share::Ratio(r) => Some(r),
         _ => None,
@@ -146,7 +146,7 @@ fn twins<'a>(bench: &'a Bench, chosen: &'a Chosen) -> impl Iterator<Item = &'sta
 }
 
 /// What the effect adds, whitened and stacked.
-fn effect_signal(bench: &Bench, selection: &Selection, at: usize) -> Vec<f64> {
+fn effect_signal(bench: &DiagnosisData, selection: &Selection, at: usize) -> Vec<f64> {
     let model = &selection.model;
     let chosen = &model.chosen[at];
     let plant = bench.form.carrier(&model.refitted.p).plant;
@@ -175,14 +175,14 @@ fn single_order(setting: &Setting) -> Option<f64> {
 
 /// Parameters of the chosen effect `at` with 95 % intervals: its numbers moved together along each direction that errs independently,
 /// the changes of each parameter added as squares; widened where the model leaves more than noise, and by what no machine follows a law to.
-fn estimates(bench: &Bench, selection: &Selection, at: usize) -> BTreeMap<String, Estimate> {
+fn estimates(bench: &DiagnosisData, selection: &Selection, at: usize) -> BTreeMap<String, Estimate> {
     let model = selection.last();
     let scene = &bench.scene;
     let chosen = &model.chosen[at];
     let base = chosen.setting.parameters(scene);
     let widen = (model.cost / model.freedom).max(1.0).sqrt() * 1.96;
-    let strengths_of = |c: &Chosen| if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
-    let moving = |c: &Chosen| c.continuous.iter().filter(|c| **c).count();
+    let strengths_of = |c: &SelectedEffect| if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
+    let moving = |c: &SelectedEffect| c.continuous.iter().filter(|c| **c).count();
     let (before, all) = (&model.chosen[..at], &model.chosen);
     let strength = bench.form.knobs.len() + before.iter().map(strengths_of).sum::<usize>();
     let number =
@@ -235,7 +235,7 @@ fn scaled(law: &AnyLaw, place: usize, by: f64) -> AnyLaw {
 }
 
 /// There, but no effect of the library explains it.
-pub(in crate::diagnose) fn unexplained(bench: &Bench, selection: &Selection, explained: f64) -> Finding {
+pub(in crate::diagnose) fn unexplained(bench: &DiagnosisData, selection: &Selection, explained: f64) -> Finding {
     let (fit, model) = (bench.fit(vec![]), &selection.baseline);
     let (error, _) = fit.screen_basis(&model.refitted.p);
     let place = place(bench, &bench.stack, &error);

@@ -3,8 +3,8 @@
 use super::diagnosis_json::Diagnosis;
 use super::finding::{NextExperiment, Verdict};
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::diagnosis_data::Bench;
-use crate::diagnose::fit::simulation::{Judged, error};
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::simulation::{SimulatedModel, error};
 use crate::diagnose::noise::whitening::Whitener;
 use crate::diagnose::search::selection::Selection;
 use crate::physics::{Scene, facts};
@@ -17,7 +17,7 @@ const STROKE: f64 = 2.0;
 
 /// Proposes the record that tells the final model best from its strongest rival: the existing excitations at other sizes
 /// (T-optimality over a catalogue; Atkinson & Fedorov 1975), by simulating both and counting the whitened difference.
-pub(in crate::diagnose) fn propose(d: &mut Diagnosis, bench: &Bench, selection: &Selection) {
+pub(in crate::diagnose) fn propose(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection) {
     let standing = match d.verdict {
         Verdict::DataFault => "record again with the log repaired; every other verdict rests on it".to_owned(),
         Verdict::Undecidable => {
@@ -66,7 +66,7 @@ pub(in crate::diagnose) fn propose(d: &mut Diagnosis, bench: &Bench, selection: 
 }
 
 fn difference(
-    bench: &Bench,
+    bench: &DiagnosisData,
     run: &Run,
     a: &crate::diagnose::fit::model::Model,
     b: &crate::diagnose::fit::model::Model,
@@ -75,7 +75,12 @@ fn difference(
         let fixed =
             crate::diagnose::fit::corrected_model::corrected(&bench.form, &m.refitted.p, &m.chosen, &bench.scene);
         let (effects, scene): (_, &Scene) = (fixed.effects.iter().collect(), &bench.scene);
-        error(&Judged { plant: &fixed.plant, effects, own: Vec::new(), lines: &[], fit: None, scene }, run, None).ok()
+        error(
+            &SimulatedModel { plant: &fixed.plant, effects, own: Vec::new(), lines: &[], fit: None, scene },
+            run,
+            None,
+        )
+        .ok()
     };
     let (Some(x), Some(y)) = (simulate(a), simulate(b)) else { return 0.0 };
     // A record that would leave the stroke is no proposal.

@@ -1,14 +1,14 @@
 //! What the noise itself tells: a coarse count of the encoder, noise that grows with the speed, torque without a pattern, an encoder louder than
 //! it should be.
 //!
-//! In: the bench's levels, what repeats differ by, the levels that a sound machine shows where they are given. Out: findings.
+//! In: the diagnosis data's levels, what repeats differ by, the levels that a sound machine shows where they are given. Out: findings.
 
 use super::finding::{Estimate, Finding, FitFigures};
 use super::naming::everywhere;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::noise::chance::log_tail;
-use crate::diagnose::noise::torque_noise::Unrest;
+use crate::diagnose::noise::torque_noise::TorqueNoise;
 use crate::diagnose::rules::{NOISE_DEPARTED, NOISE_LARGER, NOISE_SLOPE, NOISE_WITH_SPEED};
 use crate::physics::{Facts, broadband_disturbance, encoder_noise, jitter, quantisation};
 use crate::recording::NominalNoise;
@@ -20,14 +20,14 @@ const SHAPE: f64 = 0.05;
 
 /// Findings of the noise; `left` is what the best model leaves on the fit records.
 pub(in crate::diagnose) fn noise_findings(
-    bench: &Bench,
-    unrest: Option<&Unrest>,
+    bench: &DiagnosisData,
+    torque_noise: Option<&TorqueNoise>,
     nominal: &NominalNoise,
     left: FitFigures,
 ) -> Vec<Finding> {
     let mut all: Vec<Finding> = counted(bench).into_iter().collect();
     let larger = left.rms_after.powi(2) > NOISE_LARGER * bench.levels.sensor_rms.powi(2);
-    let blown = unrest.filter(|u| match nominal.windage_rms {
+    let blown = torque_noise.filter(|u| match nominal.windage_rms {
         Some(level) => u.rms_command > NOISE_DEPARTED * level,
         None => larger,
     });
@@ -40,7 +40,7 @@ pub(in crate::diagnose) fn noise_findings(
 }
 
 /// The encoder's count, where it makes a part of the noise that is worth a word.
-fn counted(bench: &Bench) -> Option<Finding> {
+fn counted(bench: &DiagnosisData) -> Option<Finding> {
     let grid = bench.grid.filter(|_| bench.coarse())?;
     let off = grid.off.max(GRADUATION * grid.step);
     let unit = bench.form.given.position_unit.clone();
@@ -49,7 +49,7 @@ fn counted(bench: &Bench) -> Option<Finding> {
 }
 
 /// Torque without a pattern, with level and corner.
-fn wind(bench: &Bench, u: &Unrest) -> Finding {
+fn wind(bench: &DiagnosisData, u: &TorqueNoise) -> Finding {
     let unit = bench.form.given.command_unit.clone();
     let off = 1.96 * u.spread.hypot(SHAPE) * u.rms_command;
     let level = Estimate { value: u.rms_command, low: u.rms_command - off, high: u.rms_command + off, unit };
@@ -67,7 +67,7 @@ fn wind(bench: &Bench, u: &Unrest) -> Finding {
 }
 
 /// An encoder whose noise is above the stated one.
-fn loud(bench: &Bench, stated: f64) -> Option<Finding> {
+fn loud(bench: &DiagnosisData, stated: f64) -> Option<Finding> {
     let level = bench.levels.sensor_rms;
     if !bench.levels.from_repeats || level < NOISE_DEPARTED * stated {
         return None;
@@ -83,12 +83,12 @@ fn loud(bench: &Bench, stated: f64) -> Option<Finding> {
     Some(f)
 }
 
-fn fitted(bench: &Bench) -> Vec<&Run> {
+fn fitted(bench: &DiagnosisData) -> Vec<&Run> {
     bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect()
 }
 
 /// Noise that grows with the speed: a clock that trembles, or an encoder that does.
-fn faster(bench: &Bench) -> Option<Finding> {
+fn faster(bench: &DiagnosisData) -> Option<Finding> {
     // Squares of the whitened repeats against the square of the speed.
     let (mut n, mut sx, mut sy, mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for (run, series) in &bench.repeats {

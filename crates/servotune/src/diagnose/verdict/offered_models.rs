@@ -7,10 +7,10 @@
 use crate::controller::Law;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, corrected};
-use crate::diagnose::fit::diagnosis_data::Bench;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_problem::descended;
-use crate::diagnose::fit::simulation::{Judged, errors, floor, rms, size};
+use crate::diagnose::fit::simulation::{SimulatedModel, errors, floor, rms, size};
 use crate::diagnose::rules::{REFIT_BETTER, REFIT_FAR, SIMULATION_ALIKE, SIMULATION_SAMPLING};
 use crate::diagnose::search::selection::Selection;
 use crate::lti::Plant;
@@ -50,7 +50,7 @@ pub(in crate::diagnose) struct Reported {
 /// How models are simulated for the report.
 #[derive(Clone, Copy)]
 pub(in crate::diagnose) struct Reporting<'a> {
-    pub bench: &'a Bench,
+    pub bench: &'a DiagnosisData,
     pub selection: &'a Selection,
     /// All runs, whole.
     pub runs: &'a [Run],
@@ -79,7 +79,8 @@ impl<'a> Reporting<'a> {
         if offer.full {
             return errors(&made.judged(self.bench, self.selection), runs, closed);
         }
-        let plain = Judged { own: Vec::new(), lines: &[], fit: None, ..made.judged(self.bench, self.selection) };
+        let plain =
+            SimulatedModel { own: Vec::new(), lines: &[], fit: None, ..made.judged(self.bench, self.selection) };
         errors(&plain, runs, closed)
     }
 
@@ -93,7 +94,7 @@ impl<'a> Reporting<'a> {
 
     /// Records of a role that no push fell into.
     fn of_role(&self, role: Role) -> Vec<&'a Run> {
-        self.runs.iter().filter(|r| r.role == role && !r.bumped).collect()
+        self.runs.iter().filter(|r| r.role == role && !r.shocked).collect()
     }
 
     /// The model fitted by the reported error, where the logs are sound.

@@ -2,11 +2,11 @@
 
 use super::finding::{Estimate, Finding, Where};
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::shock::Bump;
+use crate::diagnose::fit::shock::DetectedShock;
 use crate::physics::{Facts, shock};
 use std::collections::BTreeMap;
 
-impl Bump {
+impl DetectedShock {
     /// The finding, in a machine with these units.
     pub(in crate::diagnose) fn finding(&self, runs: &[Run], command_unit: &str) -> Finding {
         let &Facts { name: effect, says, port, .. } = &shock::FACTS;
