@@ -47,32 +47,48 @@ def functions(text: str) -> list[tuple[int, str]]:
     return found
 
 
-def rooms(use: str) -> set[str]:
-    """First names of the paths of `use super::...`: what lies behind them may bear a file's name too."""
+def paths(text: str) -> list[str]:
+    """Paths that begin with `super::` or `crate::`, groups in braces taken apart."""
+    code = "\n".join(line for line in text.splitlines() if not line.lstrip().startswith("//"))
+    found = []
+    for m in re.finditer(r"(?<![\w:])(?:super|crate)::[\w:]*", code):
+        end, depth = m.end(), 0
+        if code[end : end + 1] == "{" and m.group().endswith("::"):
+            while depth or end == m.end():
+                depth += (code[end] == "{") - (code[end] == "}")
+                end += 1
+        found += apart(re.sub(r"\s", "", code[m.start() : end]))
+    return found
+
+
+def apart(tree: str) -> list[str]:
+    """`a::{b, c::{d, e}}` as `a::b`, `a::c::d`, `a::c::e`."""
+    head, brace, group = tree.partition("{")
+    if not brace:
+        return [tree]
     depth, parts = 0, [""]
-    for c in re.sub(r"\s", "", use[1:-1] if use.startswith("{") else use):
+    for c in group[:-1]:
         depth += (c == "{") - (c == "}")
-        parts += [""] if c == "," and depth == 0 else []
+        parts += [""] if c == "," and not depth else []
         parts[-1] += c if c != "," or depth else ""
-    return {p.split("::")[0] for p in parts}
+    return [head + p for part in parts if part for p in apart(part)]
 
 
 def circles(root: Path) -> int:
-    """Files that import one another in a circle within their folder."""
+    """Files that import one another in a circle within their crate."""
     count = 0
-    for folder in {f.parent for f in root.rglob("*.rs") if "target" not in f.parts and "tests" not in f.parts}:
-        names = {f.stem for f in folder.glob("*.rs")} - {"mod", "lib", "main"}
-        edges = {
-            n: {
-                m
-                for use in re.findall(r"^use super::(.*?);", without_tests((folder / f"{n}.rs").read_text()), re.M | re.S)
-                for m in rooms(use)
-                if m in names and m != n
-            }
-            for n in names
-        }
+    for source in [root / "src", *sorted(root.glob("crates/*/src"))]:
+        files = {f.relative_to(source).with_suffix("").parts: f for f in source.rglob("*.rs") if f.stem not in ("mod", "lib", "main")}
+        edges = {place: set() for place in files}
+        for place, file in files.items():
+            for path in paths(without_tests(file.read_text())):
+                full = list(place)
+                for part in filter(None, path.split("::")):
+                    full = [] if part == "crate" else full[:-1] if part == "super" else [*full, part]
+                ends = [tuple(full[:n]) for n in range(len(full), 0, -1) if tuple(full[:n]) in files]
+                edges[place] |= set(ends[:1]) - {place}
 
-        def reached(start: str) -> set[str]:
+        def reached(start: tuple[str, ...]) -> set[tuple[str, ...]]:
             seen, todo = set(), [start]
             while todo:
                 for m in edges[todo.pop()] - seen:
@@ -80,7 +96,7 @@ def circles(root: Path) -> int:
                     todo.append(m)
             return seen
 
-        count += sum(n in reached(n) for n in names)
+        count += sum(n in reached(n) for n in files)
     return count
 
 
@@ -130,7 +146,7 @@ def figures(root: Path) -> list[tuple[str, str]]:
         ("lines of the installed product, tests left out", f"{lines}"),
         ("files", f"{len(files)}"),
         ("public items", f"{sum(len(PUBLIC.findall(t)) for t in code.values())}"),
-        ("files in circles of imports within their folder", f"{circles(root)}"),
+        ("files in circles of imports within their crate", f"{circles(root)}"),
         ("longest function, lines", f"{longest[0]} (`{longest[1]}`, {longest[2]})"),
         (f"functions above {LONG_FUNCTION} lines", f"{len(long)}"),
         ("of these in `diagnose`", f"{sum('/diagnose/' in f[2] for f in long)}"),

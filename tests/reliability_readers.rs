@@ -295,7 +295,7 @@ fn a_document_without_end_is_refused() {
     );
 }
 
-// M4 and M5: the equations of a diagnosis are tested where they stand (`crates/servotune/src/diagnose/stack.rs`).
+// M4 and M5: the equations of a diagnosis are tested where they stand (`crates/servotune/src/diagnose/data/stacked_records.rs`).
 
 #[test]
 fn values_and_frequencies_beyond_any_machine_are_no_response() {

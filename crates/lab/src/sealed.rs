@@ -5,7 +5,7 @@
 use super::foreign::{Foreign, SOUND};
 use super::foreign_stage::{BARE, Stage};
 use super::foreign_trial::{Model, Trial};
-use super::sealed_draw::{Drawn, Made, WHOLE, draw};
+use super::sealed_draw::{Drawn, Made, WHOLE, draw, kind};
 use super::sealed_page::page;
 use super::sealed_row::{Outcome, Row, outcome};
 use super::{Study, StudyError};
@@ -67,15 +67,22 @@ impl SealedCase {
 
 /// The cases of a set, those that cannot be made left out.
 pub fn sealed_set(seed: u64, count: usize, samples: usize) -> Vec<SealedCase> {
-    (0..count)
-        .into_par_iter()
-        .filter_map(|place| (0..DRAWS).find_map(|again| made(seed, place, samples, again)))
-        .collect()
+    at_places(seed, samples, (0..count).collect())
+}
+
+fn at_places(seed: u64, samples: usize, places: Vec<usize>) -> Vec<SealedCase> {
+    let at = |place: usize| (0..DRAWS).find_map(|again| made(seed, place, samples, again));
+    places.into_par_iter().filter_map(at).collect()
+}
+
+/// Name of the case at a place.
+fn name(place: usize) -> String {
+    format!("s{place:03}_{}", kind(place).replace('+', "_"))
 }
 
 fn made(seed: u64, place: usize, samples: usize, again: u64) -> Option<SealedCase> {
     let drawn = draw(seed, place, samples, again);
-    let id = format!("s{place:03}_{}", drawn.kind.replace('+', "_"));
+    let id = name(place);
     let made = match &drawn.made {
         Made::Arm(trial) => trial.made(&id),
         Made::Stage(stage, size) => stage.made(&id, *size),
@@ -200,15 +207,15 @@ pub fn sealed(
     Ok(study)
 }
 
-/// Some cases of a set, by their names or the beginnings of them: the diagnoses as files, the lines as they are known.
+/// Some cases of a set, by their names, the beginnings of them or their kinds: the diagnoses as files, the lines as they are known.
 pub fn sealed_cases(
     seed: u64,
     count: Option<usize>,
     names: &[String],
     say: &mut (dyn FnMut(&str) + Send),
 ) -> Result<Study, StudyError> {
-    let mut cases = sealed_set(seed, count.unwrap_or(WHOLE), SAMPLES);
-    cases.retain(|c| names.iter().any(|n| c.id.starts_with(n.as_str())));
+    let asked = |place: &usize| names.iter().any(|n| name(*place).starts_with(n.as_str()) || kind(*place) == n);
+    let cases = at_places(seed, SAMPLES, (0..count.unwrap_or(WHOLE)).filter(asked).collect());
     let mut study = Study::default();
     for (case, (_, diagnosis)) in cases.iter().zip(rows(&cases, say)?) {
         if let Some(d) = diagnosis {

@@ -57,7 +57,7 @@ const STAGE_DEAD: usize = 6;
 pub(super) const WHOLE: usize = 208;
 
 /// The kind of a place in the set. Places go through the kinds in turn, so that a part of a set holds of all.
-fn kind(place: usize) -> &'static str {
+pub(super) fn kind(place: usize) -> &'static str {
     let all: Vec<(&str, usize)> = KINDS.into_iter().chain([("stage_dead_band", STAGE_DEAD)]).collect();
     // Each case of a kind stands at its share of the whole.
     let mut places: Vec<(f64, usize, &str)> = Vec::new();

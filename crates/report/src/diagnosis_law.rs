@@ -7,7 +7,7 @@ use super::ReportError;
 use super::diagnosis_shown::{Shown, short, words};
 use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Scale, Series};
 use super::time::{CurveKind, TimeCurve, TimePanel, time};
-use servotune::diagnose::{Chosen, Trajectory};
+use servotune::diagnose::{SelectedEffect, Trajectory};
 use servotune::lti::{Body, Plant};
 use servotune::physics::{AnyLaw, COLUMNS, Entry, Sample, Scene, Setting, ShownOver, describing};
 use std::f64::consts::TAU;
@@ -35,7 +35,7 @@ pub(super) fn added(law: &AnyLaw, strengths: &[f64], scene: &Scene, motion: &Tra
 }
 
 /// Strengths of a chosen effect in one segment.
-pub(super) fn own(c: &Chosen, segment: usize) -> &[f64] {
+pub(super) fn own(c: &SelectedEffect, segment: usize) -> &[f64] {
     if c.setting.facts().per_record {
         c.setting.strengths.get(segment * c.setting.facts().columns..).unwrap_or(&[])
     } else {
@@ -63,7 +63,7 @@ pub(super) fn law_figures(s: &Shown) -> Result<Vec<Figure>, ReportError> {
     Ok(figures)
 }
 
-fn law_figure(s: &Shown, c: &Chosen, segment: usize, value: &[f64]) -> Result<Figure, ReportError> {
+fn law_figure(s: &Shown, c: &SelectedEffect, segment: usize, value: &[f64]) -> Result<Figure, ReportError> {
     let (bench, facts) = (&s.made.bench, c.setting.facts());
     let motion = &bench.trajectories[segment].samples;
     let way = c.effect().shown_over();

@@ -1,21 +1,21 @@
 //! The diagnosis of a case, step by step: logs, noise, linear refit, search, judgement on hold-out records, verdict.
 
-use super::bench::Bench;
-use super::bump::set_aside;
-use super::cleared::cleared;
 use super::diagnose_error::DiagnoseError;
-use super::diagnosed::Diagnosed;
-use super::excerpt::excerpts;
-use super::fitted::refit;
-use super::ground;
-use super::judge::rms;
-use super::logs::check;
-use super::pace::Pace;
+use super::preconditions;
+use super::progress::Pace;
 use super::rules::MEASURED_COMMAND;
-use super::run::{Run, runs};
 use super::settings::DiagnoseSettings;
 use super::trial::Trial;
 use crate::controller::{Controller, Law};
+use crate::diagnose::data::excerpt::excerpts;
+use crate::diagnose::data::run::{Run, runs};
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::fitted_model::refit;
+use crate::diagnose::fit::shock::set_aside;
+use crate::diagnose::fit::simulation::rms;
+use crate::diagnose::search::cleared_plant::cleared;
+use crate::diagnose::verdict::diagnosed::Diagnosed;
+use crate::diagnose::verdict::log_checks::check;
 use crate::lti::{Body, Plant};
 use crate::recording::{Case, Role};
 
@@ -52,7 +52,7 @@ pub fn diagnose(
     let sample_time_s = controller.map_or(sample_time_s, |c| c.sample_time_s);
     progress("checking the logs");
     let law = controller.map(Law::new).transpose()?;
-    let hygiene = check(case, &mut all, given, law.as_ref(), sample_time_s)?;
+    let log_checks = check(case, &mut all, given, law.as_ref(), sample_time_s)?;
     let mut remarks = Vec::new();
     let mut whole = all;
     let cut = excerpts(&whole, sample_time_s);
@@ -60,8 +60,8 @@ pub fn diagnose(
         let kept: usize = cut.iter().filter(|r| r.role == Role::Fit).map(Run::len).sum();
         remarks.push(format!("the search was made on excerpts of the fit records, {kept} samples together; figures are of the whole records"));
     }
-    let mut bench = Bench::new(given, cut.unwrap_or_else(|| whole.clone()), sample_time_s, case.spindle_hz)?;
-    ground::check(&bench)?;
+    let mut bench = DiagnosisData::new(given, cut.unwrap_or_else(|| whole.clone()), sample_time_s, case.spindle_hz)?;
+    preconditions::check(&bench)?;
     if controller.is_none() {
         progress("is the command held between samples, or measured");
         let (better, measured) = held_or_measured(bench, case, given, settings.select.iterations, &mut remarks)?;
@@ -70,7 +70,7 @@ pub fn diagnose(
             whole = whole.iter().map(Run::measured).collect();
         }
     }
-    let sound = hygiene.finding.is_none();
+    let sound = log_checks.finding.is_none();
     let start = sound.then(|| cleared(&bench, settings.select.iterations, &mut |step: &str| progress(step))).flatten();
     if let Some(start) = start {
         remarks.push(match start.law {
@@ -82,28 +82,36 @@ pub fn diagnose(
             }
             None => "the search set out from a plant fitted to the balance of torques: the given one is far off".into(),
         });
-        bench = Bench::new(&start.plant, bench.runs, sample_time_s, case.spindle_hz)?;
+        bench = DiagnosisData::new(&start.plant, bench.runs, sample_time_s, case.spindle_hz)?;
         bench.foretold = start.law;
     }
-    let bumps = set_aside(&mut bench, given, case.spindle_hz, settings.select.iterations)?;
-    whole.iter_mut().zip(&bench.runs).for_each(|(w, r)| w.bumped = r.bumped);
-    let closed = law.as_ref().filter(|_| hygiene.closed);
-    let trial =
-        Trial { case, given, whole: &whole, closed, settings, hygiene: &hygiene, bumps: &bumps, remarks: &remarks };
+    let shocks = set_aside(&mut bench, given, case.spindle_hz, settings.select.iterations)?;
+    whole.iter_mut().zip(&bench.runs).for_each(|(w, r)| w.shocked = r.shocked);
+    let closed = law.as_ref().filter(|_| log_checks.closed);
+    let trial = Trial {
+        case,
+        given,
+        whole: &whole,
+        closed,
+        settings,
+        log_checks: &log_checks,
+        shocks: &shocks,
+        remarks: &remarks,
+    };
     trial.best(bench, &mut progress)
 }
 
-/// The bench with the command as it fits better: held between samples, or measured at them; and whether it is the latter.
+/// The diagnosis data with the command as it fits better: held between samples, or measured at them; and whether it is the latter.
 fn held_or_measured(
-    bench: Bench,
+    bench: DiagnosisData,
     case: &Case,
     given: &Plant,
     iterations: usize,
     remarks: &mut Vec<String>,
-) -> Result<(Bench, bool), DiagnoseError> {
+) -> Result<(DiagnosisData, bool), DiagnoseError> {
     let measured: Vec<Run> = bench.runs.iter().map(Run::measured).collect();
-    let other = Bench::new(given, measured, bench.scene.sample_time_s, case.spindle_hz)?;
-    let left = |b: &Bench| {
+    let other = DiagnosisData::new(given, measured, bench.scene.sample_time_s, case.spindle_hz)?;
+    let left = |b: &DiagnosisData| {
         let mut b = b.clone();
         let p = refit(&mut b, iterations).refitted.p;
         rms(&b.without_starts(b.fit(vec![]).errors(&p)))

@@ -1,6 +1,6 @@
 //! How a diagnosis is made.
 
-use super::select_settings::SelectSettings;
+use crate::diagnose::search::select_settings::SelectSettings;
 use crate::recording::NominalNoise;
 
 /// How a diagnosis is made.

@@ -1,29 +1,29 @@
 //! The search on the ground of a case, and what it comes to; a curve in the place of the law where it ends without a name.
 
-use super::bench::Bench;
-use super::bump::{Bump, beyond};
-use super::confirm::confirm;
-use super::corrected::corrected;
 use super::diagnose_error::DiagnoseError;
-use super::diagnosed::Diagnosed;
-use super::diagnosis_json::Diagnosis;
-use super::experiment::propose;
-use super::finding::{NextExperiment, Tried, Verdict};
-use super::fit_report::{Errors, figures_of, fit_report};
-use super::held_out::{held_out, mean};
-use super::judge::Judged;
-use super::logs::Hygiene;
-use super::noise_finding::noise_findings;
-use super::reported::Reporting;
-use super::run::Run;
-use super::select::select;
-use super::select_settings::SelectSettings;
-use super::selection::Selection;
 use super::settings::DiagnoseSettings;
-use super::stand_in::{Standing, enter, stand_in};
-use super::unrest::unrest;
-use super::verdict::{ByOthers, judge};
 use crate::controller::Law;
+use crate::diagnose::data::run::Run;
+use crate::diagnose::fit::corrected_model::corrected;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::shock::{DetectedShock, beyond};
+use crate::diagnose::fit::simulation::SimulatedModel;
+use crate::diagnose::noise::torque_noise::torque_noise;
+use crate::diagnose::search::select::select;
+use crate::diagnose::search::select_settings::SelectSettings;
+use crate::diagnose::search::selection::Selection;
+use crate::diagnose::verdict::confirmation::confirm;
+use crate::diagnose::verdict::diagnosed::Diagnosed;
+use crate::diagnose::verdict::diagnosis_json::Diagnosis;
+use crate::diagnose::verdict::finding::{NextExperiment, Tried, Verdict};
+use crate::diagnose::verdict::fit_report::{Errors, figures_of, fit_report};
+use crate::diagnose::verdict::held_out::{held_out, mean};
+use crate::diagnose::verdict::judgement::{ByOthers, judge};
+use crate::diagnose::verdict::log_checks::LogChecks;
+use crate::diagnose::verdict::missing_curve::{Standing, enter, stand_in};
+use crate::diagnose::verdict::next_experiment::propose;
+use crate::diagnose::verdict::noise_finding::noise_findings;
+use crate::diagnose::verdict::offered_models::Reporting;
 use crate::lti::Plant;
 use crate::physics::library;
 use crate::recording::Case;
@@ -33,12 +33,12 @@ use crate::recording::Case;
 pub(super) struct Trial<'a> {
     pub case: &'a Case,
     pub given: &'a Plant,
-    /// All runs, whole; the bench may hold excerpts of them.
+    /// All runs, whole; the diagnosis data may hold excerpts of them.
     pub whole: &'a [Run],
     pub closed: Option<&'a Law<'a>>,
     pub settings: &'a DiagnoseSettings,
-    pub hygiene: &'a Hygiene,
-    pub bumps: &'a [Bump],
+    pub log_checks: &'a LogChecks,
+    pub shocks: &'a [DetectedShock],
     pub remarks: &'a [String],
 }
 
@@ -49,7 +49,7 @@ fn settled(d: &Diagnosis) -> bool {
 
 impl Trial<'_> {
     /// The search, with a curve where it ends without a name, or cannot tell what is left from noise, and one is worth it.
-    pub fn best(&self, bench: Bench, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
+    pub fn best(&self, bench: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
         let cut = bench.runs.clone();
         let (first, open) = self.made(bench, progress)?;
         if settled(&first.diagnosis) {
@@ -76,19 +76,23 @@ impl Trial<'_> {
     }
 
     /// One search and what it comes to, with the errors of all runs in open loop.
-    fn made(&self, mut bench: Bench, progress: &mut dyn FnMut(&str)) -> Result<(Diagnosed, Errors), DiagnoseError> {
+    fn made(
+        &self,
+        mut bench: DiagnosisData,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<(Diagnosed, Errors), DiagnoseError> {
         let mut remarks = self.remarks.to_vec();
-        let unrest = unrest(&bench);
+        let torque_noise = torque_noise(&bench.repeats, &bench.whitener, &bench.form.given, bench.scene.sample_time_s);
         // Records whose samples slipped hold nothing that a model could be fitted to.
         // A log that slipped or is in other units is no ground for the long way.
-        let sound = self.hygiene.finding.is_none();
+        let sound = self.log_checks.finding.is_none();
         let search_settings = SelectSettings { by_simulation: sound, ..self.settings.select.clone() };
         let selection = select(&mut bench, library(), &search_settings, &mut *progress);
         progress("simulating all records");
         let last = selection.last();
         // Where commands bend, repeats differ by more than a linear arm answers: no sign of a push.
-        let unrest = unrest.filter(|_| !last.chosen.iter().any(|c| c.effect().is_hard_nonlinearity()));
-        remarks.extend(unrest.as_ref().map(|u| u.says(&self.given.command_unit)));
+        let torque_noise = torque_noise.filter(|_| !last.chosen.iter().any(|c| c.effect().is_hard_nonlinearity()));
+        remarks.extend(torque_noise.as_ref().map(|u| u.says(&self.given.command_unit)));
         // What the search found, whether or not it is offered.
         let fixed = corrected(&bench.form, &last.refitted.p, &last.chosen, &bench.scene);
         let refitted = corrected(&bench.form, &selection.baseline.refitted.p, &[], &bench.scene);
@@ -110,8 +114,8 @@ impl Trial<'_> {
             corrected_model: None,
             next_experiment: NextExperiment { what: String::new(), expected_separation: 0.0 },
             noise: bench.levels,
-            replay: self.hygiene.replay.clone(),
-            sample_faults: self.hygiene.faults.clone(),
+            replay: self.log_checks.replay.clone(),
+            sample_faults: self.log_checks.faults.clone(),
             whitened,
             holdout_whitened: mean(&held_out),
             confirmed: confirm(&bench, &selection, &fixed, &held_out, self.settings.select.iterations)?,
@@ -121,11 +125,11 @@ impl Trial<'_> {
             search: search(&selection),
             bootstrap: selection.bootstrap.clone(),
         };
-        let linear = Judged { plant: &refitted.plant, effects: Vec::new(), ..fixed.judged(&bench, &selection) };
-        let bumps = beyond(&bench, self.bumps.to_vec(), &linear, &fixed.judged(&bench, &selection));
-        let bumps = bumps.iter().map(|b| b.finding(&bench.runs, &self.given.command_unit)).collect();
-        let noise = noise_findings(&bench, unrest.as_ref(), &self.settings.noise, diagnosis.fit.fit);
-        let by_others = ByOthers { logs: self.hygiene.finding.clone(), bumps, noise };
+        let linear = SimulatedModel { plant: &refitted.plant, effects: Vec::new(), ..fixed.judged(&bench, &selection) };
+        let shocks = beyond(&bench, self.shocks.to_vec(), &linear, &fixed.judged(&bench, &selection));
+        let shocks = shocks.iter().map(|b| b.finding(&bench.runs, &self.given.command_unit)).collect();
+        let noise = noise_findings(&bench, torque_noise.as_ref(), &self.settings.noise, diagnosis.fit.fit);
+        let by_others = ByOthers { logs: self.log_checks.finding.clone(), shocks, noise };
         judge(&mut diagnosis, &bench, &selection, self.given, &reported, by_others);
         propose(&mut diagnosis, &bench, &selection);
         // Pictures are of the whole records.

@@ -27,6 +27,13 @@ pub struct Graze {
 /// Extrema of |L| within this of 1 (ln), and of its angle within this of -180 deg (rad), are grazes: far more than the grid's error, far less than anybody can measure.
 pub const GRAZE: f64 = 0.01;
 
+/// Extrema of |L|² this near to 1 on the grid are looked at for a graze.
+pub(super) const NEAR_ONE: f64 = 0.07;
+/// The largest gain margin (20 dB is a hundredth of |L|²) at which a turn near the negative real axis is looked at.
+const FAINT: f64 = 1e-4;
+/// |Im L| over |Re L| up to which such a turn is looked at.
+const NEAR_AXIS: f64 = 0.05;
+
 /// Margins read off the grid.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct QuickMargins {
@@ -68,4 +75,12 @@ impl QuickMargins {
     pub fn max_sensitivity(&self) -> f64 {
         1.0 / self.dips.iter().map(|d| d.value).fold(f64::INFINITY, f64::min)
     }
+}
+
+/// Whether L comes nearest to the negative real axis at the middle one of three points, and does not cross it there.
+#[inline(always)]
+pub(super) fn turns_back([before, here, after]: [f64; 3], re: f64, gain: f64) -> bool {
+    let nearest = (here.abs() < before.abs()) & (here.abs() <= after.abs());
+    let one_side = ((here < 0.0) == (before < 0.0)) & ((here < 0.0) == (after < 0.0));
+    nearest & one_side & (here.abs() < -NEAR_AXIS * re) & (gain > FAINT)
 }

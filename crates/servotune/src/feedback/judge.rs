@@ -4,7 +4,7 @@
 //! between grid points with the sections exact ([`super::refine`]). What is shipped is judged again by [`super::margins`];
 //! spec: `specs/tuning.md`.
 
-use super::events::{GRAZE, Graze};
+use super::events::{GRAZE, Graze, NEAR_ONE, turns_back};
 use super::{LoopOnGrid, SampledPlant};
 use crate::lti::Section;
 use nalgebra::Complex;
@@ -12,12 +12,6 @@ use std::f64::consts::PI;
 
 /// Phase crossings this much (ln|L|²) beyond the smallest gain margin are read: 6.5 dB, several times what a step changes.
 const NEARLY: f64 = 1.5;
-/// Extrema of |L|² this near to 1 on the grid are looked at for a graze.
-pub(super) const NEAR_ONE: f64 = 0.07;
-/// The largest gain margin (20 dB is a hundredth of |L|²) at which a turn near the negative real axis is looked at.
-pub(super) const FAINT: f64 = 1e-4;
-/// |Im L| over |Re L| up to which such a turn is looked at.
-pub(super) const NEAR_AXIS: f64 = 0.05;
 /// Dips of |1 + L|² up to this factor above the lowest are read: twice the lowest distance.
 const DEEP: f64 = 4.0;
 
@@ -97,14 +91,6 @@ impl SampledPlant {
         quick.unstable_poles = self.outside + outside - turns.end(last, beyond);
         on.quick = quick;
     }
-}
-
-/// Whether L comes nearest to the negative real axis at the middle one of three points, and does not cross it there.
-#[inline(always)]
-pub(super) fn turns_back([before, here, after]: [f64; 3], re: f64, gain: f64) -> bool {
-    let nearest = (here.abs() < before.abs()) & (here.abs() <= after.abs());
-    let one_side = ((here < 0.0) == (before < 0.0)) & ((here < 0.0) == (after < 0.0));
-    nearest & one_side & (here.abs() < -NEAR_AXIS * re) & (gain > FAINT)
 }
 
 /// Integrators of a chain, and its poles outside the unit circle.

@@ -4,6 +4,7 @@
 //! points: the sections exactly, ln P as a cubic in ln w (from its own slopes for a model, through four neighbours for a sweep). What is
 //! read off stands in [`super::judge`]; spec: `specs/tuning.md`.
 
+use super::events::{NEAR_ONE, turns_back};
 use super::piece::Piece;
 use crate::lti::{DiscretePlant, Section};
 use crate::numeric::wide::{Wide, widest};
@@ -224,8 +225,8 @@ impl SampledPlant {
                 let crosses = (g1[j] < 1.0) != (g2[j] < 1.0);
                 let passes = ((y1[j] < 0.0) != (y2[j] < 0.0)) | ((f1[j] < 0.0) != (f2[j] < 0.0));
                 let dips = (d1[j] < d0[j]) & (d2[j] >= d1[j]);
-                let turns = ((g2[j] < g1[j]) != (g1[j] < g0[j])) & ((g1[j] - 1.0).abs() < super::judge::NEAR_ONE);
-                let back = super::judge::turns_back([y0[j], y1[j], y2[j]], x1[j], g1[j]);
+                let turns = ((g2[j] < g1[j]) != (g1[j] < g0[j])) & ((g1[j] - 1.0).abs() < NEAR_ONE);
+                let back = turns_back([y0[j], y1[j], y2[j]], x1[j], g1[j]);
                 hit |= crosses | passes | dips | turns | back;
             }
             if hit {

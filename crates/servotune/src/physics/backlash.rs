@@ -214,6 +214,10 @@ impl Parametric for Backlash {
         vec![usize::from(self.contact.is_some())]
     }
 
+    fn is_hard_nonlinearity() -> bool {
+        true
+    }
+
     fn measured_in_last_fit(&self) -> Vec<(usize, [f64; 2])> {
         if self.contact.is_some() { vec![(3, [1e-3, 0.5])] } else { Vec::new() }
     }

@@ -254,6 +254,11 @@ pub(crate) fn slider_stiffness(at: &[f64], value: &[f64]) -> Vec<f64> {
     (0..at.len().saturating_sub(1)).map(|i| slope(i) - slope(i + 1)).collect()
 }
 
+/// The level of each slider of a loading curve: what it holds while it slides.
+pub(crate) fn slider_levels(at: &[f64], value: &[f64]) -> Vec<f64> {
+    slider_stiffness(at, value).iter().zip(at.iter().skip(1)).map(|(k, a)| k * (a - at[0])).collect()
+}
+
 /// A loading curve in motion.
 struct Loading {
     sliders: Sliders,

@@ -148,7 +148,7 @@ fn loaded_to(left: f64, tail: f64) -> f64 {
 }
 
 /// Shortest sliding length whose hysteresis is told from dry friction: some twelve times the sensor's noise, or a small share of the travel.
-pub(super) fn shortest_loop(scene: &Scene) -> f64 {
+pub(crate) fn shortest_loop(scene: &Scene) -> f64 {
     (12.0 * scene.noise).max(2e-3 * scene.travel)
 }
 

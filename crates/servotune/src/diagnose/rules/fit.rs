@@ -73,6 +73,12 @@ rules! {
     CURVE_NO_WORSE: f64 = 1.0, "ratio",
         "error on held-out records over that of the better linear model",
         "never worse than what was there";
+    CURVE_NAMED: f64 = 1.5, "noise",
+        "error on held-out records under a loading curve up to which it is a drag by name",
+        "as for a law: down to the noise, or no name";
+    SLIDERS_PUSH: f64 = 0.15, "share",
+        "levels of the sliders of a loading curve that push, over those that resist, below which it is a drag",
+        "judgement: a drag takes energy; noise moves single knots";
     CURVE_NEAR: f64 = 1.1, "ratio",
         "the same over that of a mixture of laws",
         "one curve instead of several laws may cost a tenth";

@@ -1,0 +1,11 @@
+//! First floor of the diagnosis: records made ready, the given plant's linear form, and what the logs show before any model is fitted.
+
+pub(super) mod checks;
+pub(super) mod excerpt;
+pub(super) mod linear_form;
+pub(super) mod plant_check;
+pub(super) mod repeat_difference;
+pub(super) mod run;
+pub(super) mod slip;
+pub(super) mod stacked_records;
+pub(super) mod time_shift;

@@ -1,0 +1,211 @@
+//! A record made ready: what acted on the plant, what it answered, and whose repeat it is.
+
+use crate::diagnose::rules::LAP_DIGITS;
+use crate::recording::{Case, Record, Role};
+
+/// One record of a case.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Name for reports.
+    pub name: String,
+    /// Fitting or judging.
+    pub role: Role,
+    /// When it began in its session, the records taken one after another in the order of the case (s).
+    pub began_s: f64,
+    /// When it begins in the record that it is an excerpt of (s).
+    pub from_s: f64,
+    /// Index of its repeat group; each record without one is a group of its own.
+    pub group: usize,
+    /// Reference (position_unit), where recorded.
+    pub reference: Option<Vec<f64>>,
+    /// Command of the controller (command_unit).
+    pub command: Vec<f64>,
+    /// Excitation behind the controller (command_unit).
+    pub excitation: Vec<f64>,
+    /// Command plus excitation: what goes into the amplifier.
+    pub input: Vec<f64>,
+    /// Position as recorded.
+    pub position: Vec<f64>,
+    /// The command that is taken to have stood before the record began (command_unit).
+    pub before: f64,
+    /// The position at which it stood then.
+    pub origin: f64,
+    /// Whether it stood at rest as the record began: the forces on it were in balance then.
+    pub rested: bool,
+    /// Whether a push from outside falls into it, which no repeat shares: no model is fitted to it nor judged by it.
+    pub shocked: bool,
+    /// PES where recorded; NaN between servo samples.
+    pub pes: Option<Vec<f64>>,
+    /// Spindle angle (rad), where recorded.
+    pub spindle_rad: Option<Vec<f64>>,
+    /// Temperature above the record's first (°C), where recorded.
+    pub temperature: Option<Vec<f64>>,
+}
+
+impl Run {
+    /// The same run with a command that was measured at the samples and moves between them, instead of being held.
+    ///
+    /// A held value answers like the command half a sample later, weakened by sin(a)/a with a = pi f T. The value to hold is
+    /// therefore the command half a sample ahead with its upper band raised: the filter of eight taps whose response meets
+    /// a/sin(a) to the seventh order (1e-4 off at an eighth of the sample rate).
+    pub fn measured(&self) -> Run {
+        let u = &self.input;
+        let at = |k: isize| u[k.clamp(0, u.len() as isize - 1) as usize];
+        let value = |k: isize| (0..4).map(|j| AHEAD[j as usize] * (at(k - j) + at(k + 1 + j))).sum();
+        Run { input: (0..u.len() as isize).map(value).collect(), ..self.clone() }
+    }
+
+    /// A part of the record, as one of its own; it does not begin at rest.
+    pub fn stretch(&self, from: usize, to: usize) -> Run {
+        let cut = |x: &[f64]| x[from..to].to_vec();
+        let may = |x: &Option<Vec<f64>>| x.as_deref().map(cut);
+        Run {
+            began_s: self.began_s,
+            from_s: self.from_s,
+            reference: may(&self.reference),
+            command: cut(&self.command),
+            excitation: cut(&self.excitation),
+            input: cut(&self.input),
+            position: cut(&self.position),
+            before: if from == 0 { self.before } else { self.input[from - 1] },
+            origin: if from == 0 { self.origin } else { self.position[from] },
+            rested: self.rested && from == 0,
+            pes: may(&self.pes),
+            spindle_rad: may(&self.spindle_rad),
+            temperature: may(&self.temperature),
+            name: self.name.clone(),
+            role: self.role,
+            group: self.group,
+            shocked: self.shocked,
+        }
+    }
+
+    /// Samples.
+    pub fn len(&self) -> usize {
+        self.position.len()
+    }
+
+    /// The period of what drives the record, where that repeats at least once: of reference and excitation, or of the command
+    /// where nothing else is known.
+    pub fn period(&self) -> Option<usize> {
+        let drives: Vec<&[f64]> = match &self.reference {
+            Some(r) => vec![r, &self.excitation],
+            None => vec![&self.input],
+        };
+        let moving: Vec<(&[f64], f64)> = drives
+            .into_iter()
+            .filter(|x| x.iter().any(|v| *v != x[0]))
+            .map(|x| (x, LAP_DIGITS * x.iter().fold(0.0f64, |m, v| m.max(v.abs()))))
+            .collect();
+        let repeats =
+            |n: usize| moving.iter().all(|(x, close)| x.iter().zip(&x[n..]).all(|(a, b)| (a - b).abs() <= *close));
+        (SHORTEST_LAP..=self.len() / 2).find(|&n| !moving.is_empty() && repeats(n))
+    }
+
+    /// Whether there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty()
+    }
+}
+
+/// Half the taps of [`Run::measured`]; they solve the four equations of the Taylor series.
+const AHEAD: [f64; 4] = [533.0 / 840.0, -139.0 / 840.0, 29.0 / 840.0, -1.0 / 280.0];
+/// Shortest lap (samples): below it there is no spectrum of noise to speak of.
+const SHORTEST_LAP: usize = 256;
+
+/// Samples at the start over which a command at rest is averaged.
+const AT_REST: usize = 16;
+
+/// Samples for which a series stands still at the start, up to [`AT_REST`].
+fn still(series: &[f64]) -> usize {
+    series.iter().take(AT_REST).take_while(|v| **v == series[0]).count()
+}
+
+fn mean(series: &[f64]) -> f64 {
+    series.iter().sum::<f64>() / series.len() as f64
+}
+
+/// Position and command before a record began.
+///
+/// Their means as long as reference and excitation stand still: what the controller held against springs and cables. An excitation that sets in
+/// at once leaves of the position the first sample; the command that held the arm is then the mean of all that was put in, where the reference
+/// never moves.
+fn stood(record: &Record) -> [f64; 2] {
+    let reference = record.reference.as_deref().unwrap_or_default();
+    let quiet = still(reference).min(still(&record.excitation)).max(1).min(record.len());
+    let origin = mean(&record.position[..quiet]);
+    let held = still(reference) >= AT_REST && quiet < AT_REST && reference.iter().all(|r| *r == reference[0]);
+    let before = if held { mean(&record.command) + mean(&record.excitation) } else { mean(&record.command[..quiet]) };
+    [origin, before]
+}
+
+/// The records of a case as runs, groups numbered in the order of their first record.
+pub fn runs(case: &Case) -> Vec<Run> {
+    let mut groups: Vec<String> = Vec::new();
+    let mut session_s = 0.0;
+    case.records
+        .iter()
+        .enumerate()
+        .map(|(i, (entry, record))| {
+            let key = entry.repeat_group.clone().unwrap_or_else(|| format!("\u{0}{i}"));
+            let group = groups.iter().position(|g| *g == key).unwrap_or_else(|| {
+                groups.push(key);
+                groups.len() - 1
+            });
+            let began_s = session_s;
+            session_s += record.len() as f64 * record.sample_time_s;
+            let [origin, before] = stood(record);
+            let input: Vec<f64> = record.command.iter().zip(&record.excitation).map(|(c, e)| c + e).collect();
+            Run {
+                name: entry.name(),
+                role: entry.role,
+                began_s,
+                from_s: 0.0,
+                group,
+                rested: still(record.reference.as_deref().unwrap_or_default()) >= AT_REST.min(record.position.len()),
+                shocked: false,
+                before,
+                origin,
+                reference: record.reference.clone(),
+                command: record.command.clone(),
+                excitation: record.excitation.clone(),
+                input,
+                position: record.position.clone(),
+                pes: record.pes.clone(),
+                spindle_rad: record.spindle_rad.clone(),
+                temperature: record.temperature_c.as_ref().map(|t| t.iter().map(|x| x - t[0]).collect()),
+            }
+        })
+        .collect()
+}
+
+/// The mean of repeats of equal length: one run with less noise. The logs beside the motion are the first one's.
+pub fn mean_run(runs: &[Run], repeats: &[usize]) -> Run {
+    let mut mean = runs[repeats[0]].clone();
+    let scale = 1.0 / repeats.len() as f64;
+    type Pick = fn(&Run) -> &Vec<f64>;
+    let average = |pick: Pick| -> Vec<f64> {
+        (0..mean.len()).map(|k| scale * repeats.iter().map(|&r| pick(&runs[r])[k]).sum::<f64>()).collect()
+    };
+    let (command, excitation, input, position) =
+        (average(|r| &r.command), average(|r| &r.excitation), average(|r| &r.input), average(|r| &r.position));
+    (mean.command, mean.excitation, mean.input, mean.position) = (command, excitation, input, position);
+    mean.began_s = scale * repeats.iter().map(|&r| runs[r].began_s).sum::<f64>();
+    mean.before = scale * repeats.iter().map(|&r| runs[r].before).sum::<f64>();
+    mean.origin = scale * repeats.iter().map(|&r| runs[r].origin).sum::<f64>();
+    mean
+}
+
+#[cfg(test)]
+mod tests {
+    use super::AHEAD;
+
+    #[test]
+    fn a_measured_command_is_raised_as_a_hold_weakens() {
+        // At an eighth of the sample rate and below; the bound is the first term left out.
+        for a in [0.05f64, 0.2, std::f64::consts::FRAC_PI_8] {
+            let response: f64 = (0..4).map(|j| 2.0 * AHEAD[j] * ((2 * j + 1) as f64 * a).cos()).sum();
+            assert!((response * a.sin() / a - 1.0).abs() < 2e-4, "{a}");
+        }
+    }
+}

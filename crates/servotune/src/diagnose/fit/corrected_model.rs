@@ -1,0 +1,49 @@
+//! The corrected model: the refitted plant with the effects as `[[plant.physics]]`.
+//!
+//! Where a bearing that sticks takes over the spring of the body, little or less than nothing of that spring is left; the body
+//! then is a free inertia and the rest stands as a plain cable spring, of either sign.
+
+use super::selected_effect::SelectedEffect;
+use crate::diagnose::data::linear_form::{LinearForm, body_numbers};
+use crate::diagnose::rules::FREE_BODY;
+use crate::lti::{Body, PhysicsEntry, Plant};
+use crate::physics::cable_spring::CableSpring;
+use crate::physics::{Scene, Setting};
+
+/// The plant and the effects that simulate it.
+#[derive(Clone)]
+pub struct Corrected {
+    /// The plant, physics entries included.
+    pub plant: Plant,
+    /// The effects of the entries.
+    pub effects: Vec<Setting>,
+}
+
+/// Makes the corrected model of a fit; `per_record` effects belong to records, not to the machine, and stay out.
+pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[SelectedEffect], scene: &Scene) -> Corrected {
+    let mut plant = form.plant(p);
+    let mut effects: Vec<Setting> = Vec::new();
+    let mut entries = Vec::new();
+    let named = |s: &Setting| PhysicsEntry {
+        effect: s.facts().name.into(),
+        parameters: s.parameters(scene).into_iter().map(|q| (q.name.to_owned(), q.value)).collect(),
+        curve: None,
+    };
+    for c in chosen.iter().filter(|c| !c.setting.facts().per_record) {
+        entries.push(named(&c.setting));
+        effects.push(c.setting.clone());
+    }
+    let carrier = form.carrier(p);
+    let (b, k0, c0) = body_numbers(&carrier.plant.body);
+    let stiffness = k0 - carrier.spring * b * form.given.resonance_gain;
+    if k0 > 0.0 && stiffness < FREE_BODY * k0 {
+        let viscous = c0 - carrier.damper * b * form.given.resonance_gain;
+        plant.body = Body::FreeInertia { acceleration_gain: b, viscous_rate_per_s: viscous.max(0.0) };
+        let strength = stiffness / (b * form.given.resonance_gain);
+        let spring = Setting::new(CableSpring { creep_time_s: None, centre: 0.0 }, vec![strength, 0.0]);
+        entries.push(named(&spring));
+        effects.push(spring);
+    }
+    plant.physics = entries;
+    Corrected { plant, effects }
+}

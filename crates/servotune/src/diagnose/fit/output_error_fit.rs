@@ -1,0 +1,136 @@
+//! The final model fitted once more, by simulation: the laws feel the motion that the model makes, not the recorded one.
+//!
+//! Along the recorded motion a law sees the sensor's noise: a drag turns round a little early and late, its level comes out too
+//! small (the dilution of a regression whose input is noisy). Simulated from the recorded command it does not. In: the model of the
+//! search. Out: body, delay and the effects' numbers at the least whitened simulation error, with their errors.
+//!
+//! Every repeat is simulated under its own command, and the errors are averaged then: noise that the controller sends into the motor
+//! shakes a drag loose at every reversal, and a mean command shakes less.
+
+use super::diagnosis_data::DiagnosisData;
+use super::equation_error_fit::Refitted;
+use super::model::Model;
+use super::output_error_problem::{Problem, places};
+use super::simulation::size;
+use crate::diagnose::data::linear_form::FreeParameter;
+use crate::diagnose::rules::{RUNS_AWAY, SIMULATION_SILENT};
+use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
+
+/// Most Jacobians.
+const ITERATIONS: usize = 12;
+/// Relative fall of the sum of squares at which the fit ends.
+const TOLERANCE: f64 = 1e-6;
+/// Most fits one after the other, and the relative fall of the error by one for which another is made: starts that are found anew may
+/// open a way further down.
+const AGAIN: usize = 3;
+const FURTHER: f64 = 3e-4;
+/// Standard deviations of what is left beyond the noise from which a fit is made from elsewhere too.
+const UNSETTLED: f64 = 5.0;
+
+/// The whitened simulation error of a model, stacked, each segment's own directions taken out.
+pub(in crate::diagnose) fn simulation_error(bench: &DiagnosisData, model: &Model) -> Vec<f64> {
+    let mut problem = Problem::whitened_error(bench, model);
+    let x = problem.start();
+    problem.settle(&x)
+}
+
+/// The least simulation error of the model with only some of its body and delay free, all else of the linear plant as given: sum of
+/// squares and linear parameters.
+pub(in crate::diagnose) fn simulated_with(
+    bench: &DiagnosisData,
+    model: &Model,
+    keep: impl Fn(FreeParameter) -> bool,
+) -> (f64, Vec<f64>) {
+    let mut start = model.clone();
+    let kept = |i: usize| keep(bench.form.knobs[i]);
+    start.refitted.p.iter_mut().enumerate().filter(|(i, _)| !kept(*i)).for_each(|(_, v)| *v = 0.0);
+    let mut problem = Problem::whitened_error(bench, &start);
+    problem.free.knobs.retain(|&i| kept(i));
+    let (mut x, mut work) = (problem.start(), Workspace::default());
+    let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
+    let outcome = minimise(&mut problem, &mut x, &settings, &mut work);
+    (outcome.cost, problem.unpack(&x).0)
+}
+
+/// The model with body, delay and effects fitted by simulation; none where it has no effect, where its simulation runs away or where
+/// nothing is won.
+///
+/// Modes stay where the search left them, and along a noisy motion they may have taken what a drag owes. Where the fit does not come down
+/// to the noise, one from the linear parameters as given is made beside it: the better counts.
+pub(in crate::diagnose) fn simulated(bench: &DiagnosisData, model: &Model) -> Option<Model> {
+    let found = descended(bench, model);
+    if found.as_ref().unwrap_or(model).excess_sigma() < UNSETTLED {
+        return found;
+    }
+    let mut given = model.clone();
+    given.refitted.p.fill(0.0);
+    let other = descended(bench, &given).filter(|o| o.cost < found.as_ref().map_or(model.cost, |f| f.cost));
+    other.or(found)
+}
+
+/// The fit by simulation from where a model stands.
+fn descended(bench: &DiagnosisData, model: &Model) -> Option<Model> {
+    if model.chosen.is_empty() {
+        return None;
+    }
+    let model = &with_late_numbers(model);
+    let mut problem = Problem::whitened_error(bench, model);
+    let mut x = problem.start();
+    let before = size(&problem.settle(&x));
+    if !(before.is_finite() && before < RUNS_AWAY * model.cost) {
+        return None;
+    }
+    let mut work = Workspace::default();
+    let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
+    let (mut cost, mut converged, mut best) = (before, false, x.clone());
+    for _ in 0..AGAIN {
+        converged = minimise(&mut problem, &mut x, &settings, &mut work).converged;
+        // With the starts of where it ended, as the fit's own beginning was judged.
+        let settled = size(&problem.settle(&x));
+        let further = settled < (1.0 - FURTHER) * cost;
+        if settled < cost {
+            (cost, best) = (settled, x.clone());
+        }
+        if !further {
+            break;
+        }
+    }
+    if cost == before && before > SIMULATION_SILENT * model.cost {
+        return None;
+    }
+    let x = best;
+    let (p, chosen) = problem.unpack(&x);
+    if !chosen.iter().all(|c| c.setting.is_possible(&[])) {
+        return None;
+    }
+    // The errors of what was not moved stay those of the search.
+    let at = places(&problem.free, model);
+    let mut directions = model.refitted.directions.clone();
+    directions.iter_mut().for_each(|d| at.iter().for_each(|&i| d[i] = 0.0));
+    for own in work.qr.inverse_root().chunks_exact(at.len().max(1)) {
+        let mut d = vec![0.0; model.refitted.count()];
+        at.iter().zip(own).for_each(|(&i, v)| d[i] = *v);
+        directions.push(d);
+    }
+    let plant = bench.form.plant(&p);
+    let refitted = Refitted { p, plant, cost, directions, converged };
+    Some(Model { chosen, refitted, cost, ..model.clone() })
+}
+
+/// The model with those numbers free that the search takes in steps; they err in no direction yet.
+fn with_late_numbers(model: &Model) -> Model {
+    let mut open = model.clone();
+    let strengths = model.chosen.iter().filter(|c| !c.setting.facts().fixed).map(|c| c.setting.strengths.len());
+    let mut at = model.refitted.p.len() + strengths.sum::<usize>();
+    for c in &mut open.chosen {
+        let late = c.setting.law.measured_in_last_fit();
+        for i in 0..c.continuous.len() {
+            if let Some((_, range)) = late.iter().find(|(place, _)| *place == i && !c.continuous[i]) {
+                (c.continuous[i], c.range[i]) = (true, *range);
+                open.refitted.directions.iter_mut().for_each(|d| d.insert(at, 0.0));
+            }
+            at += usize::from(c.continuous[i]);
+        }
+    }
+    open
+}

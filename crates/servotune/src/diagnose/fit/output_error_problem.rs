@@ -1,0 +1,372 @@
+//! A model's simulation error as a function of its numbers, for a fit.
+//!
+//! In: a model, and the records that it is simulated on. Out: the error, whitened and averaged over repeats in open loop, or plain as it is
+//! reported, in closed loop where the loop is known; and its slopes.
+
+use super::corrected_model::corrected;
+use super::diagnosis_data::DiagnosisData;
+use super::model::Model;
+use super::selected_effect::SelectedEffect;
+use super::simulation::size;
+use super::simulation::{Begun, SimulatedModel, Started};
+use crate::controller::Law;
+use crate::diagnose::data::linear_form::FreeParameter;
+use crate::diagnose::data::run::Run;
+use crate::diagnose::data::stacked_records::{NuisanceBasis, Segment};
+use crate::diagnose::noise::lines::Line;
+use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
+use rayon::prelude::*;
+
+/// Rounds in which a start is found.
+const ROUNDS: usize = 2;
+/// Step in a linear parameter.
+const STEP: f64 = 1e-4;
+/// Relative steps in strengths and numbers: laws have kinks, and smaller steps see only them.
+const STRENGTH_STEP: f64 = 2e-3;
+const NUMBER_STEP: f64 = 5e-3;
+
+/// What is moved: places in the linear parameters, then strengths and numbers by effect and place.
+pub(in crate::diagnose) struct Free {
+    pub knobs: Vec<usize>,
+    pub strengths: Vec<[usize; 2]>,
+    pub numbers: Vec<[usize; 2]>,
+}
+
+/// The error that is made small.
+#[derive(Clone, Copy)]
+pub(in crate::diagnose) enum Error<'a> {
+    /// Open loop, whitened, the mean over the repeats of each segment.
+    Whitened,
+    /// As it is reported: plain, in closed loop where a law is given.
+    Plain(Option<&'a Law<'a>>),
+}
+
+/// A fit by simulation.
+pub(in crate::diagnose) struct Problem<'a> {
+    bench: &'a DiagnosisData,
+    model: &'a Model,
+    error: Error<'a>,
+    pub free: Free,
+    /// Where each stretch of the error stands.
+    layout: Vec<Segment>,
+    local: NuisanceBasis,
+    /// Every record of every segment.
+    records: Vec<Record<'a>>,
+}
+
+/// One record of the fit.
+struct Record<'a> {
+    run: &'a Run,
+    segment: usize,
+    /// Its share in the mean over its segment.
+    share: f64,
+    /// The free motion that it starts with, as found last: near enough for what is not far.
+    start: Vec<f64>,
+    /// What the motions of a start come to, laws resisting, around that one; as the linear plant has it where none was felt yet.
+    felt: Option<Vec<Vec<f64>>>,
+    /// The constant torque on it where it does not begin at rest (command_unit).
+    constant: Option<f64>,
+}
+
+impl Problem<'_> {
+    /// The model's own numbers.
+    pub fn start(&self) -> Vec<f64> {
+        let m = self.model;
+        let knobs = self.free.knobs.iter().map(|&i| m.refitted.p[i]);
+        let strengths = self.free.strengths.iter().map(|&[e, i]| m.chosen[e].setting.strengths[i]);
+        let numbers = self
+            .free
+            .numbers
+            .iter()
+            .map(|&[e, i]| m.chosen[e].setting.law.number(i).map_or(f64::NAN, |n| n.abs().ln()));
+        knobs.chain(strengths).chain(numbers).collect()
+    }
+
+    /// Linear parameters and effects of these numbers.
+    pub fn unpack(&self, x: &[f64]) -> (Vec<f64>, Vec<SelectedEffect>) {
+        let (mut p, mut chosen) = (self.model.refitted.p.clone(), self.model.chosen.clone());
+        let (knobs, rest) = x.split_at(self.free.knobs.len());
+        let (strengths, numbers) = rest.split_at(self.free.strengths.len());
+        self.free.knobs.iter().zip(knobs).for_each(|(&i, v)| p[i] = *v);
+        self.free.strengths.iter().zip(strengths).for_each(|(&[e, i], v)| chosen[e].setting.strengths[i] = *v);
+        for (&[e, i], v) in self.free.numbers.iter().zip(numbers) {
+            let law = &mut chosen[e].setting.law;
+            *law = law.with_number(i, v.exp().copysign(law.number(i).unwrap_or(1.0)));
+        }
+        (p, chosen)
+    }
+
+    fn law(&self) -> Option<&Law<'_>> {
+        match self.error {
+            Error::Whitened => None,
+            Error::Plain(law) => law,
+        }
+    }
+
+    /// Lines that are fitted to each record; whitened they are taken out of the mean with its start.
+    fn lines(&self) -> &[Line] {
+        match self.error {
+            Error::Whitened => &[],
+            Error::Plain(_) => &self.bench.lines,
+        }
+    }
+
+    fn total(&self) -> usize {
+        self.layout.iter().map(|s| s.len).sum()
+    }
+
+    /// Does something with every record under the model at `x`, in parallel.
+    fn each<T: Send>(&self, x: &[f64], of: impl Fn(&Record, &SimulatedModel) -> T + Sync) -> Vec<T> {
+        let bench = self.bench;
+        let (p, chosen) = self.unpack(x);
+        let made = corrected(&bench.form, &p, &chosen, &bench.scene);
+        let own = chosen.iter().filter(|c| c.setting.facts().per_record);
+        let judged = SimulatedModel {
+            plant: &made.plant,
+            effects: made.effects.iter().collect(),
+            own: own.map(|c| &c.setting.law).collect(),
+            lines: self.lines(),
+            fit: None,
+            scene: &bench.scene,
+        };
+        self.records.par_iter().map(|r| of(r, &judged)).collect()
+    }
+
+    /// Every record simulated, from the starts found last; infinite where it runs away.
+    fn simulate(&self, x: &[f64]) -> Vec<Started> {
+        self.each(x, |r, judged| {
+            let one = || {
+                let begun = Begun::new(judged, r.run, self.law(), r.constant)?;
+                begun.found(r.start.clone(), r.felt.as_ref().unwrap_or(&begun.linear), 1)
+            };
+            one().unwrap_or_else(|_| Started { error: vec![f64::INFINITY; r.run.len()], free: vec![0.0; r.run.len()] })
+        })
+    }
+
+    /// Whitened simulation error, the mean over the repeats of each segment, one stacked vector, each segment's own directions taken out.
+    fn error_at(&self, x: &[f64]) -> Vec<f64> {
+        self.whitened(&self.simulate(x))
+    }
+
+    fn whitened(&self, all: &[Started]) -> Vec<f64> {
+        let mut out = vec![0.0; self.total()];
+        for (r, s) in self.records.iter().zip(all) {
+            let from = self.layout[r.segment].start;
+            out[from..].iter_mut().zip(&s.error).for_each(|(o, e)| *o += r.share * e);
+        }
+        for s in &self.layout {
+            let part = &mut out[s.start..s.start + s.len];
+            if let Error::Whitened = self.error {
+                self.bench.whitener.apply(part);
+            }
+            part.iter_mut().for_each(|v| *v *= s.weight);
+        }
+        self.local.project(&mut out);
+        out
+    }
+
+    /// Finds the starts at `x` anew, keeps them and gives the whitened error.
+    ///
+    /// From rest each time: with a drag a start has more than one place where no small move betters it, and one that was right for
+    /// other numbers holds the fit back.
+    pub fn settle(&mut self, x: &[f64]) -> Vec<f64> {
+        let found = self.each(x, |r, judged| {
+            let begun = Begun::new(judged, r.run, self.law(), r.constant)?;
+            let near = begun.found(vec![0.0; r.run.len()], &begun.linear, 1)?;
+            begun.better(near.free, ROUNDS)
+        });
+        let mut all = Vec::with_capacity(self.records.len());
+        for (r, found) in self.records.iter_mut().zip(found) {
+            let sound = found.ok().filter(|(s, f): &(Started, Vec<Vec<f64>>)| {
+                s.free.iter().chain(f.iter().flatten()).all(|v| v.is_finite())
+            });
+            all.push(match sound {
+                Some((started, felt)) => {
+                    r.start.clone_from(&started.free);
+                    r.felt = Some(felt);
+                    started
+                }
+                None => Started { error: vec![f64::INFINITY; r.run.len()], free: r.start.clone() },
+            });
+        }
+        self.whitened(&all)
+    }
+
+    fn step(&self, i: usize, x: f64) -> f64 {
+        let (knobs, strengths) = (self.free.knobs.len(), self.free.strengths.len());
+        match i {
+            i if i < knobs => STEP,
+            i if i < knobs + strengths => STRENGTH_STEP * x.abs().max(1e-12),
+            _ => NUMBER_STEP,
+        }
+    }
+}
+
+impl Residuals for Problem<'_> {
+    fn rows(&self) -> usize {
+        self.total()
+    }
+
+    fn cols(&self) -> usize {
+        self.free.knobs.len() + self.free.strengths.len() + self.free.numbers.len()
+    }
+
+    fn evaluate(&mut self, x: &[f64], r: &mut [f64]) {
+        r.copy_from_slice(&self.error_at(x));
+    }
+
+    fn jacobian(&mut self, x: &[f64], j: &mut [f64]) {
+        self.settle(x);
+        let this = &*self;
+        let n = self.total();
+        // Both sides: the mean slope over a kink, not the slope on one side of it.
+        j.par_chunks_exact_mut(n).enumerate().for_each(|(i, column)| {
+            let step = this.step(i, x[i]);
+            let moved = |by: f64| {
+                let mut to = x.to_vec();
+                to[i] += by;
+                this.error_at(&to)
+            };
+            let (up, down) = (moved(step), moved(-step));
+            column.iter_mut().zip(up.iter().zip(&down)).for_each(|(c, (a, b))| *c = (a - b) / (2.0 * step));
+        });
+    }
+
+    fn limit(&self, i: usize) -> Limit {
+        let (knobs, strengths) = (self.free.knobs.len(), self.free.strengths.len());
+        if i < knobs + strengths {
+            let step = if i < knobs { 0.3 } else { f64::INFINITY };
+            return Limit { low: f64::NEG_INFINITY, high: f64::INFINITY, step };
+        }
+        let [e, k] = self.free.numbers[i - knobs - strengths];
+        let c = &self.model.chosen[e];
+        let [low, high] = c.range[k];
+        // Along a noisy motion a dry drag needs a length that the noise does not cover; simulated it may be as dry as it is.
+        let (low, step) = c.effect().finer_simulated(k).map_or((low, 0.3), |share| (share * low, 0.8));
+        Limit { low: low.ln(), high: high.ln(), step }
+    }
+}
+
+impl<'a> Problem<'a> {
+    /// The whitened error in open loop; modes stay.
+    pub fn whitened_error(bench: &'a DiagnosisData, model: &'a Model) -> Problem<'a> {
+        let body = |k: &FreeParameter| {
+            matches!(k, FreeParameter::Gain | FreeParameter::Stiffness | FreeParameter::Viscous | FreeParameter::Delay)
+        };
+        let segments = &bench.stack.segments;
+        let all = segments.iter().enumerate().flat_map(|(i, s)| s.runs.iter().map(move |&r| (i, r)));
+        let record =
+            |(i, r): (usize, usize)| Record::of(bench, model, &bench.runs[r], i, 1.0 / segments[i].runs.len() as f64);
+        Problem {
+            bench,
+            model,
+            error: Error::Whitened,
+            free: Free::of(bench, model, body),
+            layout: segments.clone(),
+            local: bench.fit(model.chosen.clone()).local_basis(),
+            records: all.map(record).collect(),
+        }
+    }
+
+    /// The plain error on these runs, each with the number of records that it stands for; everything is free.
+    pub fn plain_error(
+        bench: &'a DiagnosisData,
+        model: &'a Model,
+        law: Option<&'a Law<'a>>,
+        runs: &[(&'a Run, usize)],
+    ) -> Problem<'a> {
+        let mut layout: Vec<Segment> = Vec::with_capacity(runs.len());
+        for (run, count) in runs {
+            let start = layout.last().map_or(0, |s| s.start + s.len);
+            let weight = (*count as f64).sqrt() / bench.levels.sensor_rms.max(f64::MIN_POSITIVE);
+            layout.push(Segment { runs: Vec::new(), start, len: run.len(), weight });
+        }
+        Problem {
+            bench,
+            model,
+            error: Error::Plain(law),
+            free: Free::of(bench, model, |_| true),
+            layout,
+            local: NuisanceBasis::default(),
+            records: runs.iter().enumerate().map(|(i, (run, _))| Record::of(bench, model, run, i, 1.0)).collect(),
+        }
+    }
+}
+
+impl<'a> Record<'a> {
+    fn of(bench: &DiagnosisData, model: &Model, run: &'a Run, segment: usize, share: f64) -> Record<'a> {
+        let asked = !run.rested && !model.chosen.is_empty();
+        let constant = asked.then(|| bench.constant_torque(run, model).ok()).flatten();
+        Record { run, segment, share, start: vec![0.0; run.len()], felt: None, constant }
+    }
+}
+
+impl Free {
+    fn of(bench: &DiagnosisData, model: &Model, moves: impl Fn(&FreeParameter) -> bool) -> Free {
+        let knobs: Vec<usize> = (0..bench.form.knobs.len()).filter(|&i| moves(&bench.form.knobs[i])).collect();
+        let (mut strengths, mut numbers) = (Vec::new(), Vec::new());
+        for (e, c) in model.chosen.iter().enumerate() {
+            let facts = c.setting.facts();
+            if !facts.fixed && !facts.per_record {
+                // A strength of exactly 0 belongs to a term that this form of the law has not.
+                let there = (0..c.setting.strengths.len()).filter(|&i| c.setting.strengths[i] != 0.0);
+                strengths.extend(there.map(|i| [e, i]));
+            }
+            if !facts.per_record {
+                numbers.extend((0..c.continuous.len()).filter(|&i| c.continuous[i]).map(|i| [e, i]));
+            }
+        }
+        Free { knobs, strengths, numbers }
+    }
+}
+
+/// Where each number that was moved stands among all numbers of a fit: linear parameters, strengths, numbers parameters.
+pub(in crate::diagnose) fn places(free: &Free, model: &Model) -> Vec<usize> {
+    let strengths = |e: usize| {
+        let c = &model.chosen[e];
+        if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() }
+    };
+    let knobs = model.refitted.p.len();
+    let all: usize = (0..model.chosen.len()).map(strengths).sum();
+    let strength = |&[e, i]: &[usize; 2]| knobs + (0..e).map(strengths).sum::<usize>() + i;
+    let moving = |e: usize, to: usize| model.chosen[e].continuous[..to].iter().filter(|c| **c).count();
+    let numbers = |&[e, i]: &[usize; 2]| {
+        let before: usize = (0..e).map(|e| moving(e, model.chosen[e].continuous.len())).sum();
+        knobs + all + before + moving(e, i)
+    };
+    free.knobs
+        .iter()
+        .copied()
+        .chain(free.strengths.iter().map(strength))
+        .chain(free.numbers.iter().map(numbers))
+        .collect()
+}
+
+/// Jacobians of a fit by the plain error, and the relative fall at which it ends.
+const ITERATIONS: usize = 15;
+const TOLERANCE: f64 = 1e-5;
+
+/// The model fitted by the plain error from where it stands, on these runs, each with the number of records that it stands for.
+pub(in crate::diagnose) fn descended(
+    bench: &DiagnosisData,
+    model: &Model,
+    law: Option<&Law>,
+    runs: &[(&Run, usize)],
+) -> Option<Model> {
+    let mut problem = Problem::plain_error(bench, model, law, runs);
+    let mut x = problem.start();
+    let before = size(&problem.settle(&x));
+    if !before.is_finite() {
+        return None;
+    }
+    let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
+    minimise(&mut problem, &mut x, &settings, &mut Workspace::default());
+    let after = size(&problem.settle(&x));
+    let (p, chosen) = problem.unpack(&x);
+    let possible = after < before && chosen.iter().all(|c| c.setting.is_possible(&[]));
+    let mut moved = model.clone();
+    if possible {
+        (moved.refitted.plant, moved.refitted.p, moved.chosen) = (bench.form.plant(&p), p, chosen);
+    }
+    Some(moved)
+}

@@ -1,0 +1,317 @@
+//! The missing law itself, where no name explains the records: a smooth curve at each port of the machine, estimated together with the
+//! linear plant by simulation; the one that foretells best what it was not fitted to.
+//!
+//! In: the diagnosis data, linear parameters to set out from. Out: the curve in its plain form with its errors, and how well it foretells.
+//! Spec: `specs/mismatch.md`, "Curves without a name".
+
+use super::gauge::{Plain, plain};
+use super::left_out::LeftOut;
+use super::shape::Shape;
+use super::stretches::Stretches;
+use super::trial::Trial;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::rules::{CURVE_CLEARLY, CURVE_LAG, FOLD_NAMED, SECOND_CURVE};
+use crate::lti::Plant;
+use crate::numeric::spline::{Spline, roughness_rows};
+use crate::physics::CurvePort;
+use nalgebra::DMatrix;
+use std::f64::consts::LN_2;
+
+/// A shape that was fitted, and how it foretells what it was not fitted to.
+#[derive(Clone)]
+pub(in crate::diagnose) struct Foretelling<'a> {
+    pub trial: Trial<'a>,
+    /// Mean square of the parts left out.
+    pub left_out: f64,
+    covariance: DMatrix<f64>,
+}
+
+impl Foretelling<'_> {
+    /// Standard error of one number.
+    pub fn spread(&self, i: usize) -> f64 {
+        self.covariance[(i, i)].max(0.0).sqrt()
+    }
+}
+
+/// A plant and a curve that balance the torques along recorded motion: from where a fit by simulation sets out.
+#[derive(Clone, Debug)]
+pub(in crate::diagnose) struct Curved {
+    pub plant: Plant,
+    pub shape: Shape,
+    /// Mean square of the parts left out over that of the balance without a curve.
+    pub share: f64,
+}
+
+/// What the estimation of curves came to.
+pub(in crate::diagnose) struct Estimated<'a> {
+    /// The linear plant fitted in the same way.
+    pub linear: Foretelling<'a>,
+    /// The best curve; beside the reading, where that has a name.
+    pub curve: Foretelling<'a>,
+    /// It in its plain form.
+    pub plain: Plain,
+    /// A reading that folds or ends at limits, where the best curve is the sensor's and it foretells as well.
+    pub reading: Option<Foretelling<'a>>,
+    /// Every port that was tried, with the mean square of the parts left out.
+    pub tried: Vec<(CurvePort, f64)>,
+}
+
+/// Times that the smoothness is chosen anew.
+const CHOICES: usize = 2;
+/// Times that the knots of the best curve are doubled.
+const FINER: usize = 2;
+/// Time constant from which a lag sets out (samples).
+const LAG: f64 = 3.0;
+/// Share of the readings below the place where a fold is taken to lie at first, and share of the range below that which makes an edge: the
+/// readings of a motion that runs free thin out towards their ends.
+const LOWEST: f64 = 0.005;
+const EDGE: f64 = 0.03;
+
+/// Fits a trial, its smoothness chosen by what is left out.
+fn foretold<'a>(mut trial: Trial<'a>) -> Option<Foretelling<'a>> {
+    let at = match &trial.shape {
+        Shape::Curve(_, at, _) => Some(at.clone()),
+        _ => None,
+    };
+    let rough = at.as_ref().map_or_else(|| DMatrix::zeros(0, 0), |at| roughness_rows(at));
+    let judged = |trial: &mut Trial<'a>| {
+        let (r, j) = trial.slopes();
+        let sound = r.iter().chain(j.iter()).all(|v| v.is_finite());
+        sound.then(|| (LeftOut::new(&trial.stretches.blocks, &r, &j, &trial.numbers(), &rough), r, j))
+    };
+    if at.is_some() {
+        for _ in 0..CHOICES {
+            trial.smoothness = judged(&mut trial)?.0.best_smoothness();
+            trial.descend();
+        }
+    } else {
+        trial.descend();
+    }
+    let (left_out, r, j) = judged(&mut trial)?;
+    if at.is_some() {
+        trial.smoothness = left_out.best_smoothness();
+    }
+    let covariance = left_out.covariance(&r, &j, trial.smoothness);
+    let left_out = left_out.error(trial.smoothness) / trial.stretches.total().max(1) as f64;
+    left_out.is_finite().then_some(Foretelling { trial, left_out, covariance })
+}
+
+fn better<'a>(a: Option<Foretelling<'a>>, b: Option<Foretelling<'a>>) -> Option<Foretelling<'a>> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if b.left_out < a.left_out { b } else { a }),
+        (a, b) => a.or(b),
+    }
+}
+
+/// The best fit of a shape from several linear parameters.
+fn from_each<'a>(
+    bench: &'a DiagnosisData,
+    stretches: &'a Stretches,
+    starts: &[Vec<f64>],
+    shape: &Shape,
+) -> Option<Foretelling<'a>> {
+    starts.iter().map(|p| foretold(Trial::new(bench, stretches, p, shape.clone()))).fold(None, better)
+}
+
+/// The same with a lag of the amplifier in front, where that foretells clearly better.
+fn with_lag<'a>(found: Foretelling<'a>) -> Foretelling<'a> {
+    let t = found.trial.bench.scene.sample_time_s;
+    let lagged = foretold(found.trial.clone().lagged(Some(LAG * t)));
+    lagged.filter(|l| l.left_out < CURVE_LAG * found.left_out).unwrap_or(found)
+}
+
+/// The knots with others between them.
+fn doubled(at: &[f64]) -> Vec<f64> {
+    let mut all: Vec<f64> = at.iter().copied().chain(at.windows(2).map(|w| 0.5 * (w[0] + w[1]))).collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+/// The same curve over more knots, where it foretells clearly better: what acts at one place only falls between few.
+fn finer<'a>(bench: &'a DiagnosisData, ground: &'a Stretches, mut found: Foretelling<'a>) -> Foretelling<'a> {
+    for _ in 0..FINER {
+        let Shape::Curve(port, at, value) = &found.trial.shape else { break };
+        if *port == CurvePort::SensorOverPosition {
+            break;
+        }
+        let spline = Spline::new(at.clone(), value.clone());
+        let at = doubled(at);
+        let value = at.iter().map(|a| spline.value(*a)).collect();
+        let shape = Shape::Curve(*port, at, value);
+        let next = foretold(Trial::new(bench, ground, &found.trial.p, shape).lagged(found.trial.lag_s));
+        match next.filter(|n| n.left_out < CURVE_CLEARLY * found.left_out) {
+            Some(next) => found = next,
+            None => break,
+        }
+    }
+    found
+}
+
+/// Linear parameters with other gains: what is read may be a part of the motion only.
+fn other_gains(bench: &DiagnosisData, starts: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let gain = bench.form.knobs.iter().position(|k| *k == crate::diagnose::data::linear_form::FreeParameter::Gain);
+    let moved = |p: &Vec<f64>, by: f64| {
+        let mut p = p.clone();
+        if let Some(i) = gain {
+            p[i] += by;
+        }
+        p
+    };
+    starts.iter().flat_map(|p| [0.0, 1.5 * LN_2].map(|by| moved(p, by))).collect()
+}
+
+/// Readings that fold or end at limits, each fitted from several starts.
+fn readings<'a>(bench: &'a DiagnosisData, stretches: &'a Stretches, starts: &[Vec<f64>]) -> Vec<Foretelling<'a>> {
+    let mut all: Vec<f64> = stretches.runs.iter().flat_map(|r| r.position.iter().copied()).collect();
+    all.sort_by(f64::total_cmp);
+    let at = |share: f64| all.get((share * all.len() as f64) as usize).copied().unwrap_or(0.0);
+    let (low, high) = (at(LOWEST), at(1.0 - LOWEST));
+    let (Some(least), Some(most)) = (all.first(), all.last()) else { return Vec::new() };
+    let edge = EDGE * (most - least);
+    let [below, above] = [low - least < edge, most - high < edge];
+    let fitted = |starts: &[Vec<f64>], reading: Shape| {
+        // A lag in front changes the whole motion: it is no afterthought here.
+        let lags = [None, Some(LAG * bench.scene.sample_time_s)];
+        let all = starts.iter().flat_map(|p| lags.map(|lag_s| (p, lag_s)));
+        let one = |(p, lag_s): (&Vec<f64>, Option<f64>)| {
+            foretold(Trial::new(bench, stretches, p, Shape::Linear).read_by(reading.clone()).lagged(lag_s))
+        };
+        all.map(one).fold(None, better)
+    };
+    let fold = below.then(|| fitted(&other_gains(bench, starts), Shape::Fold([low, low])));
+    let limits = (below || above).then(|| fitted(starts, Shape::Limits([low, high])));
+    fold.into_iter().chain(limits).flatten().collect()
+}
+
+/// The sensor's curve: from a straight one, and from the readings that fold or end.
+fn sensor<'a>(
+    bench: &'a DiagnosisData,
+    stretches: &'a Stretches,
+    starts: &[Vec<f64>],
+    readings: &[Foretelling<'a>],
+) -> Option<Foretelling<'a>> {
+    let port = CurvePort::SensorOverPosition;
+    let straight = Shape::knots(bench, port).and_then(|at| from_each(bench, stretches, starts, &Shape::idle(port, at)));
+    let top = bench.scene.centre + 0.5 * range(bench);
+    let bent = readings.iter().filter_map(|reading| {
+        let (at, value): (Vec<f64>, Vec<f64>) = match reading.trial.reading {
+            Shape::Fold([lowest, fold]) => {
+                let reach = (top - lowest).abs();
+                let at = Shape::spread(port, fold - reach, fold + reach);
+                let value = at.iter().map(|a| lowest + (a - fold).abs()).collect();
+                (at, value)
+            }
+            Shape::Limits([low, high]) => {
+                let at = Shape::spread(port, 1.5 * low - 0.5 * high, 1.5 * high - 0.5 * low);
+                let value = at.iter().map(|a| a.max(low).min(high)).collect();
+                (at, value)
+            }
+            _ => return None,
+        };
+        let shape = Shape::Curve(port, at, value);
+        foretold(Trial::new(bench, stretches, &reading.trial.p, shape).lagged(reading.trial.lag_s))
+    });
+    bent.fold(straight, |best, b| better(best, Some(b)))
+}
+
+fn range(bench: &DiagnosisData) -> f64 {
+    let all = bench.means.iter().flat_map(|r| &r.position);
+    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    high - low
+}
+
+/// Stretches for the linear plant and most ports, and for the sensor's curve.
+pub(in crate::diagnose) fn grounds(bench: &DiagnosisData) -> [Stretches; 2] {
+    let plain = Stretches::of(bench);
+    let one_place = plain.standing_alike();
+    [plain, one_place]
+}
+
+/// Estimates the curve at every port and takes the best; `curves` are those of the balance of torques.
+pub(in crate::diagnose) fn estimated<'a>(
+    bench: &'a DiagnosisData,
+    [ground, one_place]: [&'a Stretches; 2],
+    starts: &[Vec<f64>],
+    curves: &[Curved],
+    progress: &mut dyn FnMut(&str),
+) -> Option<Estimated<'a>> {
+    progress("a curve without a name: the linear plant by simulation");
+    let linear = with_lag(from_each(bench, ground, starts, &Shape::Linear)?);
+    // What acts may have bent the refit: the given plant is another start.
+    let mut from = vec![linear.trial.p.clone()];
+    from.extend(starts.first().filter(|p| **p != from[0]).cloned());
+    let (mut best, mut tried) = (None, Vec::new());
+    let mut taken = |port: CurvePort, found: Option<Foretelling<'a>>| {
+        tried.extend(found.as_ref().map(|f| (port, f.left_out)));
+        best = better(best.take(), found);
+    };
+    for port in CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition) {
+        let [name, argument] = port.names();
+        progress(&format!("a curve without a name: {name} over {argument}"));
+        let idle = Shape::knots(bench, port).and_then(|at| from_each(bench, ground, &from, &Shape::idle(port, at)));
+        // The balance of torques knows nothing of the given plant, which what acts may have bent.
+        let balanced = curves.iter().find(|c| c.shape.port() == Some(port));
+        let balanced = balanced.and_then(|c| {
+            let p = bench.form.numbers_of(&c.plant)?;
+            foretold(Trial::new(bench, ground, &p, c.shape.clone()))
+        });
+        taken(port, better(idle, balanced));
+    }
+    progress("a curve without a name: sensor over position");
+    let read = readings(bench, one_place, starts);
+    taken(CurvePort::SensorOverPosition, sensor(bench, one_place, &from, &read));
+    let mut curve = best?;
+    let Shape::Curve(port, ..) = curve.trial.shape else { return None };
+    curve = finer(bench, ground, curve);
+    if curve.trial.lag_s.is_none() {
+        curve = with_lag(curve);
+    }
+    let reading = read
+        .into_iter()
+        .min_by(|a, b| a.left_out.total_cmp(&b.left_out))
+        .filter(|_| port == CurvePort::SensorOverPosition);
+    let mut reading = reading.filter(|r| r.left_out < SECOND_CURVE * curve.left_out);
+    if let Some(r) = &reading {
+        progress("a curve without a name beside the reading that was found");
+        let (other, by_port) = beside(r, one_place)?;
+        // A name, alone or with a curve at another port, before a sensor bent freely, where it foretells as well.
+        if r.left_out < FOLD_NAMED * curve.left_out || other.left_out <= curve.left_out {
+            (curve, tried) = (other, by_port);
+        } else {
+            reading = None;
+        }
+    }
+    let plain = in_plain_form(&curve)?;
+    Some(Estimated { linear, curve, plain, reading, tried })
+}
+
+/// The best curve at another port beside a reading that folds or ends at limits.
+fn beside<'a>(reading: &Foretelling<'a>, one_place: &'a Stretches) -> Option<(Foretelling<'a>, Vec<(CurvePort, f64)>)> {
+    let bench = reading.trial.bench;
+    let (mut best, mut tried) = (None, Vec::new());
+    for port in CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition) {
+        let Some(at) = Shape::knots(bench, port) else { continue };
+        // What is read is not where the arm is: positions and speeds may be of either sign.
+        let at = if port == CurvePort::AmplifierOverCommand { at } else { both_sides(port, &at) };
+        let from = reading.trial.clone();
+        let trial =
+            Trial::new(bench, one_place, &from.p, Shape::idle(port, at)).read_by(from.reading).lagged(from.lag_s);
+        let found = foretold(trial);
+        tried.extend(found.as_ref().map(|f| (port, f.left_out)));
+        best = better(best, found);
+    }
+    best.map(|b| (b, tried))
+}
+
+/// Knots as far to one side of 0 as to the other.
+fn both_sides(port: CurvePort, at: &[f64]) -> Vec<f64> {
+    let reach = at.iter().fold(0.0f64, |m, a| m.max(a.abs()));
+    Shape::spread(port, -reach, reach)
+}
+
+fn in_plain_form(f: &Foretelling) -> Option<Plain> {
+    let Shape::Curve(port, at, value) = &f.trial.shape else { return None };
+    let from = f.trial.shape_from();
+    let own = f.covariance.view((from, from), (at.len(), at.len())).into_owned();
+    Some(plain(f.trial.bench, *port, at, value, &own, &f.trial.p))
+}

@@ -1,0 +1,159 @@
+//! What of a curve the linear plant can hold, given to the linear plant: the rest is the curve's own.
+//!
+//! In: a curve, the covariance of its values, the linear parameters. Out: the same in its plain form. A torque keeps no mean, and no line
+//! where the plant has a spring or a damper for it (the line of least squares over the samples); a loading curve begins at 0; a gain has the mean 1; an amplifier gives 0
+//! for 0 and rises by 1 on the mean; a sensor rises or falls by 1 on the mean.
+
+use crate::diagnose::data::linear_form::{FreeParameter, LinearForm, body_numbers, rate_of};
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::numeric::spline::Spline;
+use crate::physics::CurvePort;
+use nalgebra::{DMatrix, DVector};
+
+/// A curve in its plain form.
+#[derive(Clone)]
+pub(in crate::diagnose) struct Plain {
+    pub port: CurvePort,
+    pub at: Vec<f64>,
+    pub value: Vec<f64>,
+    /// Standard errors of the values.
+    pub spread: Vec<f64>,
+    /// How many samples lie near each knot, as a share.
+    pub weight: Vec<f64>,
+    /// All linear parameters.
+    pub p: Vec<f64>,
+}
+
+/// Least weight of a knot over the mean one.
+const LEAST: f64 = 1e-3;
+/// Least stiffness over the given one, and least damping over its unit, that a curve's line may leave.
+const LEFT: f64 = 0.02;
+
+/// How many samples lie near each knot; even for a sensor, behind whose curve nobody saw the arm, and for a loading curve, whose ways nest.
+fn weights(bench: &DiagnosisData, port: CurvePort, at: &[f64]) -> Vec<f64> {
+    let mut count = vec![0.0; at.len()];
+    if matches!(port, CurvePort::SensorOverPosition | CurvePort::TorqueOverLoading) {
+        count.fill(1.0);
+    } else {
+        let arm = if port == CurvePort::AmplifierOverCommand { 1.0 } else { bench.scene.arm_over_record() };
+        for s in bench.trajectories.iter().flat_map(|t| &t.samples) {
+            let a = port.argument(&s.scaled(arm));
+            let i = at.partition_point(|x| *x < a).clamp(1, at.len() - 1);
+            count[if a - at[i - 1] < at[i] - a { i - 1 } else { i }] += 1.0;
+        }
+    }
+    let mean = count.iter().sum::<f64>() / at.len() as f64;
+    let all: f64 = count.iter().map(|c| c + LEAST * mean).sum();
+    count.iter().map(|c| (c + LEAST * mean) / all).collect()
+}
+
+/// What a curve's line may move in the plant: knob and its change per slope.
+fn knob(form: &LinearForm, p: &[f64], port: CurvePort) -> Option<(usize, f64)> {
+    let (b, k, _) = body_numbers(&form.given.body);
+    let ratio = form.knobs.iter().zip(p).find(|(k, _)| **k == FreeParameter::Gain).map_or(1.0, |(_, v)| v.exp());
+    let gain = b * form.given.resonance_gain * ratio;
+    let (wanted, unit) = match port {
+        CurvePort::TorqueOverPosition => (FreeParameter::Stiffness, k),
+        CurvePort::TorqueOverVelocity => (FreeParameter::Viscous, rate_of(&form.given.body)),
+        _ => return None,
+    };
+    form.knobs.iter().position(|k| *k == wanted).map(|i| (i, -gain / unit))
+}
+
+/// The slope of least squares as weights of the values.
+fn slope_of(at: &[f64], weight: &[f64]) -> DVector<f64> {
+    let mean: f64 = at.iter().zip(weight).map(|(a, w)| a * w).sum();
+    let square: f64 = at.iter().zip(weight).map(|(a, w)| w * (a - mean).powi(2)).sum();
+    DVector::from_fn(at.len(), |i, _| weight[i] * (at[i] - mean) / square)
+}
+
+/// The value at `x` as weights of the values.
+fn value_of(at: &[f64], x: f64) -> DVector<f64> {
+    DVector::from_fn(at.len(), |i, _| {
+        let mut unit = vec![0.0; at.len()];
+        unit[i] = 1.0;
+        Spline::new(at.to_vec(), unit).value(x)
+    })
+}
+
+/// The plain form.
+pub(in crate::diagnose) fn plain(
+    bench: &DiagnosisData,
+    port: CurvePort,
+    at: &[f64],
+    value: &[f64],
+    covariance: &DMatrix<f64>,
+    p: &[f64],
+) -> Plain {
+    let (n, weight) = (at.len(), weights(bench, port, at));
+    let theta = DVector::from_column_slice(value);
+    let mean = DVector::from_column_slice(&weight);
+    let ones = DVector::from_element(n, 1.0);
+    let places = DVector::from_column_slice(at);
+    let mut out = Plain { port, at: at.to_vec(), value: vec![], spread: vec![], weight: weight.clone(), p: p.to_vec() };
+    let gain = bench.form.knobs.iter().position(|k| *k == FreeParameter::Gain);
+    let slope = slope_of(at, &weight);
+    let mut map = DMatrix::identity(n, n);
+    let plain = match port {
+        CurvePort::TorqueOverPosition | CurvePort::TorqueOverVelocity => {
+            if let Some((i, by)) = knob(&bench.form, p, port) {
+                let full = by * slope.dot(&theta);
+                let least = if port == CurvePort::TorqueOverPosition { LEFT - 1.0 } else { least_damping(bench) };
+                let moved = full.max(least - p[i]);
+                out.p[i] += moved;
+                let share = if full == 0.0 { 1.0 } else { moved / full };
+                map -= &places * slope.transpose() * share;
+            }
+            map = (DMatrix::identity(n, n) - &ones * mean.transpose()) * map;
+            &map * &theta
+        }
+        CurvePort::TorqueOverTime => {
+            map = &map - &ones * mean.transpose();
+            &map * &theta
+        }
+        CurvePort::TorqueOverLoading => {
+            map.column_mut(0).fill(0.0);
+            map.column_mut(0).iter_mut().skip(1).for_each(|v| *v = -1.0);
+            &map * &theta
+        }
+        CurvePort::GainOverPosition | CurvePort::GainOverTime => {
+            let level = mean.dot(&theta);
+            scaled(&mut out, gain, level);
+            let plain = &theta / level;
+            map = (map - &plain * mean.transpose()) / level;
+            plain
+        }
+        CurvePort::AmplifierOverCommand => {
+            let rise = slope.dot(&theta);
+            scaled(&mut out, gain, rise);
+            let zero = &ones * value_of(at, 0.0f64.clamp(at[0], at[n - 1])).transpose();
+            let plain = (DMatrix::identity(n, n) - &zero) * &theta / rise;
+            map = ((map - &zero) - &plain * slope.transpose()) / rise;
+            plain
+        }
+        CurvePort::SensorOverPosition => {
+            let spline = Spline::new(at.to_vec(), value.to_vec());
+            let rise = (at.iter().map(|a| spline.slope(*a).powi(2)).sum::<f64>() / n as f64).sqrt();
+            scaled(&mut out, gain, rise);
+            out.at.iter_mut().for_each(|a| *a *= rise);
+            theta
+        }
+    };
+    out.value = plain.iter().copied().collect();
+    let spread = &map * covariance * map.transpose();
+    out.spread = (0..n).map(|i| spread[(i, i)].max(0.0).sqrt()).collect();
+    out
+}
+
+/// Least value of the damping's knob.
+fn least_damping(bench: &DiagnosisData) -> f64 {
+    let (_, _, c) = body_numbers(&bench.form.given.body);
+    -c / rate_of(&bench.form.given.body) + LEFT * f64::from(u8::from(c > 0.0)) * c / rate_of(&bench.form.given.body)
+}
+
+/// Gives a curve's factor to the plant's gain.
+fn scaled(out: &mut Plain, gain: Option<usize>, by: f64) {
+    if let Some(i) = gain.filter(|_| by > 0.0) {
+        out.p[i] += by.ln();
+    }
+}

@@ -1,0 +1,96 @@
+//! The stretches of the records that a curve is estimated from: all mean runs where they are few, evenly spread pieces of them where
+//! they are many.
+//!
+//! In: the diagnosis data. Out: runs, and which of them are left out together.
+
+use crate::diagnose::data::run::Run;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+
+/// Most samples: a curve has a few dozen numbers, and every one of them costs a simulation of all samples at each step.
+const MOST: usize = 40_000;
+/// Shortest piece of a long record (samples), and how many pieces of it there are at most.
+const SHORTEST: usize = 2000;
+const PIECES: usize = 12;
+/// Records from which whole records are left out; fewer are left out by stretches: one of a few may be all that went to a place.
+const MANY: usize = 12;
+/// Parts that are left out in turn, and stretches of a record that are: a move is over such a place in a twentieth of its record.
+const FOLDS: usize = 4;
+const IN_TURN: usize = 32;
+
+/// What a curve is fitted to.
+pub(in crate::diagnose) struct Stretches {
+    /// One after the other.
+    pub runs: Vec<Run>,
+    /// Blocks of consecutive samples of the runs in their order: samples, and the part that it is left out with.
+    pub blocks: Vec<(usize, usize)>,
+}
+
+/// Samples `from` to `to` of a run, as a run that begins in full motion.
+fn piece(run: &Run, from: usize, to: usize, sample_time_s: f64) -> Run {
+    let cut = |x: &Vec<f64>| x[from..to].to_vec();
+    Run {
+        began_s: run.began_s + from as f64 * sample_time_s,
+        reference: run.reference.as_ref().map(cut),
+        command: cut(&run.command),
+        excitation: cut(&run.excitation),
+        input: cut(&run.input),
+        position: cut(&run.position),
+        before: run.input[from],
+        origin: run.position[from],
+        rested: false,
+        pes: None,
+        spindle_rad: run.spindle_rad.as_ref().map(cut),
+        temperature: run.temperature.as_ref().map(cut),
+        ..run.clone()
+    }
+}
+
+impl Stretches {
+    /// Of the mean runs of the diagnosis data.
+    pub fn of(bench: &DiagnosisData) -> Stretches {
+        let total: usize = bench.means.iter().map(Run::len).sum();
+        let runs = if total <= MOST { bench.means.clone() } else { spread(&bench.means, total, bench) };
+        let whole = runs.len() >= MANY;
+        let mut blocks = Vec::new();
+        for (i, run) in runs.iter().enumerate() {
+            let parts = if whole { 1 } else { IN_TURN.min(run.len()).max(1) };
+            for k in 0..parts {
+                let len = run.len() * (k + 1) / parts - run.len() * k / parts;
+                blocks.push((len, if whole { i % FOLDS } else { k % FOLDS }));
+            }
+        }
+        Stretches { runs, blocks }
+    }
+
+    /// The same for a sensor whose curve is asked for: where the arm stands is not known from what it reads, but all records share
+    /// one machine, which stands at one place under one command.
+    pub fn standing_alike(&self) -> Stretches {
+        let samples: f64 = self.runs.iter().map(|r| r.len() as f64).sum();
+        let mean = |of: &dyn Fn(&Run) -> &Vec<f64>| self.runs.iter().flat_map(of).sum::<f64>() / samples;
+        let (origin, before) = (mean(&|r| &r.position), mean(&|r| &r.input));
+        let runs = self.runs.iter().map(|r| Run { origin, before, ..r.clone() }).collect();
+        Stretches { runs, blocks: self.blocks.clone() }
+    }
+
+    /// Samples in all.
+    pub fn total(&self) -> usize {
+        self.runs.iter().map(Run::len).sum()
+    }
+}
+
+/// Evenly spread pieces of long records.
+fn spread(means: &[Run], total: usize, bench: &DiagnosisData) -> Vec<Run> {
+    let share = MOST as f64 / total as f64;
+    let mut all = Vec::new();
+    for run in means {
+        let wanted = (share * run.len() as f64) as usize;
+        let pieces = (wanted / SHORTEST).clamp(1, PIECES);
+        let len = (wanted / pieces).min(run.len());
+        let gaps = pieces.saturating_sub(1).max(1);
+        for k in 0..pieces {
+            let from = (run.len() - len) * k / gaps;
+            all.push(piece(run, from, from + len, bench.scene.sample_time_s));
+        }
+    }
+    all
+}

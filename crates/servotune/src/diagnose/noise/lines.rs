@@ -1,0 +1,183 @@
+//! Lines whose phase differs from repeat to repeat: run-out of a spindle without index, mains, fans.
+//!
+//! In: the open-loop error of every run, noise and all. Out: frequencies, and each run's cosine and sine. A mean over repeats
+//! would smear such a line and their spread would count it as noise, so lines are found in what repeats differ by and taken
+//! out of every run before anything else is estimated. The directions are closed to all later fits.
+
+use super::chance::log_tail;
+use crate::diagnose::data::run::Run;
+use crate::diagnose::data::stacked_records::NuisanceBasis;
+use crate::diagnose::rules::{LINE_CHANCE, LINE_SNAP};
+use crate::diagnose::rules::{MAINS_MULTIPLES, MAINS_OFF_HZ};
+use crate::numeric::golden::golden_section;
+use crate::numeric::least_squares::dot;
+use crate::numeric::spectrum::forward;
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// One line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// Frequency (Hz).
+    pub hz: f64,
+    /// Order of the spindle, where it is one.
+    pub order: Option<usize>,
+    /// Logarithm of the chance that noise alone shows it somewhere in the spectrum.
+    pub log_p: f64,
+}
+
+/// Most lines that are looked for.
+const MOST: usize = 8;
+/// Bins on each side over which the noise's level is taken, and those next to the line that are left out.
+const LEVEL: [usize; 2] = [40, 4];
+
+impl Line {
+    /// Cosine and sine over a run.
+    pub fn columns(&self, run: &Run, sample_time_s: f64) -> [Vec<f64>; 2] {
+        let angle = |k: usize| match (self.order, &run.spindle_rad) {
+            (Some(n), Some(psi)) => n as f64 * psi[k],
+            _ => TAU * self.hz * k as f64 * sample_time_s,
+        };
+        [f64::cos, f64::sin].map(|f| (0..run.len()).map(|k| f(angle(k))).collect())
+    }
+
+    /// The line in part of `error`, fitted beside free motions of the body over that part: its cosine and sine.
+    pub fn fit(&self, run: &Run, over: Range<usize>, free: &[Vec<f64>], sample_time_s: f64, error: &[f64]) -> [f64; 2] {
+        let mut basis = NuisanceBasis::default();
+        free.iter().for_each(|c| basis.add_local(0, c.clone()));
+        let mut e = error[over.clone()].to_vec();
+        basis.project(&mut e);
+        let [mut c, mut s] = self.columns(run, sample_time_s).map(|c| c[over.clone()].to_vec());
+        basis.project(&mut c);
+        basis.project(&mut s);
+        let (cc, cs, ss, ce, se) = (dot(&c, &c), dot(&c, &s), dot(&s, &s), dot(&c, &e), dot(&s, &e));
+        let det = cc * ss - cs * cs;
+        if det > 1e-9 * cc * ss { [(ce * ss - se * cs) / det, (se * cc - ce * cs) / det] } else { [0.0; 2] }
+    }
+}
+
+/// The strongest line of series that hold noise only and are white but for it; `groups` says whose repeat each is.
+///
+/// The statistic is the power of all series at one frequency over the level around it: chi-square with two numbers for each
+/// repeat beyond the first of its group.
+pub fn strongest(series: &[Vec<f64>], groups: &[usize], sample_time_s: f64, spindle_hz: Option<f64>) -> Option<Line> {
+    let share = |i: usize| {
+        let repeats = groups.iter().filter(|g| **g == groups[i]).count();
+        (repeats - 1) as f64 / repeats as f64
+    };
+    let shares: Vec<f64> = (0..groups.len()).map(share).collect();
+    let numbers = (0..groups.len()).map(|i| usize::from(groups[..i].contains(&groups[i])) * 2).sum();
+    peak(series, &shares, numbers, sample_time_s, spindle_hz)
+}
+
+/// The strongest line of series each of which holds `share` of the noise of its own, `numbers` in all at one frequency.
+pub fn peak(
+    series: &[Vec<f64>],
+    shares: &[f64],
+    numbers: usize,
+    sample_time_s: f64,
+    spindle_hz: Option<f64>,
+) -> Option<Line> {
+    let longest = series.iter().map(Vec::len).max()?;
+    // One grid for all lengths: zeros behind the shorter ones, and as many again, so that no line falls between two bins.
+    let n = 2 * longest;
+    let mut power = vec![0.0; n / 2];
+    for (x, share) in series.iter().zip(shares) {
+        let variance = dot(x, x) / x.len() as f64;
+        let mut padded = x.clone();
+        padded.resize(n, 0.0);
+        let scale = share * 2.0 / (x.len() as f64 * variance.max(1e-300));
+        power.iter_mut().zip(forward(&padded)).for_each(|(p, b)| *p += scale * b.norm_sqr());
+    }
+    if numbers == 0 {
+        return None;
+    }
+    let mean = numbers as f64;
+    let level = |k: usize| {
+        let near = (k.saturating_sub(2 * LEVEL[0])..(k + 2 * LEVEL[0]).min(power.len()))
+            .filter(|j| j.abs_diff(k) > 2 * LEVEL[1] && *j > 2);
+        let mut around: Vec<f64> = near.map(|j| power[j]).collect();
+        around.sort_by(f64::total_cmp);
+        // The median of chi-square is close to its mean less two thirds.
+        around.get(around.len() / 2).copied().unwrap_or(mean) / (1.0 - 2.0 / (9.0 * mean)).powi(3)
+    };
+    let mut best = (0.0, 0);
+    for (k, p) in power.iter().enumerate().skip(5) {
+        if *p > best.0 * 0.8 {
+            let g = p / level(k) * mean;
+            if g > best.0 {
+                best = (g, k);
+            }
+        }
+    }
+    let (gain, k) = best;
+    let log_p = log_tail(gain, numbers) + (power.len() as f64).ln();
+    if log_p > LINE_CHANCE.ln() {
+        return None;
+    }
+    let width = 1.0 / (longest as f64 * sample_time_s);
+    let at = k as f64 / (n as f64 * sample_time_s);
+    let strength = |hz: f64| {
+        let w = TAU * hz * sample_time_s;
+        series
+            .iter()
+            .map(|x| {
+                let (c, s) = x.iter().enumerate().fold((0.0, 0.0), |(c, s), (k, v)| {
+                    let (sin, cos) = (w * k as f64).sin_cos();
+                    (c + v * cos, s + v * sin)
+                });
+                -(c * c + s * s) / x.len() as f64
+            })
+            .sum::<f64>()
+    };
+    let hz = golden_section(strength, at - 0.5 * width, at + 0.5 * width, 1e-3 * width).x;
+    let order =
+        spindle_hz.map(|s| ((hz / s).round(), s)).filter(|(n, s)| *n >= 1.0 && (hz - n * s).abs() < LINE_SNAP * width);
+    Some(match order {
+        Some((n, s)) => Line { hz: n * s, order: Some(n as usize), log_p },
+        None => Line { hz, order: None, log_p },
+    })
+}
+
+/// A run and its error.
+pub type RunError = (usize, Vec<f64>);
+/// White series of noise, and the group of repeats that each belongs to.
+pub type NoiseSeries = (Vec<Vec<f64>>, Vec<usize>);
+
+/// Finds lines one after the other and takes them out of `errors` (run and its error, free motions of the body still in it);
+/// `noise` makes white noise series of them, with their groups.
+pub fn take_lines(
+    errors: &mut [RunError],
+    runs: &[Run],
+    free: &dyn Fn(usize) -> Vec<Vec<f64>>,
+    sample_time_s: f64,
+    spindle_hz: Option<f64>,
+    noise: &dyn Fn(&[RunError]) -> NoiseSeries,
+) -> Vec<Line> {
+    let mut lines: Vec<Line> = Vec::new();
+    while lines.len() < MOST {
+        let (series, groups) = noise(errors);
+        let Some(line) = strongest(&series, &groups, sample_time_s, spindle_hz) else { break };
+        // A line that stays after it was taken out is no line.
+        if lines.iter().any(|l| (l.hz - line.hz).abs() < 1e-6 * line.hz) {
+            break;
+        }
+        for (r, e) in errors.iter_mut() {
+            let run = &runs[*r];
+            let fitted = line.fit(run, 0..run.len(), &free(run.len()), sample_time_s, e);
+            for (column, a) in line.columns(run, sample_time_s).iter().zip(fitted) {
+                e.iter_mut().zip(column).for_each(|(e, c)| *e -= a * c);
+            }
+        }
+        lines.push(line);
+    }
+    lines
+}
+
+/// Whether the mains may hum at a frequency: a single higher order of the spindle there may be either.
+pub(in crate::diagnose) fn mains(hz: f64) -> bool {
+    [50.0, 60.0].iter().any(|base| {
+        let k = (hz / base).round();
+        (1.0..=MAINS_MULTIPLES).contains(&k) && (hz - k * base).abs() < MAINS_OFF_HZ
+    })
+}

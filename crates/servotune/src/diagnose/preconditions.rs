@@ -1,0 +1,48 @@
+//! Whether records and plant are a ground on which anything can be computed.
+//!
+//! In: the diagnosis data, before the first fit. Out: nothing, or a refusal: numbers that overflowed would be none everywhere after, and decompositions of them need not end.
+
+use super::DiagnoseError;
+use super::rules::BEYOND_MOTION;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+
+/// Refuses a ground on which nothing can be computed.
+pub(super) fn check(bench: &DiagnosisData) -> Result<(), DiagnoseError> {
+    alike(bench)?;
+    finite(bench)
+}
+
+/// Refuses a ground on which nothing can be computed: what is no number here would be none everywhere after.
+fn finite(bench: &DiagnosisData) -> Result<(), DiagnoseError> {
+    let (l, s) = (&bench.levels, &bench.scene);
+    let numbers = [
+        ("the level of the sensor's noise", l.sensor_rms),
+        ("the level of the torque's noise", l.torque_rms),
+        ("the corner of the torque's noise", l.torque_corner_hz),
+        ("the noise of the records", s.noise),
+        ("the travel of the records", s.travel),
+        ("the speed of the records", s.speed),
+        ("the motion of the arm per recorded position", s.arm_over_record()),
+    ];
+    let moving = bench.trajectories.iter().flat_map(|t| &t.samples);
+    let lost = moving.map(|m| m.x + m.v + m.u + m.i).find(|sum| !sum.is_finite()).map(|x| ("the motion of the arm", x));
+    match numbers.into_iter().find(|(_, x)| !x.is_finite()).or(lost) {
+        Some((what, found)) => Err(DiagnoseError::NotFinite { what, found }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a plant that simulates something else than these records.
+fn alike(bench: &DiagnosisData) -> Result<(), DiagnoseError> {
+    let none = vec![0.0; bench.form.knobs.len()];
+    for (record, error) in bench.means.iter().zip(bench.clone().fit(vec![]).errors(&none)) {
+        let mean = record.position.iter().sum::<f64>() / record.len() as f64;
+        let moved: Vec<f64> = record.position.iter().map(|x| x - mean).collect();
+        let size = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt();
+        let ratio = size(&error) / size(&moved);
+        if size(&moved) > 0.0 && (!ratio.is_finite() || ratio > BEYOND_MOTION) {
+            return Err(DiagnoseError::Unlike { record: record.name.clone(), ratio });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,300 @@
+//! A curve and the linear plant together by the balance of torques: along recorded motion both are linear, whatever the given plant was.
+//!
+//! In: a balance and a port. Out: plant and curve from which a fit by simulation sets out, and how well the balance foretells what it was
+//! not fitted to. Knots are joined by straight lines here; the roughness of the spline through them is held by the same left-out parts that
+//! choose it for a simulation.
+
+use super::torque_balance::{Balance, LATER, Smoothed, smooth, weights};
+use crate::diagnose::data::linear_form::body_numbers;
+use crate::diagnose::free_form::estimation::Curved;
+use crate::diagnose::free_form::left_out::LeftOut;
+use crate::diagnose::free_form::shape::Shape;
+use crate::lti::Body;
+use crate::numeric::spline::roughness_rows;
+use crate::physics::{CurvePort, Sliders};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+/// Knots of a curve; of one over time, where events are short.
+const KNOTS: usize = 33;
+const OVER_TIME: usize = 129;
+/// Share of the rows beyond the first and the last knot.
+const BEYOND: f64 = 1e-3;
+/// Stretches of each record, and parts of them that are left out in turn.
+const STRETCHES: usize = 32;
+const PARTS: usize = 4;
+/// Shares of the later command at which a command's curve is tried: any delay up to that one.
+const DELAYS: usize = 9;
+
+/// What enters a balance beside the curve.
+struct Rows {
+    /// Columns of the plant: command early and late (none where the curve holds it), velocity, position, a constant a record.
+    plant: Vec<Vec<f64>>,
+    target: Vec<f64>,
+    blocks: Vec<(usize, usize)>,
+}
+
+impl Balance<'_> {
+    fn total(&self) -> usize {
+        self.parts.iter().map(|p| p.rows.len()).sum()
+    }
+
+    /// A value at every row, smoothed, from one at every sample of a record.
+    fn at_rows(&self, of: &dyn Fn(&Smoothed, usize) -> Vec<f64>, weights: &[f64]) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.total());
+        for (r, part) in self.parts.iter().enumerate() {
+            let series = of(part, r);
+            out.extend(part.rows.iter().map(|&k| smooth(&series, k, weights)));
+        }
+        out
+    }
+
+    fn rows(&self, port: Option<CurvePort>, weights: &[f64]) -> Rows {
+        let mut plant = Vec::new();
+        let of_command = |p: CurvePort| {
+            matches!(p, CurvePort::AmplifierOverCommand | CurvePort::GainOverPosition | CurvePort::GainOverTime)
+        };
+        if !port.is_some_and(of_command) {
+            let acts = |r: usize| held(&self.means[r].input);
+            plant.extend([0, LATER].map(|lag| self.at_rows(&|_, r| late(&acts(r), lag), weights)));
+        }
+        let raw = |of: &dyn Fn(&Smoothed, usize, usize) -> f64| -> Vec<f64> {
+            self.parts
+                .iter()
+                .enumerate()
+                .flat_map(|(r, p)| p.rows.iter().map(|&k| of(p, r, k)).collect::<Vec<_>>())
+                .collect()
+        };
+        if port != Some(CurvePort::TorqueOverVelocity) {
+            plant.push(raw(&|p, _, k| -p.samples[k].v));
+        }
+        let free = matches!(self.bench.form.given.body, Body::FreeInertia { .. });
+        if !free && port != Some(CurvePort::TorqueOverPosition) {
+            plant.push(raw(&|p, r, k| self.means[r].origin - p.samples[k].x));
+        }
+        for own in 0..self.parts.len() {
+            plant.push(raw(&|_, r, _| f64::from(u8::from(r == own))));
+        }
+        let mut blocks = Vec::new();
+        for part in &self.parts {
+            let n = part.rows.len();
+            blocks.extend((0..STRETCHES).map(|k| (n * (k + 1) / STRETCHES - n * k / STRETCHES, k % PARTS)));
+        }
+        Rows { plant, target: raw(&|p, _, k| p.acceleration[k]), blocks }
+    }
+
+    /// What is left on parts left out, and the numbers.
+    fn foretold(&self, rows: &Rows, curve: &[Vec<f64>], rough: &DMatrix<f64>) -> Option<(f64, Vec<f64>)> {
+        let count = rows.plant.len() + curve.len();
+        let total = rows.target.len();
+        if total < 4 * count {
+            return None;
+        }
+        let all: Vec<&Vec<f64>> = rows.plant.iter().chain(curve).collect();
+        let j = DMatrix::from_fn(total, count, |i, k| all[k][i]);
+        let r: Vec<f64> = rows.target.iter().map(|t| -t).collect();
+        let left_out = LeftOut::new(&rows.blocks, &r, &j, &vec![0.0; count], rough);
+        let smoothness = if curve.is_empty() { 0.0 } else { left_out.best_smoothness() };
+        let error = left_out.error(smoothness);
+        error.is_finite().then_some(())?;
+        Some((error, left_out.solution(smoothness)?))
+    }
+
+    /// Knots over what the rows go over.
+    fn knots(&self, port: CurvePort) -> Option<Vec<f64>> {
+        let arm = self.arm(port);
+        let rows = self.parts.iter().flat_map(|p| p.rows.iter().map(move |&k| p.samples[k].scaled(arm)));
+        let mut all: Vec<f64> = rows.map(|s| port.argument(&s)).filter(|a| a.is_finite()).collect();
+        all.sort_by(f64::total_cmp);
+        let off = (BEYOND * all.len() as f64) as usize;
+        let [low, high] = [*all.get(off)?, *all.get(all.len().checked_sub(off + 1)?)?];
+        let [low, high] = if port == CurvePort::TorqueOverLoading { [0.0, high - low] } else { [low, high] };
+        let count = if port == CurvePort::TorqueOverTime { OVER_TIME } else { KNOTS };
+        (low < high).then(|| Shape::spread_of(port, low, high, count))
+    }
+
+    fn arm(&self, port: CurvePort) -> f64 {
+        if port == CurvePort::AmplifierOverCommand { 1.0 } else { self.bench.scene.arm_over_record() }
+    }
+
+    /// The columns of a curve's values, a command's at this share of the later one.
+    fn curve_columns(&self, port: CurvePort, at: &[f64], weights: &[f64], share: f64) -> Vec<Vec<f64>> {
+        let arm = self.arm(port);
+        if port == CurvePort::TorqueOverLoading {
+            return self.loading_columns(at, weights);
+        }
+        let acting = |r: usize| -> Vec<f64> {
+            let acts = held(&self.means[r].input);
+            let (early, late) = (late(&acts, 0), late(&acts, LATER));
+            early.iter().zip(&late).map(|(a, b)| (1.0 - share) * a + share * b).collect()
+        };
+        (0..at.len())
+            .into_par_iter()
+            .map(|j| {
+                let of = |part: &Smoothed, r: usize| -> Vec<f64> {
+                    let hats = part.samples.iter().map(|s| hat(at, j, port.argument(&s.scaled(arm))));
+                    match port {
+                        CurvePort::AmplifierOverCommand => {
+                            let acts = held(&hats.collect::<Vec<_>>());
+                            let (early, late) = (late(&acts, 0), late(&acts, LATER));
+                            early.iter().zip(&late).map(|(a, b)| (1.0 - share) * a + share * b).collect()
+                        }
+                        CurvePort::GainOverPosition | CurvePort::GainOverTime => {
+                            hats.zip(acting(r)).map(|(h, u)| h * u).collect()
+                        }
+                        _ => hats.collect(),
+                    }
+                };
+                self.at_rows(&of, weights)
+            })
+            .collect()
+    }
+
+    /// Of a loading curve: its values are slopes between knots, and each slider holds the fall of the slope at its knot.
+    fn loading_columns(&self, at: &[f64], weights: &[f64]) -> Vec<Vec<f64>> {
+        let arm = self.bench.scene.arm_over_record();
+        let mut sliders: Vec<Vec<f64>> = vec![Vec::with_capacity(self.total()); at.len() - 1];
+        for part in &self.parts {
+            let mut row = Sliders::of(at);
+            let mut stretch = vec![vec![0.0; part.samples.len()]; at.len() - 1];
+            for k in 1..part.samples.len() {
+                let dx = arm * (part.samples[k].x - part.samples[k - 1].x);
+                row.go(dx).iter().zip(&mut stretch).for_each(|(z, s)| s[k] = *z);
+            }
+            for (out, s) in sliders.iter_mut().zip(&stretch) {
+                out.extend(part.rows.iter().map(|&k| -smooth(s, k, weights)));
+            }
+        }
+        let n = at.len();
+        let total = self.total();
+        let slider = |j: Option<usize>, i: usize| j.and_then(|j| sliders.get(j)).map_or(0.0, |s| s[i]);
+        // A value at knot i raises the slope before it and lowers the one behind.
+        let column = |i: usize| -> Vec<f64> {
+            let before = (i > 0).then(|| (at[i] - at[i - 1]).recip());
+            let behind = (i + 1 < n).then(|| (at[i + 1] - at[i]).recip());
+            let own = i.checked_sub(1);
+            (0..total)
+                .map(|k| {
+                    let rises = before.map_or(0.0, |w| {
+                        w * (slider(own, k) - slider(own.and_then(|o| o.checked_sub(1)), k))
+                    });
+                    let falls = behind.map_or(0.0, |w| w * (slider(Some(i), k) - slider(own, k)));
+                    rises - falls
+                })
+                .collect()
+        };
+        (0..n).into_par_iter().map(column).collect()
+    }
+
+    /// Plant and curve at a port; none where nothing moves there or nothing can be solved.
+    pub fn curved(&self, port: CurvePort) -> Option<Curved> {
+        let weights = weights(self.width);
+        let at = self.knots(port)?;
+        let plain = self.rows(None, &weights);
+        let (linear, _) = self.foretold(&plain, &[], &DMatrix::zeros(0, 0))?;
+        let rows = self.rows(Some(port), &weights);
+        let rough = roughness_rows(&at);
+        let of_command = rows.plant.len() + 1 < plain.plant.len()
+            || matches!(port, CurvePort::AmplifierOverCommand | CurvePort::GainOverPosition | CurvePort::GainOverTime);
+        let shares: Vec<f64> = match of_command {
+            true => (0..DELAYS).map(|k| k as f64 / (DELAYS - 1) as f64).collect(),
+            false => vec![0.0],
+        };
+        let tried = shares.into_iter().filter_map(|share| {
+            let columns = self.curve_columns(port, &at, &weights, share);
+            self.foretold(&rows, &columns, &rough).map(|(error, x)| (error, x, share))
+        });
+        let (error, x, share) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        self.made(port, at, &x, share, rows.plant.len(), error / linear)
+    }
+
+    /// The numbers of a balance as a plant and a curve.
+    fn made(&self, port: CurvePort, at: Vec<f64>, x: &[f64], share: f64, from: usize, left: f64) -> Option<Curved> {
+        let (own, mut value) = (&x[..from], x[from..].to_vec());
+        let mut own = own.iter().copied();
+        let (gain, late) = match port {
+            CurvePort::AmplifierOverCommand => {
+                // The line of least squares through the curve is the gain.
+                let mean = at.iter().sum::<f64>() / at.len() as f64;
+                let square: f64 = at.iter().map(|a| (a - mean).powi(2)).sum();
+                (at.iter().zip(&value).map(|(a, v)| (a - mean) * v).sum::<f64>() / square, share)
+            }
+            CurvePort::GainOverPosition | CurvePort::GainOverTime => {
+                (value.iter().sum::<f64>() / value.len() as f64, share)
+            }
+            _ => {
+                let [early, late] = [own.next()?, own.next()?];
+                (early + late, late / (early + late))
+            }
+        };
+        let viscous = if port == CurvePort::TorqueOverVelocity { 0.0 } else { own.next()? };
+        let free = matches!(self.bench.form.given.body, Body::FreeInertia { .. });
+        let stiffness = if free || port == CurvePort::TorqueOverPosition { 0.0 } else { own.next()? };
+        if !gain.is_normal() {
+            return None;
+        }
+        value.iter_mut().for_each(|v| *v /= gain);
+        // What the curve holds of spring and damper goes back to the plant, that it stays one.
+        let line = |at: &[f64], value: &[f64]| {
+            let mean = at.iter().sum::<f64>() / at.len() as f64;
+            let square: f64 = at.iter().map(|a| (a - mean).powi(2)).sum();
+            at.iter().zip(value).map(|(a, v)| (a - mean) * v).sum::<f64>() / square
+        };
+        let (mut viscous, mut stiffness) = (viscous, stiffness);
+        match port {
+            CurvePort::TorqueOverVelocity => viscous = (-gain * line(&at, &value)).max(0.0),
+            CurvePort::TorqueOverPosition => stiffness = (-gain * line(&at, &value)).max(0.0),
+            _ => {}
+        }
+        let plant = self.plant(gain, LATER as f64 * late, viscous, stiffness);
+        let held = body_numbers(&plant.body);
+        let back = match port {
+            CurvePort::TorqueOverVelocity => held.2 / gain,
+            CurvePort::TorqueOverPosition => held.1 / gain,
+            _ => 0.0,
+        };
+        value.iter_mut().zip(&at).for_each(|(v, a)| *v += back * a);
+        if port == CurvePort::TorqueOverLoading {
+            let first = value[0];
+            value.iter_mut().for_each(|v| *v -= first);
+        }
+        value.iter().all(|v| v.is_finite()).then_some(())?;
+        Some(Curved { plant, shape: Shape::Curve(port, at, value), share: left })
+    }
+}
+
+/// What a command held between samples comes to around each sample: the mean of the two beside it.
+fn held(u: &[f64]) -> Vec<f64> {
+    (0..u.len()).map(|k| 0.5 * (u[k] + u[k.saturating_sub(1)])).collect()
+}
+
+/// A series some samples later.
+fn late(x: &[f64], by: usize) -> Vec<f64> {
+    (0..x.len()).map(|k| x[k.saturating_sub(by)]).collect()
+}
+
+/// The value at `x` of what is 1 at knot `j` and 0 at the others, straight between and beyond them.
+fn hat(at: &[f64], j: usize, x: f64) -> f64 {
+    let i = at.partition_point(|a| *a <= x).clamp(1, at.len() - 1);
+    let share = (x - at[i - 1]) / (at[i] - at[i - 1]);
+    if i == j {
+        share
+    } else if i == j + 1 {
+        1.0 - share
+    } else {
+        0.0
+    }
+}
+
+/// Plants and curves by the balances of some smoothings, the best of each port, those that foretell best first.
+pub(in crate::diagnose) fn curves(balances: &[Balance]) -> Vec<Curved> {
+    let ports = CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition);
+    let best = |port: CurvePort| {
+        let all = balances.iter().filter_map(|b| b.curved(port));
+        all.min_by(|a, b| a.share.total_cmp(&b.share))
+    };
+    let mut all: Vec<Curved> = ports.filter_map(best).collect();
+    all.sort_by(|a, b| a.share.total_cmp(&b.share));
+    all
+}
+

@@ -1,0 +1,21 @@
+//! Fifth floor of the diagnosis: which effects the model lacks.
+
+mod backward_elimination;
+mod bootstrap;
+pub(super) mod bootstrap_chance;
+pub(super) mod candidate;
+pub(super) mod cleared_plant;
+pub(super) mod curve_balance;
+mod drift_test;
+mod far_from_noise;
+pub(super) mod residual_effect;
+mod residual_screen;
+mod rival;
+pub(super) mod rival_model;
+mod scan;
+pub(super) mod select;
+pub(super) mod select_settings;
+pub(super) mod selection;
+pub(super) mod shortlist;
+mod step_scan;
+pub(super) mod torque_balance;

@@ -1,0 +1,103 @@
+//! The search as it went: steps, the model it ended at, rivals of its laws.
+
+use super::bootstrap_chance::Bootstrap;
+use super::candidate::Candidate;
+use super::residual_effect::ResidualEffect;
+use super::rival_model::Rival;
+use crate::diagnose::fit::corrected_model::Corrected;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::model::Model;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
+use crate::diagnose::fit::simulation::SimulatedModel;
+use crate::diagnose::rules::{MIXTURE_LAWS, MIXTURE_LEADS};
+
+/// One step of the search.
+#[derive(Clone)]
+pub struct Step {
+    /// Sum of squares of the whitened error before it.
+    pub before: f64,
+    /// The scan, best first; refined where it was worth it.
+    pub candidates: Vec<Candidate>,
+    /// The full refits: index into the candidates and the model.
+    pub tried: Vec<(usize, Model)>,
+    /// Which of the tried was taken.
+    pub taken: Option<usize>,
+}
+
+/// The whole search.
+#[derive(Clone)]
+pub struct Selection {
+    /// The given plant, nothing refitted.
+    pub given: f64,
+    /// The linear refit.
+    pub baseline: Model,
+    /// Steps in order.
+    pub steps: Vec<Step>,
+    /// Where the search ended.
+    pub model: Model,
+    /// Whether that model was fitted by simulation all along: along a noisy motion its laws fall far short of themselves.
+    pub felt: bool,
+    /// The same fitted once more by simulation, where that holds: what numbers and corrected plant are taken from.
+    pub simulated: Option<Model>,
+    /// For each effect of the model, others in its place.
+    pub rivals: Vec<Vec<Rival>>,
+    /// What is still seen in the error of the final model, beyond chance.
+    pub leftover: Option<ResidualEffect>,
+    /// The search on records without physics, where it was asked for.
+    pub bootstrap: Option<Bootstrap>,
+}
+
+impl Selection {
+    /// Whether the model leaves less in simulation than along the recorded motion: noise of the sensor makes the latter too rough for its laws.
+    pub fn stands_by_simulation(&self) -> bool {
+        self.felt || self.last().cost < self.model.cost
+    }
+
+    /// The model that leaves less, along the recorded motion or simulated.
+    pub fn best(&self) -> &Model {
+        if self.last().cost < self.model.cost { self.last() } else { &self.model }
+    }
+
+    /// What effect `at` of the model explained when it was taken: fall of minus twice the logarithm of the likelihood.
+    pub fn gain(&self, at: usize) -> f64 {
+        gain_of(&self.steps, &self.model.chosen[at])
+    }
+
+    /// Whether several laws share the work and none leads: one thing that the library lacks is likelier than so many that it has. Says
+    /// something only where repeats tell what noise is: otherwise what laws explain is told in logarithms, not in shares.
+    pub fn mixture(&self) -> bool {
+        let gains: Vec<f64> = (0..self.model.chosen.len()).map(|at| self.gain(at)).collect();
+        gains.len() >= MIXTURE_LAWS
+            && gains.iter().copied().fold(0.0, f64::max) < MIXTURE_LEADS * gains.iter().sum::<f64>()
+    }
+
+    /// The model that numbers are taken from.
+    pub fn last(&self) -> &Model {
+        self.simulated.as_ref().unwrap_or(&self.model)
+    }
+}
+
+impl Corrected {
+    /// The same as a model to be judged, with what is each record's own.
+    pub(in crate::diagnose) fn judged<'a>(
+        &'a self,
+        bench: &'a DiagnosisData,
+        selection: &'a Selection,
+    ) -> SimulatedModel<'a> {
+        let own = selection.model.chosen.iter().filter(|c| c.setting.facts().per_record);
+        SimulatedModel {
+            plant: &self.plant,
+            effects: self.effects.iter().collect(),
+            own: own.map(|c| &c.setting.law).collect(),
+            lines: &bench.lines,
+            fit: Some((bench, &selection.model)),
+            scene: &bench.scene,
+        }
+    }
+}
+
+/// What an effect explained when it was taken.
+pub(super) fn gain_of(steps: &[Step], chosen: &SelectedEffect) -> f64 {
+    let step = &steps[chosen.step];
+    step.taken.map_or(0.0, |t| step.before - step.tried[t].1.evidence)
+}

@@ -1,0 +1,23 @@
+//! A diagnosis with what pictures and model files are made from.
+
+use super::diagnosis_json::Diagnosis;
+use crate::diagnose::fit::corrected_model::Corrected;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::search::selection::Selection;
+use crate::lti::Plant;
+
+/// A diagnosis with what pictures and model files are made from.
+pub struct Diagnosed {
+    /// What stands in diagnosis.json.
+    pub diagnosis: Diagnosis,
+    /// The ground it was made on.
+    pub bench: DiagnosisData,
+    /// The search.
+    pub selection: Selection,
+    /// The corrected model.
+    pub corrected: Corrected,
+    /// The refitted linear plant.
+    pub refitted: Plant,
+    /// Recorded less simulated position of every run: given, refit, corrected.
+    pub errors: [Vec<Vec<f64>>; 3],
+}

@@ -1,0 +1,339 @@
+//! From findings to a verdict: what the search found, what hold-out records say of it, and what the logs, the lines, pushes and the noise tell beside it.
+
+use super::diagnosis_json::Diagnosis;
+use super::finding::{Finding, FitFigures, Verdict};
+use super::gain_modulation::gain_modulation;
+use super::held_out::{HeldOut, astray, contradicts, unseen};
+use super::line_finding::{line_findings, same_line};
+use super::linear_verdict::linear_verdict;
+use super::naming::{finding, unexplained};
+use super::offered_models::Reported;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::model::Model;
+use crate::diagnose::fit::simulation::Simulation;
+use crate::diagnose::rules::{
+    BELOW_NOISE, BOOTSTRAP_CHANCE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, COLOURED, DECISIVE_RIVAL, DECISIVE_SHARE,
+    GIVEN_FAR, HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER, LOOP_EXPLAINS, LOOP_LEFT,
+    NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE, WIND_LEFT,
+};
+use crate::diagnose::search::selection::Selection;
+use crate::diagnose::search::shortlist::same_drag;
+use crate::lti::Plant;
+use crate::physics::{AnyLaw, Port, library};
+
+/// Findings that the search has no part in.
+pub(in crate::diagnose) struct ByOthers {
+    pub logs: Option<Finding>,
+    pub shocks: Vec<Finding>,
+    pub noise: Vec<Finding>,
+}
+
+/// What stands for and against the model of the search.
+struct Evidence<'a> {
+    bench: &'a DiagnosisData,
+    selection: &'a Selection,
+    model: &'a Model,
+    /// Share of the error in excess of noise that it explains.
+    explained: f64,
+    clean: bool,
+    restless: bool,
+    /// Whether it holds in the reported simulation and on records that were not used.
+    holds: bool,
+    /// The record that was not used and contradicts it.
+    against: Option<HeldOut>,
+}
+
+impl<'a> Evidence<'a> {
+    fn of(d: &Diagnosis, bench: &'a DiagnosisData, selection: &'a Selection, reported: &Reported) -> Evidence<'a> {
+        let (base, model) = (&selection.baseline, selection.best());
+        let explained = if base.excess() > 0.0 { 1.0 - model.excess().max(0.0) / base.excess() } else { 1.0 };
+        // Down to the noise, and not only because there was little above it; or as near as its level may err, no law seeing anything more.
+        let spent = selection.leftover.is_none() && model.cost / model.freedom < RESTLESS_RATIO;
+        // The level of the noise errs in the records that it is taken from; those that were held out tell on their own how much is explained.
+        let held = d.holdout_whitened.is_some_and(|[refit, after]| after - 1.0 < CLEAN_HELD_OUT * (refit - 1.0));
+        let clean = (model.excess_sigma() < CLEAN && base.excess_sigma() < CLEAN)
+            || (explained >= CLEAN_EXPLAINS && (model.excess_sigma() < CLEAN || spent))
+            || (explained >= CLEAN_HELD_OUT * CLEAN_EXPLAINS && spent && held);
+        // Where no law was found, much more is asked of the excess: noise may differ a little from what its repeats say.
+        let restless = model.excess_sigma() > RESTLESS_SIGMA && model.cost / model.freedom > RESTLESS_RATIO;
+        // Along the recorded motion, and simulated: in closed loop limits and noise play into each other, in open loop a free body
+        // drifts away; a model must hold in one of them.
+        let simulated = |h: FitFigures| {
+            h.rms_after <= HELD_OUT_NO_WORSE * h.rms_refit_linear || h.rms_after <= HELD_OUT_HOLDS * h.noise_floor
+        };
+        let simulations: Vec<FitFigures> = d.fit.holdout.into_iter().chain(d.fit.open_loop).collect();
+        let holds = d
+            .holdout_whitened
+            .is_none_or(|[refit, after]| after <= HELD_OUT_NO_WORSE * refit || after <= HELD_OUT_HOLDS)
+            && (simulations.is_empty() || simulations.into_iter().any(simulated))
+            && reported.withdrawn.is_none();
+        let against = contradicts(bench, &d.held_out, &selection.model).cloned();
+        Evidence { bench, selection, model, explained, clean, restless, holds, against }
+    }
+
+    /// Whether the laws of the model may be named; what speaks against it is said.
+    fn names(&self, d: &mut Diagnosis) -> bool {
+        let Evidence { selection, model, explained, .. } = *self;
+        let decisive = explained >= DECISIVE_SHARE && rival_share(selection) < DECISIVE_RIVAL;
+        if let Some(h) = &self.against {
+            d.remarks.push(format!(
+                "the nearest law holds on the records that it was fitted to, but not on {}, which {}: whitened error {:.3} after {:.3} under the linear refit, 1 being noise",
+                h.record,
+                if h.inside { "stays within their range" } else { "goes beyond their range" },
+                h.whitened[1],
+                h.whitened[0]
+            ));
+        }
+        // A law that is asked where it hardly acts errs by its form; where the hold-out records are simulated down to their noise by it, and only
+        // by it, they have answered.
+        let down = |h: FitFigures| {
+            h.rms_after < HELD_OUT_DOWN * h.noise_floor && h.rms_refit_linear > HELD_OUT_ABOVE * h.rms_after
+        };
+        let answered = model.chosen.len() < 2 && d.fit.holdout.is_some_and(down);
+        let denied = d.confirmed.iter().find(|c| c.denied() && !answered).cloned();
+        if let Some(c) = &denied {
+            d.remarks.push(format!(
+                "the records that were not used deny {}: it should take {:.0} units of their error, and takes {:.0}",
+                c.effect, c.says, c.gains
+            ));
+        }
+        let mixture = self.bench.levels.from_repeats && selection.mixture();
+        if mixture {
+            let laws: Vec<&str> = model.chosen.iter().map(|c| c.setting.facts().name).collect();
+            d.remarks.push(format!(
+                "it takes {} together to explain the records and none leads: likelier one thing that the library lacks; the corrected plant carries the mixture as a stand-in",
+                laws.join(", ")
+            ));
+        }
+        let beside = selection.leftover.as_ref().filter(|l| l.share > LEFTOVER);
+        if let Some(l) = beside {
+            d.remarks.push(format!(
+                "beside the nearest laws {} can still be seen, with {:.1} % of what they explain: they are near to what acts here, and not it",
+                l.effect,
+                100.0 * l.share
+            ));
+        }
+        // Of several laws together more is asked while yet another sees something: each further one is nearer to anything.
+        let laws = model.chosen.len();
+        let several =
+            selection.leftover.is_some() && (laws > 2 || laws > 1 && !self.clean && explained < NAMED_SHARE_OF_SEVERAL);
+        // Where all noise is the encoder's rounding, it is no draw of chance, and what fits it takes nothing of other records.
+        let below = selection.baseline.cost < BELOW_NOISE * selection.baseline.freedom;
+        let rounded = below && d.holdout_whitened.is_some_and(|[refit, after]| after >= refit);
+        let told = !rounded
+            && (explained >= NAMED_SHARE || self.clean || decisive)
+            && !several
+            && beside.is_none()
+            && !mixture;
+        let left = d.fit.holdout.is_some_and(|h| loop_left(d, h));
+        told && !left && self.holds && self.against.is_none() && denied.is_none()
+    }
+
+    /// The findings of the search by name.
+    fn named(&self, d: &mut Diagnosis) {
+        if !self.clean && self.explained < NAMED_SHARE {
+            d.remarks.push(format!(
+                "no other law of the library comes near, but {:.1} % of the error in excess of noise stays unexplained",
+                100.0 * (1.0 - self.explained)
+            ));
+        }
+        let mut found: Vec<Finding> = Vec::new();
+        for f in (0..self.model.chosen.len()).filter_map(|at| finding(self.bench, self.selection, at)) {
+            if found.iter().all(|g| g.effect != f.effect) {
+                found.push(f);
+            }
+        }
+        if d.findings.is_empty() && !found.is_empty() {
+            let open = found.iter().any(|f| f.family.len() > 1);
+            d.verdict = if open { Verdict::Family } else { Verdict::Named };
+        }
+        // A log that slipped explains what comes after it better than any physics does.
+        if d.verdict != Verdict::DataFault {
+            d.findings.extend(found);
+        }
+    }
+
+    /// There, without a name: unless it is a gain that swings in a phase of its own.
+    fn unnamed(&self, d: &mut Diagnosis, explained: f64) {
+        // A swing in one phase for all records may have taken the first step of one that has a phase in each.
+        let of_the_gain = self.model.chosen.iter().all(|c| matches!(c.setting.law, AnyLaw::ParametricGain(_)));
+        match of_the_gain.then(|| gain_modulation(self.bench, self.selection)).flatten() {
+            Some(f) => {
+                d.verdict = Verdict::Named;
+                d.findings.push(f);
+            }
+            None => {
+                d.verdict = Verdict::LocatedUnexplained;
+                d.findings.push(unexplained(self.bench, self.selection, explained));
+            }
+        }
+    }
+}
+
+/// From findings to a verdict.
+pub(in crate::diagnose) fn judge(
+    d: &mut Diagnosis,
+    bench: &DiagnosisData,
+    selection: &Selection,
+    given: &Plant,
+    reported: &Reported,
+    by_others: ByOthers,
+) {
+    let evidence = Evidence::of(d, bench, selection, reported);
+    let ByOthers { logs, shocks, noise } = by_others;
+    if let Some(f) = logs {
+        d.verdict = if f.port == Port::Controller { Verdict::Named } else { Verdict::DataFault };
+        d.findings.push(f);
+    }
+    let chosen = !evidence.model.chosen.is_empty();
+    if !believed(d, selection) && chosen {
+        d.remarks.push(
+            "the bootstrap finds as much in records without physics: the findings of the search are withdrawn".into(),
+        );
+    } else if chosen {
+        let said = d.remarks.len();
+        d.remarks.extend(reported.withdrawn.clone());
+        if evidence.names(d) {
+            evidence.named(d);
+        } else if selection.baseline.excess_sigma() < CLEAN {
+            // Nothing is there to be named, and nothing to be said of it.
+            d.remarks.truncate(said);
+        } else if d.findings.is_empty() {
+            evidence.unnamed(d, evidence.explained);
+        }
+    } else if d.findings.is_empty()
+        && let Some(f) = gain_modulation(bench, selection)
+    {
+        d.verdict = Verdict::Named;
+        d.findings.push(f);
+    } else if (evidence.restless || unaccounted(selection)) && d.findings.is_empty() {
+        d.verdict = Verdict::LocatedUnexplained;
+        d.findings.push(unexplained(bench, selection, 0.0));
+    }
+    if d.verdict != Verdict::DataFault {
+        take_lines(d, bench, selection, shocks);
+    }
+    linear_verdict(d, bench, selection, given);
+    if d.verdict == Verdict::Refit && !reported.refits {
+        // The given plant stands; whether it agrees, its own error says.
+        let far = d.fit.fit.rms_before > GIVEN_FAR * d.fit.fit.noise_floor;
+        d.verdict = if far { Verdict::LocatedUnexplained } else { Verdict::NoMismatch };
+        d.findings.extend(far.then(|| unexplained(bench, selection, 0.0)));
+    }
+    take_noise(d, bench, noise);
+    beyond_the_fit(d, bench, selection);
+    far_from_noise(d, bench, selection);
+}
+
+/// Nothing is said to be explained while several times what repeats differ by stays in closed loop, where nothing drifts.
+fn far_from_noise(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection) {
+    let says = matches!(d.verdict, Verdict::Named | Verdict::Family | Verdict::NoMismatch | Verdict::Refit);
+    let figures = d.fit.holdout.unwrap_or(d.fit.fit);
+    if !(says && bench.levels.from_repeats && loop_left(d, figures)) {
+        return;
+    }
+    let times = figures.rms_after / figures.noise_floor;
+    let names: Vec<&str> = d.findings.iter().map(|f| f.effect.as_str()).collect();
+    let beside = if names.is_empty() { String::new() } else { format!(" beside {}", names.join(", ")) };
+    d.remarks.push(format!("{times:.1} times the noise stay in the simulation{beside}: something else acts"));
+    d.verdict = Verdict::LocatedUnexplained;
+    d.findings = vec![unexplained(bench, selection, figures.explained_share.clamp(0.0, 1.0))];
+}
+
+/// Whether these figures, of records in closed loop, leave several times the noise and much of what the given plant leaves.
+fn loop_left(d: &Diagnosis, figures: FitFigures) -> bool {
+    let far = figures.rms_after > LOOP_LEFT * figures.noise_floor && figures.explained_share < LOOP_EXPLAINS;
+    d.fit.simulation == Simulation::ClosedLoop && far
+}
+
+/// Pushes and lines, which were found before the search.
+fn take_lines(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection, shocks: Vec<Finding>) {
+    let (lines, unsteady) = line_findings(bench, selection);
+    for f in shocks.into_iter().chain(lines) {
+        if d.findings.is_empty() {
+            d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
+        }
+        if d.verdict != Verdict::LocatedUnexplained && !d.findings.iter().any(|g| same_line(g, &f)) {
+            d.findings.push(f);
+        }
+    }
+    if d.findings.is_empty() && !unsteady.is_empty() {
+        d.verdict = Verdict::LocatedUnexplained;
+        d.findings.push(super::line_finding::unsteady(bench, &unsteady));
+    }
+}
+
+/// What the fitted records do not show, or cannot.
+fn beyond_the_fit(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection) {
+    // Nothing missing on the records that were fitted, and yet one that was not used is far off.
+    if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)
+        && let Some(f) = astray(bench, &d.held_out).and_then(|h| unseen(bench, selection, h))
+    {
+        d.verdict = Verdict::LocatedUnexplained;
+        d.findings.push(f);
+    }
+    // Without repeats, what the refit leaves beyond the sensor's white noise may be noise of torque or missing physics.
+    if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit) && coloured(d, bench, bench.levels.sensor_rms) {
+        d.verdict = Verdict::Undecidable;
+        d.remarks.push(
+            "no record was repeated: the error that the refit leaves is coloured, and cannot be told from noise of torque".into(),
+        );
+    }
+}
+
+/// Whether the bootstrap, where there is one, believes the search: one that finds as much where nothing is has found nothing.
+fn believed(d: &mut Diagnosis, selection: &Selection) -> bool {
+    if let Some(b) = &selection.bootstrap {
+        d.remarks.push(format!(
+            "bootstrap of {} draws without physics: chance of a candidate as strong as on these records {:.3}; draws that would have been alarms {}",
+            b.draws, b.p_value, b.alarms
+        ));
+    }
+    selection.bootstrap.as_ref().is_none_or(|b| b.p_value <= BOOTSTRAP_CHANCE.max(1.0 / (b.draws + 1) as f64))
+}
+
+/// Whether, no record being repeated, the simulation leaves far more than a noise of the sensor: noise of torque, or missing physics.
+fn coloured(d: &Diagnosis, bench: &DiagnosisData, noise: f64) -> bool {
+    !bench.levels.from_repeats && d.fit.open_loop.is_some_and(|o| o.rms_after > COLOURED * noise)
+}
+
+/// Findings of the noise beside those of the search. What is left without a name is theirs where the linear refit comes down to their noise:
+/// a count of the encoder is no reason for what is a hundred times as large.
+fn take_noise(d: &mut Diagnosis, bench: &DiagnosisData, noise: Vec<Finding>) {
+    let rounding = bench.grid.map_or(0.0, |g| g.step / 12f64.sqrt());
+    let beyond = coloured(d, bench, bench.levels.sensor_rms.hypot(rounding));
+    let wind = noise.iter().any(|f| f.port == Port::Torque);
+    let open = beyond && !wind;
+    // A plant that was fitted under wind differs from that of records under other wind: as little as that has no name of its own.
+    let h = d.fit.holdout.unwrap_or(d.fit.fit);
+    let blown = wind && !bench.coarse() && bench.levels.from_repeats && h.rms_refit_linear < WIND_LEFT * h.noise_floor;
+    if blown && d.verdict == Verdict::LocatedUnexplained {
+        d.verdict = Verdict::Refit;
+        d.findings.clear();
+    }
+    for f in noise {
+        if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit) && !open {
+            d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
+        }
+        if matches!(d.verdict, Verdict::Named | Verdict::Family) {
+            d.findings.push(f);
+        }
+    }
+}
+
+/// What the best rival of the first finding explains, as a share of what that finding does.
+fn rival_share(selection: &Selection) -> f64 {
+    let Some((step, taken)) = selection.steps.first().and_then(|s| s.taken.map(|t| (s, &s.tried[t]))) else {
+        return 1.0;
+    };
+    let name = |i: usize| step.candidates[i].setting.facts().name;
+    let gain = step.before - taken.1.evidence;
+    let others = step.tried.iter().filter(|t| name(t.0) != name(taken.0) && !same_drag(name(t.0), name(taken.0)));
+    others.map(|t| (step.before - t.1.evidence) / gain).fold(0.0, f64::max)
+}
+
+/// Whether a scan saw far more than noise shows, though no law explains enough of it.
+fn unaccounted(selection: &Selection) -> bool {
+    let best = selection.steps.first().and_then(|s| s.candidates.first());
+    best.is_some_and(|c| c.log_p_value(library().len()) < SEEN_CHANCE.ln())
+}

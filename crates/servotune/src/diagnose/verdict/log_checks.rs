@@ -1,0 +1,104 @@
+//! What the logs of a case say before any model is fitted: sound, slipped, in other units, or made by another controller.
+
+use super::finding::Finding;
+use crate::controller::Law;
+use crate::diagnose::data::checks::{Replay, SampleFault, replay_records, sample_faults};
+use crate::diagnose::data::plant_check::Answers;
+use crate::diagnose::data::run::Run;
+use crate::diagnose::data::slip::breaks_of_replay;
+use crate::diagnose::data::time_shift::shifted;
+use crate::diagnose::fit::diagnosis_data::scene;
+use crate::diagnose::fit::simulation::{SimulatedModel, error};
+use crate::diagnose::rules::UNIT_FACTOR;
+use crate::lti::{LtiError, Plant};
+use crate::recording::Case;
+
+/// What the logs are worth.
+pub(in crate::diagnose) struct LogChecks {
+    pub replay: Option<Replay>,
+    pub faults: Vec<SampleFault>,
+    /// Verdict on the logs, where it is not "sound".
+    pub finding: Option<Finding>,
+    /// Whether the controller's law holds, so that the loop can be closed in simulation.
+    pub closed: bool,
+}
+
+/// What the logs say; positions that turn out to be shifted are moved back.
+pub(in crate::diagnose) fn check(
+    case: &Case,
+    runs: &mut [Run],
+    given: &Plant,
+    law: Option<&Law>,
+    sample_time_s: f64,
+) -> Result<LogChecks, LtiError> {
+    let smooth = smooth(given, runs, sample_time_s)?;
+    let mut faults: Vec<SampleFault> = case
+        .records
+        .iter()
+        .zip(runs.iter().zip(&smooth))
+        .flat_map(|((_, record), (run, smooth))| sample_faults(run, &record.gaps, sample_time_s, smooth))
+        .collect();
+    let mut log_checks = LogChecks { replay: None, faults: Vec::new(), finding: None, closed: false };
+    if let Some(law) = law {
+        let all: Vec<&Run> = runs.iter().collect();
+        log_checks.closed = all.iter().all(|r| r.reference.is_some());
+        log_checks.replay = replay_records(law, &all, &smooth);
+    }
+    if let (Some(r), Some(law)) = (&log_checks.replay, law)
+        && !r.failing.is_empty()
+    {
+        let failing: Vec<usize> = (0..runs.len()).filter(|&i| r.failing.contains(&runs[i].name)).collect();
+        let breaks: Vec<SampleFault> =
+            failing.iter().flat_map(|&i| breaks_of_replay(law, &runs[i], sample_time_s)).collect();
+        let named: Vec<&Run> = failing.iter().map(|&i| &runs[i]).collect();
+        let helps = |e: f64| e < 0.3 * r.error;
+        if !breaks.is_empty() {
+            faults.extend(breaks);
+            log_checks.closed = false;
+        } else if faults.is_empty() {
+            if helps(r.error_shifted) && r.shift_samples.abs() > 0.05 && r.error_shifted <= 1.1 * r.error_scaled {
+                log_checks.finding = Some(super::log_finding::misalignment(r, sample_time_s, &named));
+                let by = r.shift_samples;
+                failing.iter().for_each(|&i| shift(&mut runs[i], by));
+            } else if helps(r.error_scaled) && (r.position_factor - 1.0).abs() > UNIT_FACTOR {
+                log_checks.finding = Some(super::log_finding::scale(r, &named));
+                log_checks.closed = false;
+            } else {
+                log_checks.finding = Some(super::log_finding::controller_mismatch(r, &named));
+                log_checks.closed = false;
+            }
+        }
+    }
+    if log_checks.replay.is_none() {
+        let all: Vec<&Run> = runs.iter().collect();
+        let answers = Answers::of(given, runs, sample_time_s)?;
+        if let Some(factor) = answers.other_unit() {
+            log_checks.finding = Some(super::log_finding::unit(factor, &all));
+        } else if let Some(early) = answers.early(given.delay_s / sample_time_s) {
+            log_checks.finding = Some(super::log_finding::early(-early, sample_time_s, &all));
+            runs.iter_mut().for_each(|r| shift(r, -early));
+        } else if faults.is_empty() {
+            faults = answers.slips(given, sample_time_s);
+        }
+    }
+    if !faults.is_empty() {
+        log_checks.finding = Some(super::log_finding::samples(&faults));
+        log_checks.closed = log_checks.closed && log_checks.replay.as_ref().is_some_and(|r| r.failing.is_empty());
+    }
+    log_checks.faults = faults;
+    Ok(log_checks)
+}
+
+/// The given plant's answer to each record's command, its free motions fitted to the position: the motion without the noise.
+fn smooth(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Vec<Vec<f64>>, LtiError> {
+    let scene = scene(given, runs, sample_time_s, None);
+    let model =
+        SimulatedModel { plant: given, effects: Vec::new(), own: Vec::new(), lines: &[], fit: None, scene: &scene };
+    let smooth = |run: &Run| Ok(run.position.iter().zip(error(&model, run, None)?).map(|(y, e)| y - e).collect());
+    runs.iter().map(smooth).collect()
+}
+
+/// Moves the position log against the others by a real number of samples.
+fn shift(run: &mut Run, samples: f64) {
+    run.position = shifted(&run.position, samples);
+}

@@ -1,0 +1,117 @@
+//! Findings about the logs themselves, from what data checks saw.
+
+use super::finding::{Estimate, Finding, Where};
+use super::naming::{everywhere, plain};
+use crate::diagnose::data::checks::{Replay, SampleFault};
+use crate::diagnose::data::run::Run;
+use crate::physics::{Facts, controller_mismatch, linear_parameters, lost_samples, misalignment};
+use std::collections::BTreeMap;
+
+/// The position log is shifted: the documented controller says by how much.
+pub(super) fn misalignment(r: &Replay, sample_time_s: f64, runs: &[&Run]) -> Finding {
+    let why = format!(
+        "shifted by {:.2} samples, the documented controller gives the recorded command again",
+        r.shift_samples
+    );
+    slipped(r.shift_samples, 0.05, sample_time_s, &why, runs)
+}
+
+/// The position comes before the command that made it.
+pub(in crate::diagnose) fn early(shift_samples: f64, sample_time_s: f64, runs: &[&Run]) -> Finding {
+    let why = format!(
+        "the position comes {:.0} samples before the model's answer to the command, more than all of its delay",
+        -shift_samples
+    );
+    slipped(shift_samples, 0.5, sample_time_s, &why, runs)
+}
+
+/// The position log is off by so many samples, known to `off`.
+fn slipped(samples: f64, off: f64, sample_time_s: f64, why: &str, runs: &[&Run]) -> Finding {
+    let &Facts { name: effect, says, port, .. } = &misalignment::FACTS;
+    let shift = Estimate { value: samples, low: samples - off, high: samples + off, unit: "samples".into() };
+    let parameters =
+        BTreeMap::from([("samples".to_owned(), shift), ("shift_s".to_owned(), plain(samples * sample_time_s, "s"))]);
+    Finding {
+        effect: effect.into(),
+        family: vec![effect.into()],
+        port,
+        p_value: 1e-300,
+        says: format!("In the log {says}: {why}."),
+        parameters,
+        place: everywhere(runs),
+    }
+}
+
+/// Position or command is logged in other units, or with the other sign: the documented controller says so.
+pub(in crate::diagnose) fn scale(r: &Replay, runs: &[&Run]) -> Finding {
+    let sign = if r.position_factor < 0.0 { "with the sign turned round" } else { "in other units" };
+    let factors = [
+        ("position_factor".to_owned(), plain(r.position_factor, "1")),
+        ("command_factor".to_owned(), plain(r.command_factor, "1")),
+    ];
+    let why = format!("the controller's command follows from the log only with a factor of {:.6}", r.position_factor);
+    scaled(sign, &why, BTreeMap::from(factors), runs)
+}
+
+/// The position follows the model only with a factor that no machine of this model can have.
+pub(in crate::diagnose) fn unit(factor: f64, runs: &[&Run]) -> Finding {
+    let sign = if factor < 0.0 { "with the sign turned round" } else { "in other units than the model" };
+    let why = format!("it follows the command as the model says, but times {factor:.6}");
+    scaled(sign, &why, BTreeMap::from([("position_factor".to_owned(), plain(factor, "1"))]), runs)
+}
+
+/// The position is logged with a factor.
+fn scaled(sign: &str, why: &str, parameters: BTreeMap<String, Estimate>, runs: &[&Run]) -> Finding {
+    Finding {
+        effect: linear_parameters::FACTS.name.into(),
+        family: vec![linear_parameters::FACTS.name.into()],
+        port: crate::physics::Port::Time,
+        p_value: 1e-300,
+        says: format!("The position is logged {sign}: {why}."),
+        parameters,
+        place: everywhere(runs),
+    }
+}
+
+/// The command does not follow from the documented law.
+pub(super) fn controller_mismatch(r: &Replay, runs: &[&Run]) -> Finding {
+    let &Facts { name: effect, says, port, .. } = &controller_mismatch::FACTS;
+    Finding {
+        effect: effect.into(),
+        family: vec![effect.into()],
+        port,
+        p_value: 1e-300,
+        says: format!(
+            "{says}: replayed over the log, the documented law misses the recorded command by {:.2} % rms.",
+            100.0 * r.error
+        ),
+        parameters: BTreeMap::from([("replay_error".to_owned(), plain(r.error, "1"))]),
+        place: everywhere(runs),
+    }
+}
+
+/// Samples are missing, doubled or stuck.
+pub(in crate::diagnose) fn samples(faults: &[SampleFault]) -> Finding {
+    let &Facts { name: effect, says: out_of_step, port, .. } = &lost_samples::FACTS;
+    let first = &faults[0];
+    let (says, what) = match (first.stuck, first.samples > 0.0) {
+        (true, _) => ("the position stands still in the log while the arm moves on", "samples"),
+        (false, true) => (out_of_step, "samples lost"),
+        (false, false) => (out_of_step, "samples too many"),
+    };
+    let records: Vec<String> = faults.iter().map(|f| f.record.clone()).collect();
+    Finding {
+        effect: effect.into(),
+        family: vec![effect.into()],
+        port,
+        p_value: 1e-300,
+        says: format!("{says}: record {} at {:.6} s, {} {what}.", first.record, first.time_s, first.samples.abs()),
+        parameters: BTreeMap::from([("samples".to_owned(), plain(first.samples, "samples"))]),
+        place: Where {
+            records,
+            time_s: faults.iter().map(|f| [f.time_s, f.time_s]).collect(),
+            velocity_sign: "both",
+            ..Where::default()
+        },
+    }
+}

@@ -1,0 +1,321 @@
+//! A curve in the place of the law that has no name: taken where it foretells clearly better than any linear plant and simulates no record
+//! worse that was not used.
+//!
+//! In: a diagnosis that ended without a name. Out: the corrected model with the curve, its errors, and what diagnosis.json says of it;
+//! a reading that folds or ends at limits has a name and is found here too.
+
+use super::diagnosis_json::Diagnosis;
+use super::finding::{Estimate, Finding, Verdict};
+use super::naming::everywhere;
+use crate::controller::Law;
+use crate::diagnose::data::run::Run;
+use crate::diagnose::fit::corrected_model::Corrected;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::simulation::{SimulatedModel, errors, rms};
+use crate::diagnose::free_form::curve::FreeForm;
+use crate::diagnose::free_form::estimation::{Curved, Estimated, Foretelling, estimated, grounds};
+use crate::diagnose::free_form::gauge::Plain;
+use crate::diagnose::free_form::likeness::likeness;
+use crate::diagnose::free_form::shape::{Shape, lag};
+use crate::diagnose::free_form::stretches::Stretches;
+use crate::diagnose::rules::{
+    CURVE_CLEARLY, CURVE_NAMED, CURVE_NEAR, CURVE_NO_WORSE, NAMED_SHARE, SLIDERS_PUSH,
+};
+use crate::diagnose::search::curve_balance::curves;
+use crate::diagnose::search::selection::Selection;
+use crate::diagnose::search::torque_balance::{Balance, SMOOTHINGS, recorded_means};
+use crate::lti::{CurveKnot, PhysicsEntry, Plant};
+use crate::physics::sensor_curve::{self, SensorCurve};
+use crate::physics::{CurvePort, Facts, Setting, coulomb_friction, pivot_friction, shortest_loop, slider_levels};
+use crate::recording::Role;
+
+/// A model with a curve.
+pub(in crate::diagnose) struct StandIn {
+    /// It.
+    pub corrected: Corrected,
+    /// Recorded less simulated position of every run: as the report shows it, and in open loop.
+    pub errors: [Vec<Vec<f64>>; 2],
+    /// What is said of it; none where what was found has a name.
+    pub curve: Option<FreeForm>,
+    /// What was found, where it has a name.
+    pub finding: Option<Finding>,
+}
+
+/// What both figures of a simulation are judged by.
+pub(in crate::diagnose) struct Standing<'a> {
+    /// The controller, where records are shown in closed loop.
+    pub closed: Option<&'a Law<'a>>,
+    /// Errors of all runs under the given plant, the linear refit and the laws that were found.
+    pub errors: &'a [Vec<Vec<f64>>; 3],
+    /// What of the records counts as noise (rms).
+    pub floor: f64,
+}
+
+/// Looks for a curve and takes it where it is worth it.
+pub(in crate::diagnose) fn stand_in(
+    bench: &DiagnosisData,
+    selection: &Selection,
+    standing: &Standing,
+    progress: &mut dyn FnMut(&str),
+) -> Option<StandIn> {
+    let [ground, one_place] = grounds(bench);
+    let found = estimated(bench, [&ground, &one_place], &starts(bench, selection), &balanced(bench), progress)?;
+    let best = taken(&found)?;
+    let model = model(bench, best, &found.plain);
+    let errors = [standing.closed, None].map(|closed| shown(bench, &model, best, &one_place, closed));
+    let which = judged_runs(bench);
+    let of = |e: &[Vec<f64>]| rms(&which.iter().map(|&i| e[i].clone()).collect::<Vec<_>>());
+    let [given, refit, laws] = [0, 1, 2].map(|m| of(&standing.errors[m]));
+    let (linear, after) = (given.min(refit), of(&errors[0]));
+    if !(after.is_finite() && after <= CURVE_NO_WORSE * linear && (after <= CURVE_NEAR * laws || laws >= linear)) {
+        return None;
+    }
+    let floor = standing.floor.min(after);
+    let explained_share =
+        1.0 - (after * after - floor * floor) / (linear * linear - floor * floor).max(f64::MIN_POSITIVE);
+    let reading = found.reading.as_ref().map(|_| reading_finding(bench, best, &found));
+    let near = explained_share >= NAMED_SHARE && after <= CURVE_NAMED * standing.floor;
+    let finding = reading.or_else(|| bearing_finding(bench, best, &found).filter(|_| near));
+    let curved = matches!(best.trial.shape, Shape::Curve(..));
+    let curve = curved.then(|| described(bench, &found, explained_share.clamp(-1.0, 1.0)));
+    Some(StandIn { corrected: model, errors, curve, finding })
+}
+
+/// What is taken of an estimate: the curve where it foretells clearly better than what stands without it, a named reading or the linear
+/// plant; else the reading alone, if that does; else nothing.
+fn taken<'e, 'a>(found: &'e Estimated<'a>) -> Option<&'e Foretelling<'a>> {
+    let linear = CURVE_CLEARLY * found.linear.left_out;
+    match &found.reading {
+        None => Some(&found.curve).filter(|c| c.left_out <= linear),
+        Some(r) if found.curve.left_out <= CURVE_CLEARLY * r.left_out && found.curve.left_out <= linear => {
+            Some(&found.curve)
+        }
+        Some(r) => Some(r).filter(|r| r.left_out <= linear),
+    }
+}
+
+/// The runs that judge: those that were not used, else those that were.
+fn judged_runs(bench: &DiagnosisData) -> Vec<usize> {
+    let role = |role: Role| -> Vec<usize> {
+        (0..bench.runs.len()).filter(|&i| bench.runs[i].role == role && !bench.runs[i].shocked).collect()
+    };
+    Some(role(Role::Holdout)).filter(|h| !h.is_empty()).unwrap_or_else(|| role(Role::Fit))
+}
+
+/// Recorded less simulated position of every run under the model.
+fn shown(
+    bench: &DiagnosisData,
+    model: &Corrected,
+    best: &Foretelling,
+    one_place: &Stretches,
+    closed: Option<&Law>,
+) -> Vec<Vec<f64>> {
+    if best.trial.reads() && closed.is_none() {
+        // Where the arm stands is not known from what is read: every place that gives the first reading is a start.
+        let place = &one_place.runs[0];
+        let runs: Vec<Run> =
+            bench.runs.iter().map(|r| Run { origin: place.origin, before: place.before, ..r.clone() }).collect();
+        let all = Stretches { blocks: runs.iter().map(|r| (r.len(), 0)).collect(), runs };
+        return best.trial.clone().over(&all).shown();
+    }
+    let every: Vec<&Run> = bench.runs.iter().collect();
+    let effects = model.effects.iter().collect();
+    let scene = &bench.scene;
+    let judged = SimulatedModel { plant: &model.plant, effects, own: vec![], lines: &bench.lines, fit: None, scene };
+    errors(&judged, &every, closed)
+}
+
+/// The entry of an effect with named parameters.
+fn entry(bench: &DiagnosisData, setting: &Setting) -> PhysicsEntry {
+    let parameters = setting.parameters(&bench.scene).into_iter().map(|q| (q.name.to_owned(), q.value));
+    PhysicsEntry { effect: setting.facts().name.into(), parameters: parameters.collect(), curve: None }
+}
+
+fn knots(c: &Plain) -> Vec<CurveKnot> {
+    let off = |i: usize| 1.96 * c.spread[i];
+    (0..c.at.len())
+        .map(|i| CurveKnot {
+            at: c.at[i],
+            value: c.value[i],
+            low: Some(c.value[i] - off(i)),
+            high: Some(c.value[i] + off(i)),
+        })
+        .collect()
+}
+
+/// The plant with everything that the fit put beside it.
+fn model(bench: &DiagnosisData, best: &Foretelling, c: &Plain) -> Corrected {
+    let trial = &best.trial;
+    let curved = matches!(trial.shape, Shape::Curve(..));
+    let mut plant: Plant = bench.form.plant(if curved { &c.p } else { &trial.p });
+    let (position, command) = (plant.position_unit.clone(), plant.command_unit.clone());
+    let behind = trial.lag_s.filter(|_| curved && c.port == CurvePort::AmplifierOverCommand);
+    let mut effects: Vec<Setting> = trial.lag_s.filter(|_| behind.is_none()).map(lag).into_iter().collect();
+    plant.physics = effects.iter().map(|s| entry(bench, s)).collect();
+    if curved {
+        let mut curve = c.port.curve(&c.at, &c.value);
+        curve.lag_s = behind;
+        plant.physics.push(c.port.entry(knots(c), behind, &position, &command));
+        effects.push(Setting::fixed(curve));
+    }
+    if let Some(s) = trial.reading.effect() {
+        plant.physics.push(entry(bench, &s));
+        effects.push(s);
+    }
+    Corrected { plant, effects }
+}
+
+/// What a curve of this port is called.
+pub fn curve_title(port: &str, argument: &str) -> String {
+    match (port, argument) {
+        ("amplifier", _) => "what the amplifier makes of the command".into(),
+        ("gain", argument) => format!("the torque per command over the {argument}"),
+        (_, "time") => "a torque over the time of every record".into(),
+        (_, "loading") => "a torque that resists over the way since the last turn".into(),
+        ("sensor", _) => "what the sensor reads of the position".into(),
+        (_, argument) => format!("a torque over the {argument}"),
+    }
+}
+
+fn described(bench: &DiagnosisData, found: &Estimated, explained_share: f64) -> FreeForm {
+    let c = &found.plain;
+    let form = &bench.form.given;
+    let [port, argument] = c.port.names();
+    let [argument_unit, unit] = c.port.units(&form.position_unit, &form.command_unit);
+    let like = likeness(c);
+    let what = curve_title(port, argument);
+    let beside = if found.reading.is_some() { "beside the reading that was found" } else { "for it" };
+    let says = format!(
+        "A curve without a name stands in {beside}: {what}; it is {}. It explains {:.1} % of what the better linear model leaves beyond the noise.",
+        like.says,
+        100.0 * explained_share
+    );
+    let root = |f: f64| f.max(0.0).sqrt();
+    FreeForm {
+        port,
+        argument,
+        argument_unit,
+        unit,
+        knots: knots(c),
+        explained_share,
+        says,
+        like,
+        left_out: [root(found.linear.left_out), root(found.curve.left_out)],
+        ports: found.tried.iter().map(|(p, e)| (p.names().join("_over_"), root(*e))).collect(),
+    }
+}
+
+/// The finding of a reading that folds or ends at limits.
+fn reading_finding(bench: &DiagnosisData, best: &Foretelling, found: &Estimated) -> Finding {
+    let &Facts { name: effect, says, port, .. } = &sensor_curve::FACTS;
+    let none = || Setting::fixed(SensorCurve::Folded { lowest: 0.0, at: 0.0 });
+    let setting = best.trial.reading.effect().unwrap_or_else(none);
+    let from = best.trial.reading_from();
+    let unit = &bench.form.given.position_unit;
+    let parameters = setting.parameters(&bench.scene).into_iter().enumerate().map(|(i, q)| {
+        let off = 1.96 * best.spread(from + i);
+        let e = Estimate { value: q.value, low: q.value - off, high: q.value + off, unit: unit.clone() };
+        (q.name.to_owned(), e)
+    });
+    let form = if matches!(best.trial.reading, Shape::Fold(_)) { "It folds" } else { "It ends at limits" };
+    let samples = best.trial.stretches.total() as f64;
+    // The ratio of the likelihoods of what is foretold, as a chance under noise alone.
+    let log_p = -0.5 * samples * (found.linear.left_out / best.left_out).ln();
+    let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
+    Finding {
+        effect: effect.into(),
+        family: vec![effect.into()],
+        port,
+        p_value: log_p.min(0.0).exp().max(1e-300),
+        says: format!("{form}: {says}."),
+        parameters: parameters.collect(),
+        place: everywhere(&runs),
+    }
+}
+
+/// The finding of a drag of any loading curve: generalised Maxwell slip, whose sliders all resist.
+fn bearing_finding(bench: &DiagnosisData, best: &Foretelling, found: &Estimated) -> Option<Finding> {
+    let c = &found.plain;
+    if c.port != CurvePort::TorqueOverLoading || !matches!(best.trial.shape, Shape::Curve(..)) {
+        return None;
+    }
+    let levels = slider_levels(&c.at, &c.value);
+    let [resist, push] = [1.0, -1.0].map(|s: f64| levels.iter().map(|l| (s * l).max(0.0)).sum::<f64>());
+    if !(push < SLIDERS_PUSH * resist) {
+        return None;
+    }
+    let [position, command] = [&bench.form.given.position_unit, &bench.form.given.command_unit];
+    let last = c.value.len() - 1;
+    let level = Estimate {
+        value: c.value[last],
+        low: c.value[last] - 1.96 * c.spread[last],
+        high: c.value[last] + 1.96 * c.spread[last],
+        unit: command.clone(),
+    };
+    // The way at which the first slope would reach the level; half the level tells the slope better than the first knot.
+    let half = (0..=last).find(|&i| c.value[i] >= 0.5 * c.value[last])?;
+    let (way, off) = (c.at[half] * c.value[last] / c.value[half], 1.96 * c.spread[half] / c.value[half]);
+    let length = Estimate { value: way, low: way * (1.0 - off), high: way * (1.0 + off), unit: position.clone() };
+    let pivot = way > shortest_loop(&bench.scene);
+    let facts = if pivot { &pivot_friction::FACTS } else { &coulomb_friction::FACTS };
+    let samples = best.trial.stretches.total() as f64;
+    let log_p = -0.5 * samples * (found.linear.left_out / best.left_out).ln();
+    let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
+    Some(Finding {
+        effect: facts.name.into(),
+        family: vec![facts.name.into()],
+        port: facts.port,
+        p_value: log_p.min(0.0).exp().max(1e-300),
+        says: format!("{}; its loading curve has a shape of its own.", facts.says),
+        parameters: [("level_command".to_owned(), level), ("sliding_length".to_owned(), length)].into(),
+        place: everywhere(&runs),
+    })
+}
+
+/// Takes what was found into a diagnosis.
+pub(in crate::diagnose) fn enter(d: &mut Diagnosis, found: &StandIn) {
+    if let Some(f) = &found.finding {
+        d.verdict = Verdict::Named;
+        d.findings = vec![f.clone()];
+    }
+    if let Some(c) = &found.curve {
+        d.remarks.push(c.says.clone());
+    }
+    d.free_form.clone_from(&found.curve);
+}
+
+/// A curve beside a linear plant and nothing else.
+pub struct MissingCurve {
+    /// It.
+    pub curve: FreeForm,
+    /// Recorded less simulated position of every run in open loop.
+    pub errors: Vec<Vec<f64>>,
+}
+
+/// The curve at the port where it foretells best, whatever the verdict; none where it foretells no better than a linear plant.
+pub fn missing_curve(bench: &DiagnosisData, selection: &Selection) -> Option<MissingCurve> {
+    let [ground, one_place] = grounds(bench);
+    let found =
+        estimated(bench, [&ground, &one_place], &starts(bench, selection), &balanced(bench), &mut |_| {})?;
+    let best = taken(&found).filter(|b| matches!(b.trial.shape, Shape::Curve(..)))?;
+    let errors = shown(bench, &model(bench, best, &found.plain), best, &one_place, None);
+    let share = 1.0 - best.left_out / found.linear.left_out;
+    Some(MissingCurve { curve: described(bench, &found, share), errors })
+}
+
+/// Linear parameters from which curves are looked for: the given plant, the refit, and the plant beside the laws that were found.
+fn starts(bench: &DiagnosisData, selection: &Selection) -> Vec<Vec<f64>> {
+    let mut starts = vec![vec![0.0; bench.form.knobs.len()]];
+    for p in [&selection.baseline.refitted.p, &selection.last().refitted.p] {
+        if starts.iter().all(|s| s != p) {
+            starts.push(p.clone());
+        }
+    }
+    starts
+}
+
+/// Plants and curves by the balance of torques.
+fn balanced(bench: &DiagnosisData) -> Vec<Curved> {
+    let means = recorded_means(bench);
+    curves(&SMOOTHINGS.map(|width| Balance::of(bench, &means, width, 0.0)))
+}

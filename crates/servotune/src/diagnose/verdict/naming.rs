@@ -1,0 +1,272 @@
+//! From numbers to findings: names, families, sentences, intervals.
+
+use super::finding::{Estimate, Finding, Where};
+use super::localisation::place;
+use crate::diagnose::data::linear_form::Sampled;
+use crate::diagnose::data::run::Run;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::regressors::position_columns;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
+use crate::diagnose::noise::chance::log_tail;
+use crate::diagnose::noise::lines::mains;
+use crate::diagnose::rules::{
+    DRY_LENGTH, MAINS_ORDER, ORDER_BESIDE, SLIGHT, SLIGHT_CONFOUNDED, SLIGHT_NEAR_NOISE, SLIGHT_SHARE,
+};
+use crate::diagnose::search::rival_model::{Rival, family_width};
+use crate::diagnose::search::selection::Selection;
+use crate::diagnose::search::shortlist::same_drag;
+use crate::physics::{
+    AnyLaw, Effect, Entry, Facts, Parameter, Setting, Share, coulomb_friction, facts, library, line_disturbance,
+    linear_parameters, repeatable_runout, unexplained,
+};
+use std::collections::BTreeMap;
+
+/// Difference of two linear answers below which they are one.
+const ALIKE: f64 = 1e-6;
+/// By how much free numbers are moved to see what they enter.
+const NUDGE: f64 = 1.01;
+
+/// What a line is named: a hum, or run-out where it is an order of the spindle.
+pub(super) const HUM: &str = line_disturbance::FACTS.name;
+pub(super) const RUNOUT: &str = repeatable_runout::FACTS.name;
+
+pub(super) fn text_of(name: &str) -> (&'static str, crate::physics::Port) {
+    facts(name).map_or(("something that the model does not hold", crate::physics::Port::Torque), |f| (f.says, f.port))
+}
+
+/// A frequency to three digits, as a person says it.
+fn hertz(value: f64) -> String {
+    let places = (2.0 - value.abs().max(1e-3).log10().floor()).clamp(0.0, 5.0) as usize;
+    format!("{value:.places$}")
+}
+
+pub(in crate::diagnose) fn plain(value: f64, unit: &str) -> Estimate {
+    Estimate { value, low: value, high: value, unit: unit.into() }
+}
+
+pub(in crate::diagnose) fn everywhere(runs: &[&Run]) -> Where {
+    Where { records: runs.iter().map(|r| r.name.clone()).collect(), velocity_sign: "both", ..Where::default() }
+}
+
+/// The finding about effect `at` of the final model; none where its step took nothing.
+pub(in crate::diagnose) fn finding(bench: &DiagnosisData, selection: &Selection, at: usize) -> Option<Finding> {
+    let chosen = &selection.model.chosen[at];
+    let step = &selection.steps[chosen.step];
+    let c = &step.candidates[step.tried[step.taken?].0];
+    let gain = selection.gain(at);
+    let spindle_hz = bench.scene.spindle_hz;
+    let spindle = |hz: f64| spindle_hz.is_some_and(|s| ((hz / s).round() - hz / s).abs() < 0.004 && hz > 0.9 * s);
+    let own = chosen.setting.facts().name;
+    // A line at a multiple of the spindle is run-out, whichever law carried it.
+    // A pre-sliding length that the sensor's noise covers is no pre-sliding: the drag is dry.
+    let dry = chosen.setting.law.presliding_length().is_some_and(|l| l < DRY_LENGTH * bench.scene.noise);
+    let line = chosen.effect().is_tone();
+    let name = if line && spindle(chosen.setting.law.first_number()) {
+        RUNOUT
+    } else if dry {
+        coulomb_friction::FACTS.name
+    } else {
+        own
+    };
+    let mut family = vec![name.to_owned()];
+    for Rival { name: rival, cost, .. } in &selection.rivals[at] {
+        if cost - selection.model.cost < family_width(gain)
+            && !family.iter().any(|f| f == rival)
+            && *rival != own
+            && !same_drag(rival, name)
+            && !(name == RUNOUT && *rival == HUM && spindle_hz.is_some())
+        {
+            family.push((*rival).to_owned());
+        }
+    }
+    let nothing_between = selection.model.chosen.iter().all(|c| c.setting.facts().entry != Entry::Torque);
+    for twin in twins(bench, chosen).filter(|_| nothing_between) {
+        if !family.iter().any(|f| f == twin) {
+            family.push(twin.to_owned());
+        }
+    }
+    if own == RUNOUT
+        && spindle_hz.is_some_and(|s| single_order(&chosen.setting).is_some_and(|hz| hz > MAINS_ORDER * s && mains(hz)))
+    {
+        family.push(HUM.to_owned());
+    }
+    // Nobody said how fast a spindle turns: any line may be one of its orders.
+    if name == HUM && spindle_hz.is_none() && !family.iter().any(|f| f == RUNOUT) {
+        family.push(RUNOUT.to_owned());
+    }
+    // Where the refit leaves next to nothing, a slight curve in the spectrum may be what its own straightness falls short of.
+    let curve =
+        line || chosen.setting.facts().port == crate::physics::Port::Structure && c.concealed > SLIGHT_CONFOUNDED;
+    let slight = SLIGHT.max(SLIGHT_SHARE * (selection.given - selection.baseline.cost));
+    if curve && gain < slight && selection.baseline.excess_sigma() < SLIGHT_NEAR_NOISE {
+        family.push(linear_parameters::FACTS.name.to_owned());
+    }
+    let log_p = log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library().len() as f64).ln();
+    let (says, port) = text_of(name);
+    let signal = effect_signal(bench, selection, at);
+    let mut parameters = estimates(bench, selection, at);
+    if name == RUNOUT && line {
+        parameters.insert("base_hz".into(), plain(bench.scene.spindle_hz.unwrap_or(0.0), "Hz"));
+    }
+    let place = place(bench, &bench.stack, &signal);
+    let always = chosen.effect().is_single_event() && bench.stack.segments.len() > 1;
+    let when = if always { ", at the same time of every record: it comes with the record" } else { "" };
+    let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
+    Some(Finding {
+        effect: name.into(),
+        family,
+        port,
+        p_value: log_p.min(0.0).exp().max(1e-300),
+        says: format!("Between {} and {} Hz {says}{when}.", hertz(band[0]), hertz(band[1])),
+        parameters,
+        place,
+    })
+}
+
+/// Effects that do the same to the recorded position from another place of a linear machine: where a lag sits, before the plant or behind
+/// it, no record of the two ends tells.
+fn twins<'a>(bench: &'a DiagnosisData, chosen: &'a SelectedEffect) -> impl Iterator<Item = &'static str> + 'a {
+    let ratio = |s: &Setting, w: f64| match s.response_share(&bench.scene, w) {
+        Share::Ratio(r) => Some(r),
+        _ => None,
+    };
+    let same = move |e: &dyn Effect| {
+        let numbers: Vec<f64> = chosen.setting.law.numbers().into_iter().flatten().collect();
+        let Some(other) = e.grid(&bench.scene).first().map(|l| l.with_numbers(&numbers)) else { return false };
+        let other = Setting::fixed(other);
+        let share = [0.1, 1.0, 2.5].map(|a| a / bench.scene.sample_time_s);
+        share.iter().all(|&w| {
+            let own = ratio(&chosen.setting, w);
+            own.is_some_and(|a| ratio(&other, w).is_some_and(|b| (a - b).norm() < ALIKE * a.norm()))
+        })
+    };
+    let facts = chosen.setting.facts();
+    let like = |f: &Facts| f.fixed && facts.fixed && facts.confused_with.contains(&f.name);
+    library().iter().filter(move |e| like(e.facts()) && same(**e)).map(|e| e.facts().name)
+}
+
+/// What the effect adds, whitened and stacked.
+fn effect_signal(bench: &DiagnosisData, selection: &Selection, at: usize) -> Vec<f64> {
+    let model = &selection.model;
+    let chosen = &model.chosen[at];
+    let plant = bench.form.carrier(&model.refitted.p).plant;
+    let Ok(sampled) = Sampled::of(&plant, bench.scene.sample_time_s) else { return vec![0.0; bench.stack.total] };
+    let mut signal = bench.stack.series(|i| {
+        let columns = position_columns(&chosen.setting.law, &bench.scene, &bench.trajectories[i], &sampled);
+        let mut y = vec![0.0; bench.means[i].len()];
+        for (c, s) in columns.iter().zip(chosen.own(i)) {
+            y.iter_mut().zip(c).for_each(|(y, c)| *y += s * c);
+        }
+        bench.whitener.apply(&mut y);
+        y
+    });
+    // What a record's own start and a constant torque imitate is no evidence of place.
+    bench.fit(vec![]).local_basis().project(&mut signal);
+    signal
+}
+
+/// The frequency that carries a run-out nearly alone (Hz).
+fn single_order(setting: &Setting) -> Option<f64> {
+    let sizes: Vec<f64> = setting.strengths.chunks_exact(2).map(|s| s[0].hypot(s[1])).collect();
+    let (k, most) = sizes.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    let alone = sizes.iter().enumerate().all(|(i, s)| i == k || *s < ORDER_BESIDE * most);
+    alone.then_some((k + 1) as f64 * setting.law.first_number())
+}
+
+/// Parameters of the chosen effect `at` with 95 % intervals: its numbers moved together along each direction that errs independently,
+/// the changes of each parameter added as squares; widened where the model leaves more than noise, and by what no machine follows a law to.
+fn estimates(bench: &DiagnosisData, selection: &Selection, at: usize) -> BTreeMap<String, Estimate> {
+    let model = selection.last();
+    let scene = &bench.scene;
+    let chosen = &model.chosen[at];
+    let base = chosen.setting.parameters(scene);
+    let widen = (model.cost / model.freedom).max(1.0).sqrt() * 1.96;
+    let strengths_of = |c: &SelectedEffect| if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
+    let moving = |c: &SelectedEffect| c.continuous.iter().filter(|c| **c).count();
+    let (before, all) = (&model.chosen[..at], &model.chosen);
+    let strength = bench.form.knobs.len() + before.iter().map(strengths_of).sum::<usize>();
+    let number =
+        bench.form.knobs.len() + all.iter().map(strengths_of).sum::<usize>() + before.iter().map(moving).sum::<usize>();
+    let moved = |direction: &Vec<f64>| -> Vec<Parameter> {
+        let by = |i: usize| direction.get(i).copied().unwrap_or(0.0) * widen;
+        let mut s: Setting = chosen.setting.clone();
+        (0..strengths_of(chosen)).for_each(|i| s.strengths[i] += by(strength + i));
+        let free = (0..chosen.continuous.len()).filter(|&i| chosen.continuous[i]);
+        for (k, i) in free.enumerate() {
+            s.law = scaled(&s.law, i, by(number + k).clamp(-2.0, 2.0).exp());
+        }
+        s.parameters(scene)
+    };
+    let moved: Vec<Vec<Parameter>> = model.refitted.directions.iter().map(moved).collect();
+    // A number that nothing free enters tells which form or which mode: it is exact.
+    let mut nudged = chosen.setting.clone();
+    nudged.strengths.iter_mut().take(strengths_of(chosen)).for_each(|s| *s *= NUDGE);
+    let by_strength = nudged.parameters(scene);
+    let free = (0..chosen.continuous.len()).filter(|&i| chosen.continuous[i]);
+    nudged.law = free.fold(nudged.law, |law, i| scaled(&law, i, NUDGE));
+    let nudged = nudged.parameters(scene);
+    let (position, command) = (&bench.form.given.position_unit, &bench.form.given.command_unit);
+    let out: BTreeMap<String, Estimate> = base
+        .iter()
+        .enumerate()
+        .map(|(k, p)| {
+            let off = moved.iter().map(|m| m.get(k).map_or(0.0, |q| (q.value - p.value).powi(2))).sum::<f64>();
+            let exact = nudged.get(k).is_none_or(|q| q.value == p.value);
+            let form = if exact { 0.0 } else { chosen.setting.law.form_uncertainty(p.name) * p.value };
+            let off = off.sqrt().hypot(form);
+            // Numbers of a law are above 0: lengths, times, frequencies, damping.
+            let own = by_strength.get(k).is_some_and(|q| q.value == p.value);
+            let least = if own && p.value > 0.0 { 0.0 } else { f64::NEG_INFINITY };
+            let e = Estimate {
+                value: p.value,
+                low: (p.value - off).max(least),
+                high: p.value + off,
+                unit: p.unit.text(position, command),
+            };
+            (p.name.to_owned(), e)
+        })
+        .collect();
+    out
+}
+
+/// A law with one of its numbers scaled.
+fn scaled(law: &AnyLaw, place: usize, by: f64) -> AnyLaw {
+    law.number(place).map_or_else(|| law.clone(), |n| law.with_number(place, n * by))
+}
+
+/// There, but no effect of the library explains it.
+pub(in crate::diagnose) fn unexplained(bench: &DiagnosisData, selection: &Selection, explained: f64) -> Finding {
+    let (fit, model) = (bench.fit(vec![]), &selection.baseline);
+    let (error, _) = fit.screen_basis(&model.refitted.p);
+    let place = place(bench, &bench.stack, &error);
+    let laws: Vec<&str> = selection.best().chosen.iter().map(|c| c.setting.facts().name).collect();
+    let nearest = match laws[..] {
+        [] => "none of its laws explains enough of it".to_owned(),
+        [one] => format!("its nearest law, {one}, leaves {} % of the error in excess of noise", percent(explained)),
+        _ => format!(
+            "its nearest laws, {}, leave {} % of the error in excess of noise",
+            laws.join(" and "),
+            percent(explained)
+        ),
+    };
+    let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
+    Finding {
+        effect: unexplained::FACTS.name.into(),
+        family: vec![unexplained::FACTS.name.into()],
+        port: crate::physics::Port::Torque,
+        p_value: log_tail(model.excess() + model.freedom, model.freedom as usize).min(0.0).exp().max(1e-300),
+        says: format!(
+            "Between {} and {} Hz something acts that the library does not hold: {nearest}.",
+            hertz(band[0]),
+            hertz(band[1]),
+        ),
+        parameters: BTreeMap::new(),
+        place,
+    }
+}
+
+/// What is left in per cent, to three digits; along the recorded motion a law may leave more than there was.
+fn percent(explained: f64) -> String {
+    let left = 100.0 * (1.0 - explained);
+    if left > 1000.0 { "more than 1000".into() } else { hertz(left) }
+}
