@@ -1,11 +1,12 @@
 #!/bin/sh
 # Builds the documentation site into target/site and looks whether every link in it leads to a file, and to a place in it where it names one.
-#   scripts/site.sh            mdbook is used where it is installed, and installed by cargo where it is not (two minutes of one core).
+#   scripts/site.sh            mdbook is used where it is installed, and installed by cargo where it is not. It is built without
+#                              optimisation: that takes a third of the time, and the book is small.
 # Ends with 3, and says so, where mdbook cannot be installed. The pictures are made by scripts/pictures.sh and stand in book/src/pictures.
 set -eu
 cd "$(dirname "$0")/.."
 if ! command -v mdbook >/dev/null; then
-    cargo install mdbook --locked --version 0.5.4 --no-default-features --features search || { echo "no site: mdbook cannot be installed" >&2; exit 3; }
+    cargo install mdbook --debug --locked --version 0.5.4 --no-default-features --features search || { echo "no site: mdbook cannot be installed" >&2; exit 3; }
     PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
 fi
 mdbook build book

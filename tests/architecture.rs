@@ -297,3 +297,20 @@ fn no_files_import_each_other_in_a_circle() {
     }
     assert!(files.is_empty(), "{}", files.keys().cloned().collect::<Vec<_>>().join("\n"));
 }
+
+#[test]
+fn every_file_of_tests_is_run() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let listed = std::fs::read_to_string(root.join("main.rs")).unwrap();
+    for entry in std::fs::read_dir(root).unwrap() {
+        let name = entry.unwrap().file_name().to_string_lossy().into_owned();
+        let Some(file) = name.strip_suffix(".rs").filter(|f| *f != "main") else { continue };
+        assert!(listed.lines().any(|l| l == format!("mod {file};")), "tests/main.rs does not name {file}");
+    }
+    // A crate whose tests cargo is told not to build has none.
+    each_source(|name, text| {
+        if ["crates/answer/", "crates/lab/"].iter().any(|c| name.starts_with(c)) {
+            assert!(!text.contains("#[test]") && !text.contains("/// ```\n"), "{name}: its crate builds no tests");
+        }
+    });
+}

@@ -1,9 +1,10 @@
 //! What a person sees: every command on good and on odd input, with exit codes and both streams.
 #![allow(clippy::unwrap_used)]
 
-use assert_cmd::Command;
 use serde_json::Value;
 use std::path::PathBuf;
+use std::process::Command;
+use std::sync::OnceLock;
 
 fn root(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(name)
@@ -24,7 +25,7 @@ struct Ran {
 }
 
 fn servotune(arguments: &[&str]) -> Ran {
-    let ran = Command::cargo_bin("servotune").unwrap().current_dir(root("")).args(arguments).output().unwrap();
+    let ran = Command::new(env!("CARGO_BIN_EXE_servotune")).current_dir(root("")).args(arguments).output().unwrap();
     Ran {
         code: ran.status.code().unwrap(),
         out: String::from_utf8(ran.stdout).unwrap(),
@@ -99,11 +100,20 @@ fn simulate_gives_pes_and_figures() {
     assert!((s["dft_high"].as_f64().unwrap() / norm(1500.0, 3000.0) - 1.0).abs() < 1e-12);
 }
 
+/// The demo, which takes a minute: made once for all that look at it.
+fn demo() -> &'static (PathBuf, Ran) {
+    static DEMO: OnceLock<(PathBuf, Ran)> = OnceLock::new();
+    DEMO.get_or_init(|| {
+        let dir = folder("demo");
+        let ran = servotune(&["demo", "--out", dir.to_str().unwrap()]);
+        assert_eq!(ran.code, 0, "{}\n{}", ran.out, ran.err);
+        (dir, ran)
+    })
+}
+
 #[test]
 fn the_demo_runs_the_chain_and_names_its_report() {
-    let dir = folder("demo");
-    let ran = servotune(&["demo", "--out", dir.to_str().unwrap()]);
-    assert_eq!(ran.code, 0, "{}\n{}", ran.out, ran.err);
+    let (dir, ran) = demo();
     let last = ran.out.lines().last().unwrap();
     let report = last.strip_prefix("Open this report: ").unwrap();
     let page = std::fs::read_to_string(report).unwrap();
@@ -124,8 +134,7 @@ fn the_demo_runs_the_chain_and_names_its_report() {
 #[test]
 fn identify_and_tune_from_files() {
     let dir = folder("files");
-    assert_eq!(servotune(&["demo", "--out", dir.to_str().unwrap()]).code, 0);
-    let (sweep, plant, gains) = (dir.join("response.bod"), dir.join("p.toml"), dir.join("g.toml"));
+    let (sweep, plant, gains) = (demo().0.join("response.bod"), dir.join("p.toml"), dir.join("g.toml"));
     let (sweep, plant, gains) = (sweep.to_str().unwrap(), plant.to_str().unwrap(), gains.to_str().unwrap());
     let ran = servotune(&["identify", sweep, "--out", plant, "--json"]);
     assert_eq!(ran.code, 0, "{}", ran.err);
@@ -308,11 +317,11 @@ fn pareto_and_next_sweep_refuse_what_they_cannot_do() {
         servotune(&[&[command, "--plant", plant, "--spec", PAPER], more].concat())
     };
     let next = |more: &[&str]| {
-        let given = ["next-sweep", "--frf", "tests/museum/good.bod", "--controller", NOMINAL];
+        let given = ["next-sweep", "--frf", "tests/invalid_sweeps/good.bod", "--controller", NOMINAL];
         servotune(&[&given, more].concat())
     };
     // The first rows of a sweep: too few, and an end before the crossing.
-    let good = std::fs::read_to_string(root("tests/museum/good.bod")).unwrap();
+    let good = std::fs::read_to_string(root("tests/invalid_sweeps/good.bod")).unwrap();
     let swept = |rows: usize| {
         let text: String = good.lines().take(rows).map(|l| format!("{l}\n")).collect();
         let file = write(&format!("{rows}.bod"), text);

@@ -1,9 +1,7 @@
 //! Whole diagnoses of machines simulated by another integrator: verdicts, names and numbers.
 #![allow(clippy::unwrap_used)]
 
-mod diagnose_common;
-
-use diagnose_common::*;
+use crate::diagnose_common::*;
 use servotune::diagnose::{Confirmation, DiagnoseSettings, Verdict, diagnose};
 use servotune::numeric::random::Random;
 use servotune::recording::{Case, Role};

@@ -1,9 +1,7 @@
 //! Logs that are wrong, of machines simulated by another integrator: shifted, cut, in other units, on another clock, measured and not held.
 #![allow(clippy::unwrap_used)]
 
-mod diagnose_common;
-
-use diagnose_common::*;
+use crate::diagnose_common::*;
 use servotune::controller::{Controller, Pid};
 use servotune::diagnose::{DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use servotune::lti::Plant;

@@ -1,9 +1,7 @@
 //! What a diagnosis offers: never worse than what was given, whatever acts; noise, counts and stated levels as findings.
 #![allow(clippy::unwrap_used)]
 
-mod diagnose_common;
-
-use diagnose_common::*;
+use crate::diagnose_common::*;
 use servotune::diagnose::{DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use servotune::lti::{Body, Plant};
 use servotune::numeric::random::Random;

@@ -1,9 +1,7 @@
 //! The decision rules: what the program prints, what `specs/rules.md` says, and what the code uses are one.
 #![allow(clippy::unwrap_used)]
 
-mod program_common;
-
-use program_common::{root, servotune};
+use crate::program_common::{root, servotune};
 use serde_json::Value;
 use servotune::diagnose::decision_rules;
 use std::collections::BTreeSet;

@@ -1,9 +1,7 @@
 //! The documents: links lead somewhere, every page of the site is in its list, commands are understood, and the first tutorial runs as written.
 #![allow(clippy::unwrap_used)]
 
-mod program_common;
-
-use program_common::{folder, root, servotune, servotune_with};
+use crate::program_common::{folder, root, servotune, servotune_with};
 use std::path::{Path, PathBuf};
 
 fn markdown(dir: &str) -> Vec<PathBuf> {

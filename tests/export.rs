@@ -1,9 +1,7 @@
 //! Exported code gives the library's commands: to the last bit in C, to the bit in integers.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stderr)]
 
-mod program_common;
-
-use program_common::{folder, root, servotune};
+use crate::program_common::{folder, root, servotune};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;

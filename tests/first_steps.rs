@@ -1,9 +1,7 @@
 //! `init`, `check`, `completions`, and what every command says beside its result.
 #![allow(clippy::unwrap_used)]
 
-mod program_common;
-
-use program_common::{folder, root, servotune, servotune_with};
+use crate::program_common::{folder, root, servotune, servotune_with};
 use serde_json::Value;
 
 const KINDS: [&str; 5] = ["spiral", "stage", "galvo", "vcm", "motor"];

@@ -1,9 +1,7 @@
 //! Apply and rollback: store and installed files are one, a list of slots is all or none, whatever stops them.
 #![allow(clippy::unwrap_used)]
 
-mod fleet_common;
-
-use fleet_common::{add_run, all, context, folder, installed, one, order, rows, stamp, store_of, tuned, words};
+use crate::fleet_common::{add_run, all, context, folder, installed, one, order, rows, stamp, store_of, tuned, words};
 use servotune::document::sha256_hex;
 use servotune_fleet::{Action, End, FleetError, Store, Which};
 use std::path::Path;

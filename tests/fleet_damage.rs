@@ -1,9 +1,7 @@
 //! A store whose bytes have changed installs nothing, says what has changed, and an emptied one is not a new one.
 #![allow(clippy::unwrap_used)]
 
-mod fleet_common;
-
-use fleet_common::{all, context, folder, installed, rows, store_of, tuned};
+use crate::fleet_common::{all, context, folder, installed, rows, store_of, tuned};
 use servotune_fleet::{Action, FleetError, Store};
 use std::path::{Path, PathBuf};
 
@@ -157,7 +155,7 @@ impl Refused for Store {
     /// Whether a store opened to be read refuses to be written to.
     fn begin_refused(mut self) -> bool {
         let inputs = servotune_fleet::Inputs { config: String::new(), slots: 1, list: String::new() };
-        self.begin(None, &inputs, &fleet_common::stamp()).is_err()
+        self.begin(None, &inputs, &crate::fleet_common::stamp()).is_err()
     }
 }
 

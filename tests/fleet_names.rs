@@ -2,9 +2,7 @@
 //! one bad slot is a row.
 #![allow(clippy::unwrap_used)]
 
-mod fleet_common;
-
-use fleet_common::{fleet, folder};
+use crate::fleet_common::{fleet, folder};
 use servotune::document::check_name;
 use servotune::gate::features::{features, machine_folders, read_machines};
 use servotune::recording::{Case, RecordSettings};

@@ -1,9 +1,7 @@
 //! Runs of a fleet: equal bytes whoever does them and whatever interrupts them, and a store that loses nothing.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod fleet_common;
-
-use fleet_common::{Quiet, fleet, folder, one, stamp};
+use crate::fleet_common::{Quiet, fleet, folder, one, stamp};
 use servotune_fleet::TwinSource;
 use servotune_fleet::{
     Action, Asked, Context, Effort, Fleet, FleetError, Inputs, Job, Loaded, SlotName, SlotSource, Store, TwinInput,

@@ -1,9 +1,7 @@
 //! A newer verdict withdraws an older proposal, and the output folder holds the files of one run only.
 #![allow(clippy::unwrap_used)]
 
-mod fleet_common;
-
-use fleet_common::{add_run, all, context, folder, one, order, rows, stamp, store_of, tuned, words};
+use crate::fleet_common::{add_run, all, context, folder, one, order, rows, stamp, store_of, tuned, words};
 use servotune_fleet::{
     Action, Asked, FleetError, Inputs, SlotRow, Store, Verdict, Which, clear_pages, page_file, write_tables,
 };

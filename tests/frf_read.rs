@@ -1,9 +1,7 @@
 //! Reading sweeps: real and practice files, units and conventions on the paper's family of plants.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stderr, missing_docs)]
 
-mod frf_plants;
-
-use frf_plants::{Plant, Show, file};
+use crate::frf_plants::{Plant, Show, file};
 use servotune::frf::*;
 use std::path::PathBuf;
 

@@ -1,10 +1,8 @@
 //! Layouts, mutations, round trips, time records and the measured files.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr, missing_docs)]
 
-mod frf_plants;
-
+use crate::frf_plants::{Draw, Plant};
 use flate2::read::MultiGzDecoder;
-use frf_plants::{Draw, Plant};
 use nalgebra::Complex;
 use servotune::frf::*;
 use std::f64::consts::TAU;
@@ -148,10 +146,10 @@ fn a_written_file_comes_back() {
 #[test]
 fn no_mutation_panics() {
     let mut draw = Draw(2024);
-    let museum = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/museum");
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/invalid_sweeps");
     let mut seeds: Vec<Vec<u8>> = ["good.bod", "even_single_text.uff", "uneven_double_binary.uff", "cut.bod.gz"]
         .iter()
-        .map(|n| std::fs::read(museum.join(n)).unwrap())
+        .map(|n| std::fs::read(folder.join(n)).unwrap())
         .collect();
     seeds.push(b"Frequency (Hz);Re;Im;Std;Coherence\n1,5;2;3;0,1;0,9\n2,5;\"1\";2;0,1;0,8\n".to_vec());
     let (mut read, mut refused) = (0, 0);

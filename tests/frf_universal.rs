@@ -1,4 +1,4 @@
-//! Universal files written by another program (see `museum/make_uff.py`), and damaged ones.
+//! Universal files written by another program (see `invalid_sweeps/make_uff.py`), and damaged ones.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use nalgebra::Complex;
@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 fn read(name: &str, settings: &ReadSettings) -> Result<Sweep, FrfError> {
-    read_file(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/museum").join(name), settings)
+    read_file(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/invalid_sweeps").join(name), settings)
 }
 
 /// The response that the script writes.
@@ -86,7 +86,7 @@ fn other_functions_and_zero_hertz_are_told() {
 #[test]
 fn a_file_cut_anywhere_is_refused() {
     for name in ["even_double_text.uff", "uneven_single_binary.uff"] {
-        let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/museum").join(name);
+        let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/invalid_sweeps").join(name);
         let bytes = std::fs::read(path).unwrap();
         let end = bytes.iter().rposition(|&b| b == b'-').unwrap();
         for cut in (0..end).step_by(7) {

@@ -1,9 +1,9 @@
 //! What a person sees of the gate: features, train, classify, tune --machines, from folders to gain tables, and the refusals.
 #![allow(clippy::unwrap_used)]
 
-use assert_cmd::Command;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// An empty folder of this test's own.
 fn folder(name: &str) -> PathBuf {
@@ -20,7 +20,7 @@ struct Ran {
 }
 
 fn servotune(folder: &Path, arguments: &[&str]) -> Ran {
-    let ran = Command::cargo_bin("servotune").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let ran = Command::new(env!("CARGO_BIN_EXE_servotune")).current_dir(folder).args(arguments).output().unwrap();
     Ran {
         code: ran.status.code().unwrap(),
         out: String::from_utf8(ran.stdout).unwrap(),

@@ -1,12 +1,10 @@
 //! Each bad input of the gate is refused by its variant, with place and names; nothing is overwritten.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod gate_common;
-
-use assert_cmd::Command;
-use gate_common::{World, folder, known};
+use crate::gate_common::{World, folder, known};
 use servotune::gate::{Gate, GateError, Table, TrainSettings, train};
 use std::path::Path;
+use std::process::Command;
 
 fn parse(text: &str) -> Result<Table, GateError> {
     Table::parse(Path::new("t.csv"), text, Some("label"))
@@ -104,7 +102,8 @@ fn gate_files_that_are_not_whole() {
 #[test]
 fn the_program_refuses_with_2_and_overwrites_nothing() {
     let dir = folder("gate_program");
-    let run = |words: &[&str]| Command::cargo_bin("servotune").unwrap().current_dir(&dir).args(words).output().unwrap();
+    let run =
+        |words: &[&str]| Command::new(env!("CARGO_BIN_EXE_servotune")).current_dir(&dir).args(words).output().unwrap();
     std::fs::write(dir.join("gate.json"), gate_text()).unwrap();
     std::fs::write(dir.join("bad.csv"), "f0,label\n1,x\nword,y\n").unwrap();
     let before = std::fs::read(dir.join("gate.json")).unwrap();

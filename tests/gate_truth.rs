@@ -1,9 +1,7 @@
 //! The gate against what is known beforehand: gradients, counts, coverage, alarms, threads.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod gate_common;
-
-use gate_common::{World, known};
+use crate::gate_common::{World, known};
 use servotune::gate::{Action, Gate, Table, TrainSettings, parameter_count, train};
 use std::path::Path;
 

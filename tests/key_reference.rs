@@ -1,9 +1,7 @@
 //! `specs/keys.md` names the keys that the parsers take, all of them and no other; `servotune schema` gives them to editors.
 #![allow(clippy::unwrap_used)]
 
-mod program_common;
-
-use program_common::{folder, root, servotune};
+use crate::program_common::{folder, root, servotune};
 use serde_json::Value;
 use servotune::controller::Controller;
 use servotune::lti::PlantFile;

@@ -3,6 +3,8 @@
 
 #[path = "../crates/servotune/examples/margins_of_many.rs"]
 mod margins_of_many;
+#[path = "../crates/servotune/examples/simulate_write.rs"]
+mod simulate_write;
 #[path = "../crates/servotune/examples/sweep_to_margins.rs"]
 mod sweep_to_margins;
 #[path = "../crates/servotune/examples/tune_and_verify.rs"]
@@ -16,6 +18,11 @@ fn a_sweep_to_margins() {
 #[test]
 fn a_table_tuned_and_verified() {
     tune_and_verify::main().unwrap_or_else(|e| panic!("{e}"));
+}
+
+#[test]
+fn the_position_error_of_a_write() {
+    simulate_write::main().unwrap_or_else(|e| panic!("{e}"));
 }
 
 #[test]

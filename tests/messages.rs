@@ -1,9 +1,7 @@
 //! What the program says where a file is not what it seems: sign, units, keys, lists.
 #![allow(clippy::unwrap_used)]
 
-mod program_common;
-
-use program_common::{folder, servotune, servotune_with};
+use crate::program_common::{folder, servotune, servotune_with};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -27,7 +25,7 @@ fn write(dir: &Path, name: &str, header: &str, rows: impl Iterator<Item = [f64; 
     std::fs::write(dir.join(name), text).unwrap();
 }
 
-fn margins(dir: &Path, sweep: &str, more: &[&str]) -> program_common::Ran {
+fn margins(dir: &Path, sweep: &str, more: &[&str]) -> crate::program_common::Ran {
     let words = ["margins", "--frf", sweep, "--controller", "controller.toml"];
     servotune_with(&[&words[..], more].concat(), Some(dir), None)
 }

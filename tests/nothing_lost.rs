@@ -1,9 +1,7 @@
 //! No output is an input, nothing that a person wrote is lost, and a full disk leaves what was there.
 #![allow(clippy::unwrap_used)]
 
-mod program_common;
-
-use program_common::{folder, servotune, servotune_with};
+use crate::program_common::{folder, servotune, servotune_with};
 use std::path::{Path, PathBuf};
 
 /// A beginning of the stage's files.
@@ -13,7 +11,7 @@ fn stage(name: &str) -> PathBuf {
     dir
 }
 
-fn identify(dir: &Path, out: &str, more: &[&str]) -> program_common::Ran {
+fn identify(dir: &Path, out: &str, more: &[&str]) -> crate::program_common::Ran {
     let words = ["identify", "sweep.csv", "--order", "8", "--out", out];
     servotune_with(&[&words[..], more].concat(), Some(dir), None)
 }

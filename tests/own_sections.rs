@@ -1,8 +1,6 @@
 //! The user's own second-order sections: the same loop as the notch that they are, kept by the search, proved, and refused where they ring.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod tune_common;
-
 use servotune::controller::{Controller, ControllerError};
 use servotune::feedback::{ModelLoop, margins};
 use servotune::lti::{DiscretePlant, Section};
@@ -19,14 +17,14 @@ fn own() -> Controller {
 
 #[test]
 fn a_notch_in_coefficients_is_the_notch() {
-    let plant = DiscretePlant::of(&tune_common::paper_plant(), own().sample_time_s).unwrap();
+    let plant = DiscretePlant::of(&crate::tune_common::paper_plant(), own().sample_time_s).unwrap();
     let of = |c: &Controller| margins(&ModelLoop::new(&plant, &c.sections().unwrap()).unwrap());
     assert_eq!(of(&own()), of(&nominal_controller().unwrap()));
 }
 
 #[test]
 fn the_search_keeps_them_and_the_table_carries_them() {
-    let (plant, spec) = (tune_common::paper_plant(), tune_common::paper_spec());
+    let (plant, spec) = (crate::tune_common::paper_plant(), crate::tune_common::paper_spec());
     let settings = TuneSettings { starts: 2, rounds: 1, ..TuneSettings::default() };
     let outcome = tune(&Machine::Model(&plant), &spec, Some(&own()), &settings).unwrap();
     let c = outcome.controller();

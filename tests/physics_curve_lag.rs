@@ -1,9 +1,7 @@
 //! An amplifier's curve with a lag behind it: simulated as an independent integrator does, and refused at any other port.
 #![allow(clippy::unwrap_used)]
 
-mod physics_common;
-
-use physics_common::runge_kutta;
+use crate::physics_common::runge_kutta;
 use servotune::document::parse_toml;
 use servotune::lti::{Plant, PlantFile};
 use servotune::physics::{Context, Machine, Restored};

@@ -1,9 +1,7 @@
 //! The entries of the library of effects: every name of the contract, parameters there and back, columns pure and at rest zero.
 #![allow(clippy::unwrap_used)]
 
-mod physics_common;
-
-use physics_common::{along, run, scene};
+use crate::physics_common::{along, run, scene};
 use servotune::lti::Body;
 use servotune::physics::coulomb_friction::CoulombFriction;
 use servotune::physics::encoder_cyclic_error::Harmonics;

@@ -1,10 +1,8 @@
 //! The laws of the physics room against closed forms: truth that is not this program's own output.
 #![allow(clippy::unwrap_used)]
 
-mod physics_common;
-
+use crate::physics_common::{T, along, close, df, law, run, scene};
 use nalgebra::Complex;
-use physics_common::{T, along, close, df, law, run, scene};
 use servotune::physics::aerodynamic_drag::AerodynamicDrag;
 use servotune::physics::amplifier_lag::AmplifierLag;
 use servotune::physics::backlash::Backlash;

@@ -1,10 +1,8 @@
 //! Modes that move and modes whose damping grows, against the product form of the plant and the logistic decay.
 #![allow(clippy::unwrap_used)]
 
-mod physics_common;
-
+use crate::physics_common::{T, scene};
 use nalgebra::Complex;
-use physics_common::{T, scene};
 use servotune::physics::modal_damping::ModalDamping;
 use servotune::physics::mode_shift::{ModeForm, ModeShift};
 use servotune::physics::{AnyLaw, Parametric, Sample, Scene};

@@ -1,9 +1,7 @@
 //! A dry drag that holds the arm on stiff bristles: simulated as an independent integrator does, though arm and bristles swing at some 3 kHz.
 #![allow(clippy::unwrap_used)]
 
-mod physics_common;
-
-use physics_common::runge_kutta;
+use crate::physics_common::runge_kutta;
 use servotune::document::parse_toml;
 use servotune::lti::{Plant, PlantFile};
 use servotune::physics::{Context, Machine, Restored};

@@ -1,7 +1,6 @@
 //! What a hostile trial found in the readers, each as its reproduction: the refusal, its variant and its fields.
 #![allow(clippy::unwrap_used)]
 
-use assert_cmd::Command;
 use nalgebra::Complex;
 use servotune::controller::{Controller, ControllerError};
 use servotune::document::{DocumentError, FileSet, OverLimit, parse_toml, read_text, size_limits, write_whole};
@@ -23,6 +22,7 @@ use servotune_report::table::{Column, Table};
 use std::f64::consts::TAU;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 const HEALTHY: &str = include_str!("../specs/machines/healthy.toml");
 const NOMINAL: &str = include_str!("../specs/controllers/nominal.toml");
@@ -39,7 +39,7 @@ fn folder(name: &str) -> PathBuf {
 /// Exit code and stderr.
 fn servotune(words: &[&str]) -> (i32, String, String) {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    let ran = Command::cargo_bin("servotune").unwrap().current_dir(root).args(words).output().unwrap();
+    let ran = Command::new(env!("CARGO_BIN_EXE_servotune")).current_dir(root).args(words).output().unwrap();
     let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
     (ran.status.code().unwrap(), text(&ran.stdout), text(&ran.stderr))
 }

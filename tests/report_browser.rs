@@ -2,9 +2,7 @@
 //! widths, in light and in dark. Skipped with a message where no Chromium is installed; `.ci/run` installs it.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
-mod program_common;
-
-use program_common::{folder, root, servotune, servotune_with};
+use crate::program_common::{folder, root, servotune, servotune_with};
 use servotune_report::fleet::{CoverageLine, FleetView, SlotLine, fleet_page};
 use servotune_report::number::NumberFormat;
 use servotune_report::page::{Block, Page, Section};

@@ -1,7 +1,7 @@
 //! Tuning over a model: limits met by the exact judgement, verdicts, bounds, determinism, truth by enumeration.
 #![allow(clippy::unwrap_used)]
 
-mod tune_common;
+use crate::tune_common::{paper_plant, paper_spec, start_controller};
 use servotune::controller::{Controller, Pid};
 use servotune::feedback::{LoopOnGrid, ModelLoop, SampledPlant, margins};
 use servotune::lti::{Body, DiscretePlant, Plant};
@@ -12,7 +12,6 @@ use servotune::tune::{
 };
 use std::f64::consts::TAU;
 use std::path::Path;
-use tune_common::{paper_plant, paper_spec, start_controller};
 
 fn quick() -> TuneSettings {
     TuneSettings { starts: 6, ..TuneSettings::default() }

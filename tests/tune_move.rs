@@ -1,8 +1,7 @@
 //! Feed-forward tuned to the move, and limits on the move's end, against the plain simulation and least squares.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod tune_common;
-
+use crate::tune_common::{paper_plant, paper_profile, paper_spec, start_controller};
 use nalgebra::{Matrix2, Vector2};
 use servotune::controller::{Controller, Feedforward};
 use servotune::lti::Plant;
@@ -10,7 +9,6 @@ use servotune::pes::{Noise, PesClock, Profile, simulate};
 use servotune::tune::{
     Limits, Machine, Minimise, MoveLimits, Objective, Spec, SpecError, Structure, TuneSettings, What, judge, tune,
 };
-use tune_common::{paper_plant, paper_profile, paper_spec, start_controller};
 
 /// The paper's write without noise, and the rms of its PES from the start of the move on to be least: at speed alone no lead tells.
 fn still_spec() -> Spec {

@@ -1,14 +1,13 @@
 //! Tuning straight on a measured response, and the PES from a spectrum, against the model that made the response.
 #![allow(clippy::unwrap_used)]
 
-mod tune_common;
+use crate::tune_common::{paper_plant, paper_profile, paper_response, paper_spec, start_controller, sweep};
 use servotune::controller::Feedforward;
 use servotune::feedback::{MeasuredLoop, ModelLoop, ResponseCurve, margins};
 use servotune::lti::{DiscretePlant, FrequencyResponse};
 use servotune::pes::{ExpectedNoise, Noise, NoiseWork, Runout, SpectralPes, SpectralWork, figures, simulate};
 use servotune::tune::{Hold, Machine, Outcome, Route, TuneError, TuneSettings, judge, tune};
 use std::f64::consts::TAU;
-use tune_common::{paper_plant, paper_profile, paper_response, paper_spec, start_controller, sweep};
 
 const T: f64 = 39.6e-6;
 

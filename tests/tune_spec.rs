@@ -1,11 +1,10 @@
 //! spec.toml: read from a file with its profile, refused by key.
 #![allow(clippy::unwrap_used)]
 
-mod tune_common;
+use crate::tune_common::{paper_profile, paper_spec};
 use servotune::document::DocumentError;
 use servotune::tune::{HarmonicLimit, Spec, SpecError};
 use std::path::Path;
-use tune_common::{paper_profile, paper_spec};
 
 #[test]
 fn the_paper_s_spec_reads_with_its_profile_beside_it() {

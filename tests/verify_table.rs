@@ -1,7 +1,6 @@
 //! `servotune verify` as a person runs it: a table that holds, and what happens when a digit of it changes.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-use assert_cmd::Command;
 use servotune::document::sha256_hex;
 use servotune::lti::{Plant, PlantFile};
 use servotune::numeric::random::Random;
@@ -10,6 +9,7 @@ use servotune::twin::nominal_controller;
 use servotune::twin::plants::{log_grid, measure};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 const PLANT: &str = include_str!("../specs/machines/tunable.toml");
 const SPEC: &str = include_str!("../specs/limits/paper.toml");
@@ -38,8 +38,7 @@ fn folder_of(name: &str, spec_text: &str, profile: &str) -> PathBuf {
 }
 
 fn verify(dir: &Path, more: &[&str]) -> (i32, String) {
-    let out = Command::cargo_bin("servotune")
-        .unwrap()
+    let out = Command::new(env!("CARGO_BIN_EXE_servotune"))
         .current_dir(dir)
         .args(["verify", "gains.toml", "--plant", "plant.toml", "--spec", "spec.toml"])
         .args(more)
@@ -96,7 +95,7 @@ fn a_band_above_half_the_rate_of_the_record_has_no_figure_and_hinders_no_proof()
 }
 
 fn run(dir: &Path, words: &[&str]) -> (i32, String, String) {
-    let out = Command::cargo_bin("servotune").unwrap().current_dir(dir).args(words).output().unwrap();
+    let out = Command::new(env!("CARGO_BIN_EXE_servotune")).current_dir(dir).args(words).output().unwrap();
     let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
     (out.status.code().unwrap(), text(&out.stdout), text(&out.stderr))
 }
@@ -192,7 +191,7 @@ fn what_is_wrong_is_named_with_its_file() {
         text.replacen(line, &format!("{key} = {value}"), 1)
     };
     std::fs::write(dir.join("words.json"), "no certificate").unwrap();
-    let good = "tests/museum/good.bod";
+    let good = "tests/invalid_sweeps/good.bod";
     let short: String = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(good)).unwrap();
     let short: String = short.lines().take(6).map(|l| format!("{l}\n")).collect();
     std::fs::write(dir.join("short.bod"), short).unwrap();

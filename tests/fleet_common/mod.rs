@@ -46,7 +46,7 @@ pub fn context(name: &str) -> Context {
     Context::of(&Fleet::read(&fleet(&folder(name), "twin = { slots = 4, seed = 3 }")).unwrap()).unwrap()
 }
 
-/// Rows of a run of four slots, at least two of them tuned; the run is made once for each file of tests.
+/// Rows of a run of four slots, at least two of them tuned; the run is made once.
 pub fn rows() -> &'static [SlotRow] {
     static ROWS: OnceLock<Vec<SlotRow>> = OnceLock::new();
     ROWS.get_or_init(|| {

@@ -54,7 +54,7 @@ pub(super) fn html(
         (counted(*k, "group of machines", "groups of machines") + " that look alike, one table each", share(*served))
     }));
     view.ways.extend(shared.curve.iter().map(|c| {
-        (counted(c.tables.len(), "shared table", "shared tables") + ", chosen by what is proven", share(c.served))
+        (counted(c.tables.len(), "shared table", "shared tables") + ", chosen by what is accepted", share(c.served))
     }));
     let named = |(i, t): (usize, &servotune_fleet::SharedTable)| (format!("K{:02}", i + 1), t.origin.clone(), t.slots);
     view.tables = shared.tables.iter().enumerate().map(named).collect();

@@ -2,7 +2,7 @@
 //! [`servotune::verify`], which shares no algorithm with the search and its margins.
 //!
 //! In: the plants of every case, identified, drawn and at each temperature. Out: [`Certified`]. It speaks of these models, [`super::prove()`] of the
-//! measured curve: the two differ by what the model leaves over. The write is not in it. Spec: `specs/fleet.md`, "Proof".
+//! measured curve: the two differ by what the model leaves over. The write is not in it. Spec: `specs/fleet.md`, "Acceptance".
 
 use super::{Context, Evidence};
 use serde::{Deserialize, Serialize};

@@ -1,13 +1,13 @@
 //! The fewest shared tables: which candidates serve the most slots, and a bound that says how far any choice could do better.
 //!
-//! In: for each slot the candidates proven in it, and what each of them costs there. Out: for every number of tables K the best choice found,
+//! In: for each slot the candidates accepted in it, and what each of them costs there. Out: for every number of tables K the best choice found,
 //! its coverage, and an upper bound on the coverage of any K. Slots of equal rows are one with a weight, so that the work does not grow with
 //! the floor. Choice: greedy, then exchanges until no single exchange helps, then branch and bound where that is small enough; the bound is
 //! the Lagrangean one of maximal covering (Church & ReVelle, Papers of the Regional Science Association 32, 1974; Galvao & ReVelle, EJOR 88, 1996).
 
 use std::collections::BTreeMap;
 
-/// Candidates proven in each slot, as sets; equal ones once, with how many slots have them.
+/// Candidates accepted in each slot, as sets; equal ones once, with how many slots have them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Coverage {
     /// Candidates.
@@ -35,7 +35,7 @@ const LOOKS: usize = 200_000_000;
 const STEPS: usize = 200;
 
 impl Coverage {
-    /// From each slot's set: whether candidate `i` is proven in it.
+    /// From each slot's set: whether candidate `i` is accepted in it.
     pub fn of(candidates: usize, slots: impl Iterator<Item = Vec<bool>>) -> Coverage {
         let mut c = Collect::new(candidates);
         slots.for_each(|s| c.add(|i| s.get(i).copied().unwrap_or(false)));

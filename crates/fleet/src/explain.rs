@@ -2,7 +2,7 @@
 //!
 //! In: an untunable slot with its cases. Out: [`Explained`]. The slot is first searched in full, by the widest search there is; only what that
 //! leaves untunable is explained. Each change is tried at its largest; where a table is then found, the smallest change is sought by bisection,
-//! with a table polished anew for every trial and proven at the end.
+//! with a table polished anew for every trial and judged at the end.
 
 use super::certified::{Certified, certified};
 use super::prove::{Proved, prove};
@@ -88,7 +88,7 @@ pub struct Remedy {
     pub factor: f64,
     /// In words.
     pub words: String,
-    /// The table that is proven after the change, and what it reaches.
+    /// The table that is accepted after the change, and what it reaches.
     pub after: OwnTable,
 }
 
@@ -165,7 +165,7 @@ impl Changed<'_> {
         s
     }
 
-    /// A proven table after a change by `factor`, polished from `start`.
+    /// An accepted table after a change by `factor`, polished from `start`.
     fn tuned(&self, factor: f64, start: &Controller) -> Option<OwnTable> {
         let evidence = self.slot.evidence.with(|p| self.plant(p, factor)).ok()?;
         let c = self.context;

@@ -24,7 +24,7 @@ pub struct Pilot {
     pub id: String,
     /// Its plant, where one was identified.
     pub model: Option<ModelRow>,
-    /// Its table, where one is proven.
+    /// Its table, where one is accepted.
     pub table: Option<OwnTable>,
 }
 

@@ -1,4 +1,4 @@
-//! Whether a table meets every limit in a slot, in every case: the one place that says "proven".
+//! Whether a table meets every limit in a slot, in every case: the one place that says "accepted".
 //!
 //! In: the slot's cases, a controller, the spec. Out: [`Proved`]: figures as measured, and the worst case with the limit that it misses most.
 //! No margin is the search grid's.

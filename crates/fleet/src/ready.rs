@@ -1,4 +1,4 @@
-//! A slot made ready for many tables: every case prepared once, then scored, polished and proven without building anything again.
+//! A slot made ready for many tables: every case prepared once, then scored, polished and judged without building anything again.
 //!
 //! In: the slot's [`Evidence`], the spec and the same spec a guard inside. Out: quick scores by the search's grid against the guarded limits.
 

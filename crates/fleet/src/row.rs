@@ -12,9 +12,9 @@ use servotune::lti::PlantFile;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Its own gains are proven, and the gate sees nothing to tune.
+    /// Its own gains are accepted, and the gate sees nothing to tune.
     Keeps,
-    /// A table of its own is proven.
+    /// A table of its own is accepted.
     Tuned,
     /// No table was found that meets every limit in every case.
     Untunable,
@@ -88,7 +88,7 @@ pub struct OwnTable {
     pub proved: Proved,
 }
 
-/// A candidate of the library that is proven in a slot.
+/// A candidate of the library that is accepted in a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Serves {
     /// Which.
@@ -157,7 +157,7 @@ pub struct SlotRow {
     pub certified: Option<Certified>,
     /// The best that was found where none passes.
     pub nearest: Option<OwnTable>,
-    /// Candidates of the library that are proven in it.
+    /// Candidates of the library that are accepted in it.
     pub serves: Vec<Serves>,
 }
 
@@ -167,7 +167,7 @@ impl SlotRow {
         format!("{}/{}", self.tester, self.slot)
     }
 
-    /// What a candidate does in it, where it is proven.
+    /// What a candidate does in it, where it is accepted.
     pub fn served_by(&self, candidate: usize) -> Option<&Serves> {
         self.serves.iter().find(|s| s.candidate == candidate)
     }

@@ -1,7 +1,7 @@
 //! Shared tables of a run: how many, which, who gets which, and how other ways would have done.
 //!
 //! In: the rows of a run and its library. Out: [`Shared`]: coverage over K with bounds, the choice, and the comparison with one table for all,
-//! a table for each slot, and groups tuned together. A slot counts as served only by a table that is proven in it.
+//! a table for each slot, and groups tuned together. A slot counts as served only by a table that is accepted in it.
 
 use super::cover::{Choice, Collect};
 use super::library::{Candidate, Library};
@@ -17,7 +17,7 @@ use servotune::lti::Plant;
 pub struct Shared {
     /// Slots to be served: those that the gate sends neither to repair nor to a person, and that could be read.
     pub slots: usize,
-    /// Of them, slots with a proven table of their own or proven gains.
+    /// Of them, slots with a accepted table of their own or accepted gains.
     pub own: usize,
     /// Of them, slots that some candidate serves.
     pub coverable: usize,
@@ -46,7 +46,7 @@ pub struct SharedTable {
     pub slots: usize,
 }
 
-/// The table that a slot gets: of the chosen that are proven in it, the one with the smallest DFT, then the first.
+/// The table that a slot gets: of the chosen that are accepted in it, the one with the smallest DFT, then the first.
 pub fn assigned(row: &SlotRow, chosen: &[usize]) -> Option<usize> {
     let served = chosen.iter().filter_map(|&c| row.served_by(c));
     served.min_by(|a, b| a.dft.total_cmp(&b.dft).then(a.candidate.cmp(&b.candidate))).map(|s| s.candidate)

@@ -1,4 +1,4 @@
-//! The work on one slot: gate, identify, judge its gains, find a table, prove it, mark the candidates that serve it.
+//! The work on one slot: gate, identify, judge its gains, find a table, judge it, mark the candidates that serve it.
 //!
 //! In: a loaded slot, the [`Context`], the [`Library`]. Out: a [`SlotRow`]. No state is kept between slots: the row is the same whoever works
 //! it out, on whichever thread, in whichever order. What goes wrong with a slot is written into its row.
@@ -260,7 +260,7 @@ struct Looked {
 /// What the candidates score that are looked at in this slot, and those that serve.
 ///
 /// Of today's table and of those grown to be shared the exact judgement decides. Another candidate that the grid sees inside the guarded limits counts
-/// as serving: the guard stands for the grid's error (`specs/fleet.md`, "Proof"); closer to a limit the exact judgement decides as well.
+/// as serving: the guard stands for the grid's error (`specs/fleet.md`, "Acceptance"); closer to a limit the exact judgement decides as well.
 fn covered(context: &Context, library: &Library, look: &[f64], ready: &mut Ready<'_>) -> Result<Looked, TuneError> {
     let guard = context.file.robust.guard;
     let mut serves: Vec<Serves> = Vec::new();
@@ -286,7 +286,7 @@ fn covered(context: &Context, library: &Library, look: &[f64], ready: &mut Ready
     Ok(Looked { all, serves })
 }
 
-/// A table of the slot's own: polished from the best candidates; else the best candidate that is proven. Where none is, the nearest.
+/// A table of the slot's own: polished from the best candidates; else the best candidate that is accepted. Where none is, the nearest.
 fn own_table(
     library: &Library,
     ready: &mut Ready<'_>,

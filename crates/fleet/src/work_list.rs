@@ -1,7 +1,7 @@
 //! The work list for maintenance: what to do to which machine, by what it would gain.
 //!
 //! In: the rows of a run with their explanations. Out: [`WorkItem`]s, the largest gain first. Gain is the fall of the PES that the work buys
-//! (sum of both DFT norms, position_unit): of an untunable slot from the best table today to the proven table after the smallest change; of a
+//! (sum of both DFT norms, position_unit): of an untunable slot from the best table today to the accepted table after the smallest change; of a
 //! machine to be repaired from its gains today to the floor's median after tuning.
 
 use super::row::{SlotRow, Verdict};

@@ -170,7 +170,7 @@ pub fn floor(out: &Path, say: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>, Stud
          temperatures and two drawn plants. {}\n\n\
          | age | slots | wall (s) | processor (s) | slots/s of the run | slots/s of every slot alone | peak MiB | verdicts |\n|---|---|---|---|---|---|---|---|\n{rows}\n\
          Slots/s of the run counts all: pilots, the library, every slot, explanations of untunable slots, shared tables. \"Every slot alone\" is the stage from a slot's files to its\n\
-         proven and certified table, per processor time: what {threads} cores without other work do.\n\n\
+         accepted and certified table, per processor time: what {threads} cores without other work do.\n\n\
          The page of the last run, with the reports of its {REPORTS} worst slots: `fleet.html`, written beside this page by the command.\n\n\
          Second opinion, last run: of {tuned} tables of tuned slots the prover of `specs/certificate.md` certifies {certified} ({:.1} %): on the identified plant, the\n\
          drawn plants and at each temperature every limit of a margin is kept at every frequency. The others keep them on the measured curve, and miss one on a\n\

@@ -43,9 +43,9 @@ const NOMINAL: &str = include_str!("../../../specs/controllers/nominal.toml");
 const PAPER: &str = include_str!("../../../specs/limits/paper.toml");
 const SPIRAL: &str = include_str!("../../../specs/profiles/spiral.toml");
 const UNIVERSAL: [&[u8]; 3] = [
-    include_bytes!("../../../tests/museum/uneven_double_text.uff"),
-    include_bytes!("../../../tests/museum/uneven_double_binary.uff"),
-    include_bytes!("../../../tests/museum/even_single_binary.uff"),
+    include_bytes!("../../../tests/invalid_sweeps/uneven_double_text.uff"),
+    include_bytes!("../../../tests/invalid_sweeps/uneven_double_binary.uff"),
+    include_bytes!("../../../tests/invalid_sweeps/even_single_binary.uff"),
 ];
 
 /// Largest write that is simulated in a trial (samples): a longer one is only checked.

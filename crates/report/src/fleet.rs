@@ -244,7 +244,7 @@ fn draw_limit(panel: &mut Panel, side: Side, at: f64) {
 
 fn shared(v: &FleetView) -> Result<Vec<Block>, ReportError> {
     let mut blocks = vec![Block::Prose(
-        "A slot counts as served by a table that meets every limit in it, in every case. Shares are of the slots that can be served: those that keep proven gains or have a proven table of their own.".into(),
+        "A slot counts as served by a table that meets every limit in it, in every case. Shares are of the slots that can be served: those that keep accepted gains or have an accepted table of their own.".into(),
     )];
     if !v.coverage.is_empty() {
         let k: Vec<f64> = v.coverage.iter().map(|c| c.tables as f64).collect();

@@ -7,28 +7,11 @@
 //! A tour that runs: the paper's machine (eqs. (20), (22)), its loop, one spiral write.
 //!
 //! ```
-//! use servotune::controller::{Controller, Pid};
-//! use servotune::feedback::{ModelLoop, margins};
-//! use servotune::lti::{Body, DiscretePlant, Plant};
+//! use servotune::{Body, Controller, DiscretePlant, ModelLoop, Pid, Plant, margins};
 //!
-//! let plant = Plant {
-//!     position_unit: "track".into(),
-//!     command_unit: "V".into(),
-//!     body: Body::SecondOrder { dc_gain: 75.0, natural_frequency_rad_s: 369.0, damping_ratio: 0.22 },
-//!     delay_s: 65e-6,
-//!     resonance_gain: 1.0,
-//!     modes: vec![],
-//!     physics: vec![],
-//! };
-//! let controller = Controller {
-//!     sample_time_s: 39.6e-6,
-//!     output_limit: None,
-//!     pid: Pid { kp: 0.27, ki_per_s: 60.0, kd_s: 3.7e-4, derivative_filter_s: 12e-6 },
-//!     lowpass: vec![],
-//!     notch: vec![],
-//!     biquad: vec![],
-//!     feedforward: None,
-//! };
+//! let body = Body::SecondOrder { dc_gain: 75.0, natural_frequency_rad_s: 369.0, damping_ratio: 0.22 };
+//! let plant = Plant::new("track", "V", body).with_delay_s(65e-6);
+//! let controller = Controller::new(39.6e-6, Pid { kp: 0.27, ki_per_s: 60.0, kd_s: 3.7e-4, derivative_filter_s: 12e-6 });
 //! let (sampled, sections) = (DiscretePlant::of(&plant, 39.6e-6)?, controller.sections()?);
 //! let judged = margins(&ModelLoop::new(&sampled, &sections)?);
 //! assert!(judged.stable && judged.phase_margin_deg.is_some_and(|deg| deg > 30.0));
@@ -58,3 +41,14 @@ pub mod tune;
 
 pub mod twin;
 pub mod verify;
+
+// The nouns and verbs of the common tasks, without their rooms.
+pub use controller::{Controller, Lowpass, Notch, Pid};
+pub use feedback::{Margins, MeasuredLoop, MeasuredMargins, ModelLoop, margins, measured_margins};
+pub use frf::{Frf, Sweep};
+pub use identify::{Identified, IdentifySettings, identify};
+pub use lti::{Body, DiscretePlant, Mode, Plant};
+pub use pes::{PesFigures, Profile, simulate};
+pub use recording::{Case, Record};
+pub use tune::{GainTable, Machine, Outcome, Spec, TuneSettings, Tuned, tune};
+pub use verify::{Certificate, Uncertainty, VerifySettings, certify};

@@ -53,6 +53,19 @@ pub enum ControllerError {
 const LEAST_AWAY: f64 = 1e-11;
 
 impl Controller {
+    /// A PID controller without filters or a limit; `sample_time_s` in s. The other fields are added by name.
+    pub fn new(sample_time_s: f64, pid: Pid) -> Controller {
+        Controller {
+            sample_time_s,
+            output_limit: None,
+            pid,
+            lowpass: Vec::new(),
+            notch: Vec::new(),
+            biquad: Vec::new(),
+            feedforward: None,
+        }
+    }
+
     /// Refuses numbers that are no controller; the key in the error is the one of the file.
     pub fn check(&self) -> Result<(), ControllerError> {
         let range = |key, found: f64, good: bool, expected| {

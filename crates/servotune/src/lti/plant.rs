@@ -171,6 +171,33 @@ impl Body {
 }
 
 impl Plant {
+    /// A rigid body alone: no delay, no modes, no effects beyond linear. [`Plant::with_delay_s`] and [`Plant::with_mode`] add to it.
+    pub fn new(position_unit: &str, command_unit: &str, body: Body) -> Plant {
+        Plant {
+            position_unit: position_unit.to_owned(),
+            command_unit: command_unit.to_owned(),
+            body,
+            delay_s: 0.0,
+            resonance_gain: 1.0,
+            modes: Vec::new(),
+            physics: Vec::new(),
+        }
+    }
+
+    /// The same plant with this dead time (s).
+    #[must_use]
+    pub fn with_delay_s(mut self, delay_s: f64) -> Plant {
+        self.delay_s = delay_s;
+        self
+    }
+
+    /// The same plant with one more resonance pair.
+    #[must_use]
+    pub fn with_mode(mut self, mode: Mode) -> Plant {
+        self.modes.push(mode);
+        self
+    }
+
     /// The order of the rational part: the body's, 2 for one without a form of its own, and 2 for each mode.
     pub fn order(&self) -> usize {
         let body = match &self.body {

@@ -1,4 +1,4 @@
-//! The museum of bad files: each is refused for its own reason, at its own place.
+//! Bad files: each is refused for its own reason, at its own place.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use servotune::frf::FrfError as E;
@@ -6,7 +6,7 @@ use servotune::frf::*;
 use std::path::PathBuf;
 
 fn path(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/museum").join(name)
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/invalid_sweeps").join(name)
 }
 
 fn refused(name: &str) -> E {
@@ -32,7 +32,7 @@ macro_rules! refuses {
 }
 
 #[test]
-fn the_good_file_of_the_museum_is_read() {
+fn the_good_file_beside_them_is_read() {
     let sweep = read_file(&path("good.bod"), &ReadSettings::default()).unwrap();
     assert_eq!((sweep.frf.len(), sweep.rows_read), (30, 30));
     assert!(sweep.notes.iter().any(|n| matches!(n, Note::PhaseResponse { ground: Ground::GainPhase(_) })));
