@@ -77,7 +77,8 @@ class Meter(threading.Thread):
         self.seconds: dict[int, float] = {}
 
     def run(self) -> None:
-        while not self.over.wait(0.5):
+        # Reading the memory of an engine with thirty processes is work by itself.
+        while not self.over.wait(2.0):
             self.look()
 
     def look(self) -> tuple[float, float]:
@@ -143,24 +144,32 @@ def main() -> None:
     words.add_argument("--again", action="store_true", help="measure rows that are known")
     asked = words.parse_args()
     os.environ.setdefault("RAY_worker_niceness", "0")
-    floor = kept().get(str(asked.slots), {"ways": [], "store": 0, "files": {}})
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         fleet = fleet_file(folder, asked.slots, PILOTS)
         for workers in asked.workers:
             for name in ["fleet run", *asked.engines]:
-                known = [way for way in floor["ways"] if (way["name"], way["workers"]) == (name, workers)]
-                if known and not asked.again:
-                    continue
-                out = folder / f"{name}{workers}"
-                way = run(name, workers, fleet, out, floor["files"])
-                floor["ways"] = [way for way in floor["ways"] if way not in known] + [asdict(way)]
-                floor["store"] = floor["store"] or (out / "fleet.db").stat().st_size
-                floor["files"] = floor["files"] or digests(out)
-                shutil.rmtree(out)
-                floors = {**kept(), str(asked.slots): floor}
-                KEPT.write_text(json.dumps(floors, indent=1) + "\n")
-                KEPT.with_suffix(".md").write_text("\n".join(page(floors)))
+                floor = floor_of(kept(), asked.slots)
+                if asked.again or not any((way["name"], way["workers"]) == (name, workers) for way in floor["ways"]):
+                    out = folder / f"{name}{workers}"
+                    put(asked.slots, run(name, workers, fleet, out, floor["files"]), out)
+                    shutil.rmtree(out)
+
+
+def put(slots: int, way: Way, out: Path) -> None:
+    """A row onto the page; what another process measured meanwhile stays."""
+    floors = kept()
+    floor = floors[str(slots)] = floor_of(floors, slots)
+    floor["ways"] = [w for w in floor["ways"] if (w["name"], w["workers"]) != (way.name, way.workers)] + [asdict(way)]
+    floor["store"] = floor["store"] or (out / "fleet.db").stat().st_size
+    floor["files"] = floor["files"] or digests(out)
+    KEPT.write_text(json.dumps(floors, indent=1) + "\n")
+    KEPT.with_suffix(".md").write_text("\n".join(page(floors)))
+
+
+def floor_of(floors: dict[str, dict], slots: int) -> dict:
+    """What is known of a floor's size."""
+    return floors.get(str(slots), {"ways": [], "store": 0, "files": {}})
 
 
 def kept() -> dict[str, dict]:
