@@ -153,7 +153,7 @@ def main() -> None:
                 if asked.again or not any((way["name"], way["workers"]) == (name, workers) for way in floor["ways"]):
                     out = folder / f"{name}{workers}"
                     put(asked.slots, run(name, workers, fleet, out, floor["files"]), out)
-                    shutil.rmtree(out)
+                    shutil.rmtree(out, ignore_errors=True)
 
 
 def put(slots: int, way: Way, out: Path) -> None:
@@ -254,7 +254,8 @@ def million(slots: int, ways: list[Way], store: int) -> list[str]:
         f"| their rate | over that time, one driver that adds {machines * cores / each:.0f} rows/s | {many * row / work / 2**20:.0f} MiB/s |",
         f"| pilots, library, explanations, shared tables, files | as they are here on one driver; they grow by the slots served, see `fleet_scale.md` | {rest:.0f} s for {slots} |",
         "",
-        "What limits it: the driver, not the workers. It parses and stores every row, and the end of the run (shared tables, CSV) is one process that reads the store once; "
+        "What limits it: the driver, not the workers: the run lasts as long as the longest line. Engines also spend time on the driver by the second, busy or not; it is not told apart "
+        "from what a slot costs, and counts the more the slower the workers are. The driver parses and stores every row, and the end of the run (shared tables, CSV) is one process that reads the store once; "
         "results/fleet_scale.md has the time of that end and the store's own limit. More machines than keep the driver's rate of rows below that limit do not help.",
         "",
     ]
