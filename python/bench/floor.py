@@ -1,15 +1,18 @@
 """Makes results/python_floor.md and .json: `python python/bench/floor.py` with the package, its engines and the program at hand.
 
 One made-up floor, worked on by `servotune fleet run` and by `python -m servotune.floor` over each engine, on one and on two workers, each in processes of its own.
-`--slots 1000`, `--engines local ray dask spark`. Floors of other sizes that were measured before stay on the page; each row is written when it is known.
+`--slots 1000`, `--engines local ray dask spark`, `--workers 2 1`. Each row is written when it is known, and a row that is known is not measured again without
+`--again`: a long table may take several goes. Floors of other sizes stay on the page.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -18,7 +21,7 @@ import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from machine import ROOT, busy, children, fleet_file, program_file
+from machine import ROOT, children, fleet_file, program_file
 
 #: Few, so that the stage before the slots is short; it is not what is measured.
 PILOTS = 4
@@ -26,6 +29,8 @@ PILOTS = 4
 FILES = ("slots.csv", "slots.jsonl", "coverage.csv", "shared.json", "work_list.csv", "untunable.json")
 
 
+#: Of the rows.
+ORDER = ("fleet run", "local", "ray", "dask", "spark")
 #: Rows of all floors that were measured.
 KEPT = ROOT / "results/python_floor.json"
 
@@ -38,10 +43,11 @@ class Way:
     whole_s  : of the run (s)
     slots_s  : between those lines (s)
     busy_s   : of processors between them, all processes (s)
-    driver_s : of these the process that was started (s)
+    driver_s : of these the process that was started (s); none where it was not looked at
     peak_mib : memory of all processes at once (proportional set size, MiB)
     start_s  : until the first word about pilots (s)
     same     : its files are those of the first way
+    load     : average load of the machine over the last minutes of the run (1.0 is one busy core)
     """
 
     name: str
@@ -50,10 +56,11 @@ class Way:
     whole_s: float
     slots_s: float
     busy_s: float
-    driver_s: float
+    driver_s: float | None
     peak_mib: float
     start_s: float
     same: bool
+    load: float
 
     def each_s(self) -> float:
         """Of a processor for a slot (s)."""
@@ -70,7 +77,8 @@ class Meter(threading.Thread):
         self.seconds: dict[int, float] = {}
 
     def run(self) -> None:
-        while not self.over.wait(0.5):
+        # Reading the memory of an engine with thirty processes is work by itself.
+        while not self.over.wait(2.0):
             self.look()
 
     def look(self) -> tuple[float, float]:
@@ -88,8 +96,13 @@ class Meter(threading.Thread):
         return sum(self.seconds.values()), self.seconds.get(self.of, 0.0)
 
 
-def run(name: str, workers: int, fleet: Path, out: Path, alone: Path | None) -> Way:
-    """One way, from start to end."""
+def digests(out: Path) -> dict[str, str]:
+    """What is compared of a run's files."""
+    return {f: hashlib.sha256((out / f).read_bytes()).hexdigest() for f in FILES}
+
+
+def run(name: str, workers: int, fleet: Path, out: Path, right: dict[str, str]) -> Way:
+    """One way, from start to end; `right`: digests of the files that the first way made, none for the first."""
     common = [str(fleet), "--out", str(out), "--run", "one", "--pages", "0"]
     if name == "fleet run":
         words = [str(program_file()), "fleet", "run", *common, "--threads", str(workers)]
@@ -115,9 +128,9 @@ def run(name: str, workers: int, fleet: Path, out: Path, alone: Path | None) -> 
     meter.join()
     if code not in (0, 1):
         raise RuntimeError("".join(said[-20:]))
-    same = alone is None or all((out / f).read_bytes() == (alone / f).read_bytes() for f in FILES)
+    same = digests(out) == (right or digests(out))
     seconds, busy_s, driver_s, slots = (b - a for a, b in zip(first, last))
-    way = Way(name, workers, slots, whole, seconds, busy_s, driver_s, meter.peak_mib, pilots - begun, same)
+    way = Way(name, workers, slots, whole, seconds, busy_s, driver_s, meter.peak_mib, pilots - begun, same, os.getloadavg()[1])
     print(way, flush=True)
     return way
 
@@ -127,22 +140,41 @@ def main() -> None:
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("--slots", type=int, default=1000)
     words.add_argument("--engines", nargs="*", default=["local", "ray", "dask", "spark"])
+    words.add_argument("--workers", nargs="*", type=int, default=[1, 2])
+    words.add_argument("--again", action="store_true", help="measure rows that are known")
     asked = words.parse_args()
     os.environ.setdefault("RAY_worker_niceness", "0")
-    floors = json.loads(KEPT.read_text()) if KEPT.is_file() else {}
-    floor = {"ways": [], "machine": "", "store": 0, "engines": asked.engines}
-    floors[str(asked.slots)] = floor
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         fleet = fleet_file(folder, asked.slots, PILOTS)
-        alone = folder / "fleet run1"
-        for name in ["fleet run", *asked.engines]:
-            for workers in (1, 2):
-                way = run(name, workers, fleet, folder / f"{name}{workers}", alone if floor["ways"] else None)
-                floor["ways"].append(asdict(way))
-                floor["machine"], floor["store"] = busy(), (alone / "fleet.db").stat().st_size
-                KEPT.write_text(json.dumps(floors, indent=1) + "\n")
-                KEPT.with_suffix(".md").write_text("\n".join(page(floors)))
+        for workers in asked.workers:
+            for name in ["fleet run", *asked.engines]:
+                floor = floor_of(kept(), asked.slots)
+                if asked.again or not any((way["name"], way["workers"]) == (name, workers) for way in floor["ways"]):
+                    out = folder / f"{name}{workers}"
+                    put(asked.slots, run(name, workers, fleet, out, floor["files"]), out)
+                    shutil.rmtree(out, ignore_errors=True)
+
+
+def put(slots: int, way: Way, out: Path) -> None:
+    """A row onto the page; what another process measured meanwhile stays."""
+    floors = kept()
+    floor = floors[str(slots)] = floor_of(floors, slots)
+    floor["ways"] = [w for w in floor["ways"] if (w["name"], w["workers"]) != (way.name, way.workers)] + [asdict(way)]
+    floor["store"] = floor["store"] or (out / "fleet.db").stat().st_size
+    floor["files"] = floor["files"] or digests(out)
+    KEPT.write_text(json.dumps(floors, indent=1) + "\n")
+    KEPT.with_suffix(".md").write_text("\n".join(page(floors)))
+
+
+def floor_of(floors: dict[str, dict], slots: int) -> dict:
+    """What is known of a floor's size."""
+    return floors.get(str(slots), {"ways": [], "store": 0, "files": {}})
+
+
+def kept() -> dict[str, dict]:
+    """What was measured so far."""
+    return json.loads(KEPT.read_text()) if KEPT.is_file() else {}
 
 
 def page(floors: dict[str, dict]) -> list[str]:
@@ -156,7 +188,8 @@ def page(floors: dict[str, dict]) -> list[str]:
         "*Slots/s*: of the stage of slots. *Processor ms a slot*: of all processes of the run in that stage, their start included where an engine starts workers late; it is what",
         "other work on the machine does not change much. *Of these the driver*: the process that was started; `fleet run` is one process, Spark's driver works in a Java machine",
         "beside it. *Beside `fleet run`*: processor time, relative to the program on as many threads. *Memory*: proportional set size, so that shared pages count once; Ray's",
-        f"holds its object store. *Files equal*: {', '.join(FILES)} byte by byte those of the first row.",
+        "holds its object store. *Load*: of the machine, average of the last five minutes of the run; it has two cores, and above two a run shares them with other work.",
+        f"*Files equal*: {', '.join(FILES)} by their SHA-256 those of the first row that was measured.",
         "",
     ]
     for slots in sorted(floors, key=int, reverse=True):
@@ -170,38 +203,44 @@ def page(floors: dict[str, dict]) -> list[str]:
 
 def table(slots: int, floor: dict) -> list[str]:
     """A floor's rows."""
-    ways = [Way(**w) for w in floor["ways"]]
+    ways = sorted((Way(**w) for w in floor["ways"]), key=lambda way: (ORDER.index(way.name), way.workers))
     own = {way.workers: way for way in ways if way.name == "fleet run"}
     lines = [
         f"## {slots} slots",
         "",
-        f"`python python/bench/floor.py --slots {slots} --engines {' '.join(floor['engines'])}`. {floor['machine']}",
+        f"`python python/bench/floor.py --slots {slots} --engines {' '.join(e for e in ORDER[1:] if any(way.name == e for way in ways))}`, {os.cpu_count()} cores.",
         "",
-        "| way | workers | slots/s | processor ms a slot | of these the driver | beside `fleet run` | whole run (s) | until the engine stands (s) | memory of all processes (MiB) | files equal |",
-        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---|",
+        "| way | workers | slots/s | processor ms a slot | of these the driver | beside `fleet run` | whole run (s) | until the engine stands (s) | memory of all processes (MiB) | load | files equal |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---|",
     ]
     for way in ways:
         fleet = way.name == "fleet run"
-        beside = "" if fleet else f"{100 * (way.each_s() / own[way.workers].each_s() - 1):+.0f} %"
-        driver = "" if fleet else f"{1e3 * way.driver_s / way.slots:.1f}"
+        beside = "" if fleet or way.workers not in own else f"{100 * (way.each_s() / own[way.workers].each_s() - 1):+.0f} %"
+        driver = "" if fleet or way.driver_s is None else f"{1e3 * way.driver_s / way.slots:.1f}"
         lines.append(
             f"| {way.name} | {way.workers} | {way.slots / way.slots_s:.1f} | {1e3 * way.each_s():.1f} | {driver} | {beside} | {way.whole_s:.0f} | {way.start_s:.1f} "
-            f"| {way.peak_mib:.0f} | {'yes' if way.same else '**no**'} |"
+            f"| {way.peak_mib:.0f} | {way.load:.0f} | {'yes' if way.same else '**no**'} |"
         )
-    return [*lines, ""]
+    known = {(way.name, way.workers) for way in ways}
+    left = [f"{name} on {workers}" for name in ORDER for workers in (1, 2) if (name, workers) not in known]
+    return [*lines, "", *([f"Not measured at this size: {', '.join(left)}.", ""] if left else [])]
 
 
 def million(slots: int, ways: list[Way], store: int) -> list[str]:
     """What the figures say of a million slots."""
     ray = next((way for way in ways if way.name == "ray" and way.workers == 2), None)
-    own = next(way for way in ways if way.name == "fleet run" and way.workers == 2)
-    if ray is None:
+    own = next((way for way in ways if way.name == "fleet run" and way.workers == 2), None)
+    if ray is None or own is None:
         return []
     many, machines, cores = 1_000_000, 100, 2
     each = ray.each_s()
     work = many * each / (machines * cores)
     row = store / slots
     rest = own.whole_s - own.slots_s
+    driver = []
+    if ray.driver_s is not None:
+        own_s = ray.driver_s / ray.slots
+        driver = [f"| the driver's own processor time | {1e3 * own_s:.2f} ms a slot, one core | {many * own_s / 60:.0f} min |"]
     return [
         "## A million slots on 100 machines, on paper",
         "",
@@ -211,11 +250,12 @@ def million(slots: int, ways: list[Way], store: int) -> list[str]:
         "|---|---|---:|",
         f"| work on slots | {1e3 * each:.1f} ms of a processor a slot, {machines * cores} cores | {work / 60:.0f} min |",
         f"| rows to the driver | {row / 1024:.1f} KiB a slot in the store | {many * row / 2**30:.1f} GiB |",
-        f"| the driver's own processor time | {1e3 * ray.driver_s / ray.slots:.2f} ms a slot, one core | {many * ray.driver_s / ray.slots / 60:.0f} min |",
+        *driver,
         f"| their rate | over that time, one driver that adds {machines * cores / each:.0f} rows/s | {many * row / work / 2**20:.0f} MiB/s |",
         f"| pilots, library, explanations, shared tables, files | as they are here on one driver; they grow by the slots served, see `fleet_scale.md` | {rest:.0f} s for {slots} |",
         "",
-        "What limits it: the driver, not the workers. It parses and stores every row, and the end of the run (shared tables, CSV) is one process that reads the store once; "
+        "What limits it: the driver, not the workers: the run lasts as long as the longest line. Engines also spend time on the driver by the second, busy or not; it is not told apart "
+        "from what a slot costs, and counts the more the slower the workers are. The driver parses and stores every row, and the end of the run (shared tables, CSV) is one process that reads the store once; "
         "results/fleet_scale.md has the time of that end and the store's own limit. More machines than keep the driver's rate of rows below that limit do not help.",
         "",
     ]

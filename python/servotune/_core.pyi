@@ -31,6 +31,7 @@ class Answer:
     json: str
     accepted: bool
     notes: list[str]
+    def plain(self, key: str) -> tuple[None | bool | int | float | str] | None: ...
     def svg(self) -> str | None: ...
 
 class Frf:

@@ -62,6 +62,10 @@ class Controller:
         """The controller.toml as a dictionary."""
         return json.loads(self._core.json())
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Its text is all there is to it: so it goes to workers of any engine.
+        return Controller.from_toml, (self.to_toml(),)
+
     def __repr__(self) -> str:
         return repr(self._core)
 

@@ -55,6 +55,9 @@ class Plant(Machine):
         """Of a continuous python-control system (`tf`, `zpk`, `ss`) with one input and one output; such a system has no dead time, so say it."""
         if getattr(system, "dt", 0) not in (0, None):
             raise ValueError(f"found a system sampled at {system.dt} s; expected a continuous one")
+        channels = (getattr(system, "ninputs", 1), getattr(system, "noutputs", 1))
+        if channels != (1, 1):
+            raise ValueError(f"found {channels[0]} inputs and {channels[1]} outputs; expected one of each")
         head = f"position_unit = {json.dumps(position_unit)}\ncommand_unit = {json.dumps(command_unit)}\n[plant]\n"
         delay = f"delay_s = {float(delay_s)!r}\n"
         if all(hasattr(system, key) for key in "ABCD"):
@@ -121,6 +124,10 @@ class Plant(Machine):
             a[n + i, n + i - 1] = 1.0
         c = np.concatenate([np.asarray(output, dtype=float), np.zeros(held)]).reshape(1, -1)
         return Sampled(a, b, c, np.zeros((1, 1)), sample_time_s)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Its text is all there is to it: so it goes to workers of any engine. The quality of an identified one stays behind.
+        return Plant.from_toml, (self.to_toml(),)
 
     def to_dict(self) -> dict[str, Any]:
         """The plant.toml as a dictionary."""

@@ -22,7 +22,7 @@ class Result:
 
     def __init__(self, answer: Any) -> None:
         self._answer = answer
-        # Most calls in a loop look at one or two numbers: the document is taken apart when it is first asked for.
+        # Most calls in a loop look at one or two numbers: the document is taken apart when a list or an object of it is first asked for.
         self._document: dict[str, Any] | None = None
 
     @property
@@ -52,6 +52,8 @@ class Result:
         # Only what is no attribute comes here.
         if key.startswith("_"):
             raise AttributeError(key)
+        if self._document is None and (found := self._answer.plain(key)) is not None:
+            return found[0]
         try:
             return self._read()[key]
         except KeyError:

@@ -1,5 +1,6 @@
 //! What a call gives back: the document of the command line's `--json`, what was said on the way, and a picture when it is asked for.
 
+use crate::plain::plain_value;
 use crate::refusal::{raise, unwritable};
 use pyo3::prelude::*;
 use serde::Serialize;
@@ -38,6 +39,11 @@ impl Answer {
 
 #[pymethods]
 impl Answer {
+    /// The value of a key of the document as a tuple of one; none for a list, an object, or a key that is not there.
+    fn plain<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Option<(Bound<'py, PyAny>,)>> {
+        Ok(plain_value(py, &self.json, key)?.map(|value| (value,)))
+    }
+
     /// The picture as SVG; none for a result without one.
     fn svg(&self, py: Python<'_>) -> PyResult<Option<String>> {
         py.detach(|| self.draw.as_ref().map(|draw| draw()).transpose()).map_err(raise)

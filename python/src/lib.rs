@@ -14,6 +14,7 @@ mod gate;
 mod identify;
 mod margins;
 mod picture;
+mod plain;
 mod plant;
 mod refusal;
 mod rows;

@@ -101,3 +101,14 @@ def test_diagnose(program, practice, tmp_path):
     assert found.report == (tmp_path / "report.html").read_text()
     if found.corrected is not None:
         assert found.corrected.to_toml() == (tmp_path / "plant_corrected.toml").read_text()
+
+
+def test_every_attribute_is_its_key_of_the_document(healthy, nominal):
+    document = st.margins(healthy, nominal).to_dict()
+    assert {type(value) for value in document.values()} >= {bool, int, float, list}
+    for key, value in document.items():
+        # A result that nobody has looked at yet finds its number without the rest of the document.
+        found = getattr(st.margins(healthy, nominal), key)
+        assert (type(found), found) == (type(value), value), key
+    with pytest.raises(AttributeError, match="expected one of: .*phase_margin_deg"):
+        _ = st.margins(healthy, nominal).phase_margin

@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import sqlite3
+import sys
 import time
 from contextlib import nullcontext
 from importlib import import_module
@@ -188,3 +189,14 @@ def test_refusals(tmp_path):
         floor.run(tmp_path, out=tmp_path)
     with pytest.raises(st.FleetRefused, match="FLEET.toml"):
         floor.run(tmp_path / "FLEET.toml", out=tmp_path / "out")
+
+
+def test_numbers_and_packages_that_are_not_there(fleet, tmp_path, monkeypatch):
+    for words, said in [({"batch": 0}, "batch: found 0"), ({"workers": -1}, "workers: found -1"), ({"pages": -2}, "pages: found -2")]:
+        with pytest.raises(ValueError, match=said):
+            floor.run(fleet, out=tmp_path / "none", **words)
+    assert not (tmp_path / "none").exists()
+    # As on a machine without Dask.
+    monkeypatch.setitem(sys.modules, "dask", None)
+    with pytest.raises(ImportError, match=r"engine dask: found no package 'dask'; expected it here: pip install 'servotune\[dask\]'"):
+        floor.run(fleet, engine="dask", out=tmp_path)

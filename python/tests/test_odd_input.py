@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -192,3 +195,19 @@ def test_a_file_that_cannot_be_written_leaves_what_was_there(nominal, tmp_path):
     assert file.read_text() == "before" and [f.name for f in tmp_path.iterdir()] == ["controller.toml"]
     nominal.to_toml(file)
     assert file.read_text() == nominal.to_toml() and [f.name for f in tmp_path.iterdir()] == ["controller.toml"]
+
+
+def test_systems_of_many_channels():
+    control = pytest.importorskip("control")
+    first = control.tf([1.0], [1.0, 2.0])
+    many = control.tf([[first.num[0][0]] * 2], [[first.den[0][0]] * 2])
+    for system in (many, control.ss([[-1.0]], [[1.0, 2.0]], [[1.0]], [[0.0, 0.0]])):
+        with pytest.raises(ValueError, match="found 2 inputs and 1 outputs; expected one of each"):
+            st.Plant.from_control(system)
+
+
+def test_plants_and_controllers_go_to_other_processes(healthy, nominal):
+    for thing in (healthy, nominal):
+        again = pickle.loads(pickle.dumps(thing))
+        assert type(again) is type(thing) and again.to_toml() == thing.to_toml()
+    assert copy.deepcopy(healthy).to_dict() == healthy.to_dict()

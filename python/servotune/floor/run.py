@@ -15,6 +15,7 @@ from servotune import ServotuneError, _core
 from servotune.document import PathLike
 from servotune.floor.source import fleet_file
 from servotune.floor.task import Found, Spread, Task
+from servotune.numbers import count
 
 #: Engines and the modules that speak to them.
 ENGINES = {
@@ -73,6 +74,9 @@ def run(
     """
     if engine not in ENGINES:
         raise ValueError(f"engine: found {engine!r}; expected one of: {', '.join(ENGINES)}")
+    workers, batch, pages = count(workers, "workers"), count(batch, "batch"), count(pages, "pages")
+    if batch == 0:
+        raise ValueError("batch: found 0; expected at least one slot in a task")
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
     fleet = fleet_file(source, spec, out, controller, gate).resolve()
@@ -80,12 +84,14 @@ def run(
     floor = _core.Floor(fleet, out, name, who or getpass.getuser(), now)
     # An engine is not started where all is done: what is left is the end.
     nothing_left = not (floor.pilots_left() or floor.slots_left())
-    started = nullcontext(None) if nothing_left else import_module(ENGINES[engine]).engine(workers)
     try:
+        started = nullcontext(None) if nothing_left else import_module(ENGINES[engine]).engine(workers)
         with started as spread:
             on_slots(floor, fleet, spread, engine, workers, batch, said)
     except ServotuneError:
         raise
+    except ModuleNotFoundError as e:
+        raise ImportError(f"engine {engine}: found no package {e.name!r}; expected it here: pip install 'servotune[{engine}]'") from e
     except Exception as e:
         raise EngineFailed(
             f"{fleet}: {engine} gave up: {e}; {floor.slots() - len(floor.slots_left())} of {floor.slots()} slots are done and kept; "

@@ -36,6 +36,7 @@ pub(super) fn sign_changes(
     let f = |w: f64| level(l.at(w));
     let root = |a: f64, fa: f64, b: f64, fb: f64| bracketed_root(f, a, fa, b, fb, TOLERANCE * b);
     let mut found = Vec::new();
+    let mut dips = Vec::new();
     for i in 1..g.len() {
         let ([a, b], [from, to]) = ([g[i - 1], g[i]], [w[i - 1], w[i]]);
         if a == 0.0 {
@@ -43,16 +44,22 @@ pub(super) fn sign_changes(
         } else if a * b < 0.0 {
             found.push(root(from, a, to, b));
         } else if a.abs().min(b.abs()) < reach(trace.value[i - 1]).max(reach(trace.value[i])) {
-            // The level may reach through zero and back between the points: where it goes towards zero at the one and away from it at the other.
-            let s = b.signum();
-            let (falls, rises) = (s * (f(from * (1.0 + NEXT)) - a) < 0.0, s * (b - f(to * (1.0 - NEXT))) > 0.0);
-            if falls && rises {
-                let (dip, value) = brent_minimum(|x| s * f(x), from, to, 1e-12 * from);
-                if value < 0.0 {
-                    found.push(root(from, a, dip, s * value));
-                    found.push(root(dip, s * value, to, b));
-                }
-            }
+            dips.push(i);
+        }
+    }
+    // The level may reach through zero and back between the points: where it goes towards zero at the one and away from it at the other.
+    // Many points lie near a level, few of them so, and a loop tells of many at once sooner than of each.
+    let step = |i: usize, from: usize, beside| g[i].signum() * (level(beside) - g[from]);
+    let behind: Vec<f64> = dips.iter().map(|&i| w[i - 1] * (1.0 + NEXT)).collect();
+    let falling = dips.into_iter().zip(l.at_each(&behind)).filter(|&(i, v)| step(i, i - 1, v) < 0.0);
+    let dips: Vec<usize> = falling.map(|(i, _)| i).collect();
+    let before: Vec<f64> = dips.iter().map(|&i| w[i] * (1.0 - NEXT)).collect();
+    for (i, _) in dips.into_iter().zip(l.at_each(&before)).filter(|&(i, v)| step(i, i, v) < 0.0) {
+        let ([a, b], [from, to], s) = ([g[i - 1], g[i]], [w[i - 1], w[i]], g[i].signum());
+        let (dip, value) = brent_minimum(|x| s * f(x), from, to, 1e-12 * from);
+        if value < 0.0 {
+            found.push(root(from, a, dip, s * value));
+            found.push(root(dip, s * value, to, b));
         }
     }
     found.sort_by(f64::total_cmp);
@@ -70,8 +77,10 @@ pub(super) fn gain_crossings(l: &impl OpenLoop, trace: &Trace) -> Vec<Crossing> 
 /// Phase crossings with their gain margins, -20 lg |L|; the end of the loop counts where L is real and negative there.
 pub(super) fn phase_crossings(l: &impl OpenLoop, trace: &Trace) -> Vec<Crossing> {
     let end = l.end_rad_s();
-    let mut at: Vec<f64> =
-        sign_changes(l, trace, |v| v.im, |v| TURN * v.norm()).into_iter().filter(|&w| w < end * (1.0 - 1e-9)).collect();
+    let mut at: Vec<f64> = sign_changes(l, trace, |v| v.im, |v| TURN * v.norm_sqr().sqrt())
+        .into_iter()
+        .filter(|&w| w < end * (1.0 - 1e-9))
+        .collect();
     if l.ends_at_half_rate() {
         at.push(end);
     }

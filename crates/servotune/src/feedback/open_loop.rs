@@ -1,7 +1,7 @@
 //! What a loop must offer to be judged, and the loop of a model.
 
 use super::frequency_grid;
-use crate::lti::{DiscretePlant, Sections};
+use crate::lti::{DiscretePlant, Sections, chain_at_each};
 use nalgebra::Complex;
 use thiserror::Error;
 
@@ -9,6 +9,10 @@ use thiserror::Error;
 pub trait OpenLoop {
     /// L(e^{j w T}) at `w_rad_s` (rad/s).
     fn at(&self, w_rad_s: f64) -> Complex<f64>;
+    /// The same at each of some frequencies, for loops that have a faster way to many.
+    fn at_each(&self, w_rad_s: &[f64]) -> Vec<Complex<f64>> {
+        w_rad_s.iter().map(|&w| self.at(w)).collect()
+    }
     /// Ascending frequencies (rad/s) that no mode slips through.
     fn grid(&self) -> Vec<f64>;
     /// The frequency (rad/s) at which the loop ends: half the sample rate, or the last point of the sweep.
@@ -111,6 +115,14 @@ impl OpenLoop for ModelLoop<'_> {
     fn at(&self, w: f64) -> Complex<f64> {
         let z = Complex::from_polar(1.0, w * self.sections.sample_time_s);
         self.plant.at_z(z) * self.sections.at_delay(z.conj())
+    }
+
+    fn at_each(&self, w: &[f64]) -> Vec<Complex<f64>> {
+        let z: Vec<_> = w.iter().map(|w| Complex::from_polar(1.0, w * self.sections.sample_time_s)).collect();
+        let back: Vec<_> = z.iter().map(|z| z.conj()).collect();
+        let mut all = self.plant.at_each(&z);
+        all.iter_mut().zip(chain_at_each(&self.sections.chain, &back)).for_each(|(p, c)| *p *= c);
+        all
     }
 
     fn grid(&self) -> Vec<f64> {

@@ -24,13 +24,13 @@ impl Trace {
     pub fn of(l: &impl OpenLoop) -> Trace {
         let grid = l.grid();
         let mut t = Trace { w_rad_s: Vec::with_capacity(2 * grid.len()), value: Vec::with_capacity(2 * grid.len()) };
-        let Some(&first) = grid.first() else { return t };
-        let mut left = (first, l.at(first));
+        let values = l.at_each(&grid);
+        let Some(mut left) = grid.iter().copied().zip(values.iter().copied()).next() else { return t };
         t.w_rad_s.push(left.0);
         t.value.push(left.1);
         let mut waiting: Vec<(f64, Complex<f64>, usize)> = Vec::with_capacity(DEPTH + 1);
-        for &w in &grid[1..] {
-            waiting.push((w, l.at(w), 0));
+        for (&w, &value) in grid.iter().zip(&values).skip(1) {
+            waiting.push((w, value, 0));
             while let Some(&(right_w, right, depth)) = waiting.last() {
                 if depth < DEPTH && !surely_near(left.1, right) && too_far(left.1, right) {
                     let middle = 0.5 * (left.0 + right_w);

@@ -248,8 +248,13 @@ impl FrequencyResponse for DiscretePlant {
 impl DiscretePlant {
     /// P(z) on the unit circle.
     pub(crate) fn at_z(&self, z: Complex<f64>) -> Complex<f64> {
+        let [now, before] = widest(Modes { plant: self, z });
+        self.with_delay(z, now, before)
+    }
+
+    /// P(z) of what the terms give, of the newest command and of the one before: the double integrator and the delay added.
+    pub(super) fn with_delay(&self, z: Complex<f64>, mut now: Complex<f64>, mut before: Complex<f64>) -> Complex<f64> {
         let t = self.sample_time_s;
-        let [mut now, mut before] = widest(Modes { plant: self, z });
         if self.rigid2 != 0.0 {
             let (h, d) = (t - self.rest_s, self.rest_s);
             let step = z - 1.0;

@@ -6,6 +6,7 @@
 mod curve_entry;
 mod discrete;
 mod lanes;
+mod many;
 mod modal;
 mod physics_entry;
 mod plant;
@@ -27,6 +28,7 @@ mod term_answers;
 pub use curve_entry::{CurveEntry, CurveKnot};
 pub use discrete::{DiscretePlant, Intersample, RealForm};
 pub use lanes::{CHUNK, LaneChunk, PlantLanes};
+pub(crate) use many::chain_at_each;
 pub use modal::{ModalForm, ModalTerm};
 pub use physics_entry::PhysicsEntry;
 pub use plant::{Body, LtiError, Mode, Plant};

@@ -9,6 +9,7 @@ pub mod least_squares;
 pub mod levenberg;
 pub mod peaks;
 pub mod polynomial;
+pub mod powers;
 pub mod random;
 pub mod root;
 pub mod spectrum;
