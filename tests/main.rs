@@ -59,6 +59,7 @@ mod physics_curves;
 mod physics_entries;
 mod physics_laws;
 mod physics_modes;
+mod physics_play;
 mod physics_stiff;
 mod physics_use;
 mod program_common;

@@ -57,7 +57,7 @@ fn describing_functions_of_the_textbook() {
     close(df(AmplifierLag { time_constant_s: 2e-3 }, 1.0, a, w), lag, 3e-3);
     // Play of gap g: fundamental of the loop; energy (area) 2 g (2 A - g) a cycle is pi A² Im N.
     let g = 0.4;
-    let n = df(Backlash { gap: g }, 1.0, a, w);
+    let n = df(Backlash { gap: g, contact: None }, 1.0, a, w);
     assert!((n.im.abs() * PI * a * a - g * (2.0 * a - g)).abs() < 1e-5, "{n}");
 }
 

@@ -65,14 +65,14 @@ pub fn close(found: Complex<f64>, expected: Complex<f64>, tolerance: f64) {
 }
 
 /// The states at every sample, from rest under a held input, by the classical method of Runge and Kutta with `steps` steps a sample.
-pub fn runge_kutta(
+pub fn runge_kutta<const N: usize>(
     u: &[f64],
     sample_time_s: f64,
     steps: usize,
-    slope: impl Fn(f64, [f64; 3]) -> [f64; 3],
-) -> Vec<[f64; 3]> {
-    let add = |s: [f64; 3], k: [f64; 3], h: f64| -> [f64; 3] { std::array::from_fn(|i| s[i] + h * k[i]) };
-    let (mut s, h, mut out) = ([0.0; 3], sample_time_s / steps as f64, Vec::new());
+    slope: impl Fn(f64, [f64; N]) -> [f64; N],
+) -> Vec<[f64; N]> {
+    let add = |s: [f64; N], k: [f64; N], h: f64| -> [f64; N] { std::array::from_fn(|i| s[i] + h * k[i]) };
+    let (mut s, h, mut out) = ([0.0; N], sample_time_s / steps as f64, Vec::new());
     for u in u {
         out.push(s);
         for _ in 0..steps {

@@ -146,9 +146,7 @@ fn run(a: &StudyArguments, say: &mut (dyn FnMut(&str) + Send)) -> Result<Vec<Pat
             Pages(study::abroad(&a.data, &a.cases, known.as_deref(), say)?)
         }
         StudyName::SealedDigests => Pages(study::digests(a.seed, a.count)),
-        StudyName::Sealed if !a.cases.is_empty() => {
-            Pages(study::sealed_cases(a.seed, a.count, &a.cases, say)?)
-        }
+        StudyName::Sealed if !a.cases.is_empty() => Pages(study::sealed_cases(a.seed, a.count, &a.cases, say)?),
         StudyName::Sealed => {
             let known = std::fs::read_to_string(a.out.join("mismatch/sealed_digests.txt")).ok();
             Pages(study::sealed(a.seed, a.count, known.as_deref(), say)?)

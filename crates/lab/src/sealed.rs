@@ -226,10 +226,7 @@ pub fn sealed_cases(
 }
 
 /// Diagnoses of the cases, each line said as it is known.
-fn rows(
-    cases: &[SealedCase],
-    say: &mut (dyn FnMut(&str) + Send),
-) -> Result<Vec<(Row, Option<Diagnosis>)>, StudyError> {
+fn rows(cases: &[SealedCase], say: &mut (dyn FnMut(&str) + Send)) -> Result<Vec<(Row, Option<Diagnosis>)>, StudyError> {
     let say = Mutex::new(say);
     let one = |case: &SealedCase| {
         let (row, diagnosis) = case.diagnosed()?;

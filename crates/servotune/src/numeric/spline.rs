@@ -10,9 +10,17 @@ use nalgebra::{DMatrix, DVector};
 pub struct Spline {
     at: Vec<f64>,
     value: Vec<f64>,
-    /// Second derivative at the points; 0 at both ends.
-    curvature: Vec<f64>,
+    /// Of each interval: value, slope, half the second and a sixth of the third derivative where it begins.
+    cubic: Vec<[f64; 4]>,
+    /// The slope at the last point.
+    end_slope: f64,
+    /// Buckets of one width over the points: the interval in which each begins.
+    buckets: Vec<u32>,
+    to_a_unit: f64,
 }
+
+/// Buckets to an interval.
+const BUCKETS: usize = 4;
 
 /// Second differences of the values, and the matrix that turns second derivatives into them: R c = Qᵀ f.
 fn bands(at: &[f64]) -> (DMatrix<f64>, DMatrix<f64>) {
@@ -41,7 +49,22 @@ impl Spline {
         if let Some(solved) = r.cholesky().map(|c| c.solve(&right)) {
             curvature[1..=solved.len()].copy_from_slice(solved.as_slice());
         }
-        Spline { at, value, curvature }
+        let cubic: Vec<[f64; 4]> = (0..at.len() - 1)
+            .map(|i| {
+                let h = at[i + 1] - at[i];
+                let rise = (value[i + 1] - value[i]) / h;
+                let slope = rise - h * (2.0 * curvature[i] + curvature[i + 1]) / 6.0;
+                [value[i], slope, 0.5 * curvature[i], (curvature[i + 1] - curvature[i]) / (6.0 * h)]
+            })
+            .collect();
+        let last = at.len() - 1;
+        let h = at[last] - at[last - 1];
+        let end_slope = (value[last] - value[last - 1]) / h + h * (curvature[last - 1] + 2.0 * curvature[last]) / 6.0;
+        let to_a_unit = (BUCKETS * last) as f64 / (at[last] - at[0]);
+        let begins = |b: usize| at[0] + b as f64 / to_a_unit;
+        let interval = |x: f64| at.partition_point(|a| *a <= x).clamp(1, last) - 1;
+        let buckets = (0..BUCKETS * last).map(|b| interval(begins(b)) as u32).collect();
+        Spline { at, value, cubic, end_slope, buckets, to_a_unit }
     }
 
     /// Where its points are.
@@ -55,32 +78,44 @@ impl Spline {
     }
 
     /// The interval that holds `x`, the first or the last beyond the ends.
+    #[inline]
     fn interval(&self, x: f64) -> usize {
-        self.at.partition_point(|a| *a <= x).clamp(1, self.at.len() - 1) - 1
+        let bucket = (((x - self.at[0]) * self.to_a_unit) as usize).min(self.buckets.len() - 1);
+        let mut i = self.buckets[bucket] as usize;
+        while i + 2 < self.at.len() && self.at[i + 1] <= x {
+            i += 1;
+        }
+        while i > 0 && self.at[i] > x {
+            i -= 1;
+        }
+        i
     }
 
     /// The value at `x`.
+    #[inline]
     pub fn value(&self, x: f64) -> f64 {
-        let (first, last) = (self.at[0], self.at[self.at.len() - 1]);
-        if x < first || x > last {
-            let end = x.clamp(first, last);
-            return self.value(end) + self.slope(end) * (x - end);
+        let last = self.at.len() - 1;
+        if x < self.at[0] {
+            return self.value[0] + self.cubic[0][1] * (x - self.at[0]);
+        }
+        if x > self.at[last] {
+            return self.value[last] + self.end_slope * (x - self.at[last]);
         }
         let i = self.interval(x);
-        let h = self.at[i + 1] - self.at[i];
-        let (a, b) = ((self.at[i + 1] - x) / h, (x - self.at[i]) / h);
-        let bend = (a * a * a - a) * self.curvature[i] + (b * b * b - b) * self.curvature[i + 1];
-        a * self.value[i] + b * self.value[i + 1] + bend * h * h / 6.0
+        let (d, [a, b, c, e]) = (x - self.at[i], self.cubic[i]);
+        a + d * (b + d * (c + d * e))
     }
 
     /// The slope at `x`.
     pub fn slope(&self, x: f64) -> f64 {
-        let x = x.clamp(self.at[0], self.at[self.at.len() - 1]);
+        let last = self.at.len() - 1;
+        if x >= self.at[last] {
+            return self.end_slope;
+        }
+        let x = x.max(self.at[0]);
         let i = self.interval(x);
-        let h = self.at[i + 1] - self.at[i];
-        let (a, b) = ((self.at[i + 1] - x) / h, (x - self.at[i]) / h);
-        let bend = (3.0 * b * b - 1.0) * self.curvature[i + 1] - (3.0 * a * a - 1.0) * self.curvature[i];
-        (self.value[i + 1] - self.value[i]) / h + bend * h / 6.0
+        let (d, [_, b, c, e]) = (x - self.at[i], self.cubic[i]);
+        b + d * (2.0 * c + 3.0 * d * e)
     }
 }
 

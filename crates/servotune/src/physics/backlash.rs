@@ -121,7 +121,9 @@ impl Apart {
             Body::SecondOrder { natural_frequency_rad_s: w0, damping_ratio, .. } if w0 < SPRING * w => {
                 [w0 * w0, 2.0 * damping_ratio * w0]
             }
-            Body::FreeInertia { viscous_rate_per_s, .. } if viscous_rate_per_s < SPRING * w => [0.0, viscous_rate_per_s],
+            Body::FreeInertia { viscous_rate_per_s, .. } if viscous_rate_per_s < SPRING * w => {
+                [0.0, viscous_rate_per_s]
+            }
             _ => [0.0; 2],
         };
         let steps = (w * scene.sample_time_s / PHASE).ceil().clamp(1.0, STEPS);

@@ -68,7 +68,8 @@ static TORQUE_OVER_VELOCITY: Facts = made(Port::Torque, Entry::Torque, "tau = u 
 static AMPLIFIER_OVER_COMMAND: Facts = made(Port::Amplifier, Entry::Command, "i = f(u), f a natural cubic spline");
 static GAIN_OVER_POSITION: Facts = made(Port::Torque, Entry::Torque, "tau = f(x) u, f a natural cubic spline");
 static GAIN_OVER_TIME: Facts = made(Port::Torque, Entry::Torque, "tau = f(t) u, f a natural cubic spline");
-static TORQUE_OVER_TIME: Facts = made(Port::Torque, Entry::Torque, "tau = u + f(t), f a natural cubic spline, t from the start of a record");
+static TORQUE_OVER_TIME: Facts =
+    made(Port::Torque, Entry::Torque, "tau = u + f(t), f a natural cubic spline, t from the start of a record");
 static TORQUE_OVER_LOADING: Facts = made(
     Port::Torque,
     Entry::Torque,
@@ -252,11 +253,6 @@ impl Sliders {
 pub(crate) fn slider_stiffness(at: &[f64], value: &[f64]) -> Vec<f64> {
     let slope = |i: usize| if i + 1 < at.len() { (value[i + 1] - value[i]) / (at[i + 1] - at[i]) } else { 0.0 };
     (0..at.len().saturating_sub(1)).map(|i| slope(i) - slope(i + 1)).collect()
-}
-
-/// The level of each slider of a loading curve: what it holds while it slides.
-pub(crate) fn slider_levels(at: &[f64], value: &[f64]) -> Vec<f64> {
-    slider_stiffness(at, value).iter().zip(at.iter().skip(1)).map(|(k, a)| k * (a - at[0])).collect()
 }
 
 /// A loading curve in motion.

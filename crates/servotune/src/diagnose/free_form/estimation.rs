@@ -9,6 +9,7 @@ use super::left_out::LeftOut;
 use super::shape::Shape;
 use super::stretches::Stretches;
 use super::trial::Trial;
+use crate::diagnose::data::linear_form::body_numbers;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::rules::{CURVE_CLEARLY, CURVE_LAG, FOLD_NAMED, SECOND_CURVE};
 use crate::lti::Plant;
@@ -42,6 +43,29 @@ pub(in crate::diagnose) struct Curved {
     pub share: f64,
 }
 
+impl Curved {
+    /// The same curve beside another plant: what either holds of gain, spring and damper goes over to the other.
+    fn beside(&self, plant: &Plant) -> Option<Shape> {
+        let Shape::Curve(port, at, value) = &self.shape else { return None };
+        let numbers = |p: &Plant| {
+            let (b, k, c) = body_numbers(&p.body);
+            (b * p.resonance_gain, k, c)
+        };
+        let ((b, k, c), (gain, spring, damper)) = (numbers(plant), numbers(&self.plant));
+        let of_command =
+            matches!(port, CurvePort::AmplifierOverCommand | CurvePort::GainOverPosition | CurvePort::GainOverTime);
+        let line = match port {
+            CurvePort::TorqueOverPosition => (k - spring) / b,
+            CurvePort::TorqueOverLoading => (spring - k) / b,
+            CurvePort::TorqueOverVelocity => (c - damper) / b,
+            _ => 0.0,
+        };
+        let ratio = if of_command || line != 0.0 { gain / b } else { 1.0 };
+        let value = at.iter().zip(value).map(|(a, v)| ratio * v + line * a).collect();
+        Some(Shape::Curve(*port, at.clone(), value))
+    }
+}
+
 /// What the estimation of curves came to.
 pub(in crate::diagnose) struct Estimated<'a> {
     /// The linear plant fitted in the same way.
@@ -60,6 +84,9 @@ pub(in crate::diagnose) struct Estimated<'a> {
 const CHOICES: usize = 2;
 /// Times that the knots of the best curve are doubled.
 const FINER: usize = 2;
+/// Shares of the linear balance below which a curve balances well, and above which it does not beside such a one.
+const BALANCES: f64 = 0.3;
+const BALANCES_NOT: f64 = 0.8;
 /// Time constant from which a lag sets out (samples).
 const LAG: f64 = 3.0;
 /// Share of the readings below the place where a fold is taken to lie at first, and share of the range below that which makes an edge: the
@@ -248,13 +275,16 @@ pub(in crate::diagnose) fn estimated<'a>(
     for port in CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition) {
         let [name, argument] = port.names();
         progress(&format!("a curve without a name: {name} over {argument}"));
-        let idle = Shape::knots(bench, port).and_then(|at| from_each(bench, ground, &from, &Shape::idle(port, at)));
         // The balance of torques knows nothing of the given plant, which what acts may have bent.
         let balanced = curves.iter().find(|c| c.shape.port() == Some(port));
-        let balanced = balanced.and_then(|c| {
-            let p = bench.form.numbers_of(&c.plant)?;
-            foretold(Trial::new(bench, ground, &p, c.shape.clone()))
-        });
+        let share = balanced.map_or(1.0, |c| c.share);
+        // Where one port balances well, one that does not is not it; where this one does, its curve is the start.
+        if share > BALANCES_NOT && curves.iter().any(|c| c.share < BALANCES) {
+            continue;
+        }
+        let idle = Shape::knots(bench, port).filter(|_| share > BALANCES);
+        let idle = idle.and_then(|at| from_each(bench, ground, &from, &Shape::idle(port, at)));
+        let balanced = balanced.and_then(|c| from_balance(bench, ground, c, &from));
         taken(port, better(idle, balanced));
     }
     progress("a curve without a name: sensor over position");
@@ -283,6 +313,24 @@ pub(in crate::diagnose) fn estimated<'a>(
     }
     let plain = in_plain_form(&curve)?;
     Some(Estimated { linear, curve, plain, reading, tried })
+}
+
+/// The fit of a shape from the curve of a balance, with the plant beside which it simulates best: its own, or one of some others.
+fn from_balance<'a>(
+    bench: &'a DiagnosisData,
+    ground: &'a Stretches,
+    curve: &Curved,
+    others: &[Vec<f64>],
+) -> Option<Foretelling<'a>> {
+    let own = bench.form.numbers_of(&curve.plant);
+    let beside = |p: &Vec<f64>| {
+        let shape = curve.beside(&bench.form.plant(p))?;
+        let mut trial = Trial::new(bench, ground, p, shape);
+        let left = trial.left();
+        left.is_finite().then_some((left, trial))
+    };
+    let best = own.iter().chain(others).filter_map(beside).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    foretold(best.1)
 }
 
 /// The best curve at another port beside a reading that folds or ends at limits.

@@ -1,7 +1,8 @@
 //! What of a curve the linear plant can hold, given to the linear plant: the rest is the curve's own.
 //!
 //! In: a curve, the covariance of its values, the linear parameters. Out: the same in its plain form. A torque keeps no mean, and no line
-//! where the plant has a spring or a damper for it (the line of least squares over the samples); a loading curve begins at 0; a gain has the mean 1; an amplifier gives 0
+//! where the plant has a spring or a damper for it (the line of least squares over the samples); a loading curve begins at 0
+//! and keeps no line at its end where the plant has a spring for it; a gain has the mean 1; an amplifier gives 0
 //! for 0 and rises by 1 on the mean; a sensor rises or falls by 1 on the mean.
 
 use crate::diagnose::data::linear_form::{FreeParameter, LinearForm, body_numbers, rate_of};
@@ -28,6 +29,8 @@ pub(in crate::diagnose) struct Plain {
 const LEAST: f64 = 1e-3;
 /// Least stiffness over the given one, and least damping over its unit, that a curve's line may leave.
 const LEFT: f64 = 0.02;
+/// Share of the longest way behind which a loading curve is all spring.
+const TAIL: f64 = 0.4;
 
 /// How many samples lie near each knot; even for a sensor, behind whose curve nobody saw the arm, and for a loading curve, whose ways nest.
 fn weights(bench: &DiagnosisData, port: CurvePort, at: &[f64]) -> Vec<f64> {
@@ -54,6 +57,8 @@ fn knob(form: &LinearForm, p: &[f64], port: CurvePort) -> Option<(usize, f64)> {
     let gain = b * form.given.resonance_gain * ratio;
     let (wanted, unit) = match port {
         CurvePort::TorqueOverPosition => (FreeParameter::Stiffness, k),
+        // A torque that resists is counted the other way round.
+        CurvePort::TorqueOverLoading => (FreeParameter::Stiffness, -k),
         CurvePort::TorqueOverVelocity => (FreeParameter::Viscous, rate_of(&form.given.body)),
         _ => return None,
     };
@@ -112,8 +117,19 @@ pub(in crate::diagnose) fn plain(
             &map * &theta
         }
         CurvePort::TorqueOverLoading => {
-            map.column_mut(0).fill(0.0);
-            map.column_mut(0).iter_mut().skip(1).for_each(|v| *v = -1.0);
+            // What still rises behind all turns is a spring.
+            let behind: Vec<f64> = at.iter().map(|a| f64::from(u8::from(*a > TAIL * at[n - 1]))).collect();
+            let count: f64 = behind.iter().sum();
+            let behind: Vec<f64> = behind.iter().map(|w| w / count).collect();
+            let slope = slope_of(at, &behind);
+            if let Some((i, by)) = knob(&bench.form, p, port) {
+                let full = by * slope.dot(&theta);
+                let moved = full.max(LEFT - 1.0 - p[i]);
+                out.p[i] += moved;
+                map -= &places * slope.transpose() * if full == 0.0 { 1.0 } else { moved / full };
+            }
+            let first = map.row(0).into_owned();
+            map.row_iter_mut().for_each(|mut row| row -= &first);
             &map * &theta
         }
         CurvePort::GainOverPosition | CurvePort::GainOverTime => {

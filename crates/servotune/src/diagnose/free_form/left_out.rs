@@ -34,13 +34,7 @@ const ORDER: usize = 12;
 
 impl LeftOut {
     /// Of a fit at `x` whose rows stand in blocks, each with its length and the part that it belongs to; `rough` belongs to the last numbers.
-    pub fn new(
-        of: &[(usize, usize)],
-        r: &[f64],
-        j: &DMatrix<f64>,
-        x: &[f64],
-        rough: &DMatrix<f64>,
-    ) -> LeftOut {
+    pub fn new(of: &[(usize, usize)], r: &[f64], j: &DMatrix<f64>, x: &[f64], rough: &DMatrix<f64>) -> LeftOut {
         let (m, mut from) = (x.len(), 0);
         let mut blocks = Vec::new();
         for &(len, part) in of {

@@ -8,7 +8,8 @@ use crate::diagnose::rules::{CURVE_LIKE, CURVE_LOPSIDED};
 use crate::numeric::least_squares::Qr;
 use crate::physics::{
     CurvePort, Facts, aerodynamic_drag, cable_spring, coulomb_friction, current_saturation, dead_band,
-    encoder_scale_error, gain_drift, nonlinear_spring, pivot_friction, sensor_curve, shock, torque_factor_rolloff, torque_ripple, unexplained,
+    encoder_scale_error, gain_drift, nonlinear_spring, pivot_friction, sensor_curve, shock, torque_factor_rolloff,
+    torque_ripple, unexplained,
 };
 
 /// The nearest law of the library.

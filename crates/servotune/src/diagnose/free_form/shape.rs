@@ -25,6 +25,8 @@ pub(in crate::diagnose) enum Shape {
 const KNOTS: usize = 17;
 /// Share of the samples beyond the first and the last knot: a curve is straight there.
 const BEYOND: f64 = 1e-3;
+/// Share of the longest loaded way at which the last slider slides: some samples lie beyond it.
+const REACHED: f64 = 0.98;
 
 impl Shape {
     /// Its numbers.
@@ -86,13 +88,18 @@ impl Shape {
         all.sort_by(f64::total_cmp);
         let off = (BEYOND * all.len() as f64) as usize;
         let [low, high] = [*all.get(off)?, *all.get(all.len().checked_sub(off + 1)?)?];
-        let [low, high] = if port == CurvePort::TorqueOverLoading { [0.0, high - low] } else { [low, high] };
+        if port == CurvePort::TorqueOverLoading {
+            let records = bench.trajectories.iter().map(|t| t.samples.iter().map(|s| arm * s.x).collect::<Vec<_>>());
+            return Shape::loading_knots(records, KNOTS);
+        }
         Some(Shape::spread(port, low, high)).filter(|_| low < high)
     }
 
     /// Knots from `low` to `high`. Dense around 0 where laws turn there: over velocity and command, and on a loading curve.
     pub fn spread(port: CurvePort, low: f64, high: f64) -> Vec<f64> {
-        Shape::spread_of(port, low, high, KNOTS)
+        // A gain drifts slowly over a session.
+        let count = if port == CurvePort::GainOverTime { KNOTS / 2 + 1 } else { KNOTS };
+        Shape::spread_of(port, low, high, count)
     }
 
     /// The same with a number of knots.
@@ -107,6 +114,17 @@ impl Shape {
             return (0..knots).map(|k| s(k).abs().powf(1.6) * if s(k) < 0.0 { low } else { high }).collect();
         }
         (0..knots).map(|k| low + share(k) * (high - low)).collect()
+    }
+
+    /// Knots of a loading curve over the longest way that is loaded: from where a record begins, or half a swing between two turns (Masing).
+    pub fn loading_knots(records: impl Iterator<Item = Vec<f64>>, knots: usize) -> Option<Vec<f64>> {
+        let one = |x: Vec<f64>| {
+            let first = x.first().copied().unwrap_or(0.0);
+            let (low, high) = x.iter().fold((first, first), |(a, b), v| (a.min(*v), b.max(*v)));
+            (high - first).max(first - low).max(0.5 * (high - low))
+        };
+        let reach = records.map(one).fold(0.0, f64::max);
+        (reach > 0.0).then(|| Shape::spread_of(CurvePort::TorqueOverLoading, 0.0, REACHED * reach, knots))
     }
 
     /// The curve that changes nothing.

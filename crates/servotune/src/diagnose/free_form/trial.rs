@@ -73,9 +73,11 @@ struct Made {
 /// Linear parameters that the shape leaves free: what it can hold itself stays.
 fn knobs(bench: &DiagnosisData, shape: &Shape) -> Vec<usize> {
     let held = match shape {
-        Shape::Curve(CurvePort::TorqueOverPosition, ..) => Some(FreeParameter::Stiffness),
+        Shape::Curve(CurvePort::TorqueOverPosition | CurvePort::TorqueOverLoading, ..) => {
+            Some(FreeParameter::Stiffness)
+        }
         Shape::Curve(CurvePort::TorqueOverVelocity, ..) => Some(FreeParameter::Viscous),
-        Shape::Curve(CurvePort::TorqueOverLoading | CurvePort::TorqueOverTime, ..) => None,
+        Shape::Curve(CurvePort::TorqueOverTime, ..) => None,
         Shape::Curve(..) => Some(FreeParameter::Gain),
         _ => None,
     };
@@ -241,6 +243,13 @@ impl<'a> Trial<'a> {
             }
             _ => Vec::new(),
         }
+    }
+
+    /// Sum of squares of the error where it stands, its starts found anew.
+    pub fn left(&mut self) -> f64 {
+        let x = self.numbers();
+        self.settle(&x);
+        size(&self.error(&x))
     }
 
     /// Moves to the least error; gives its sum of squares, roughness aside.

@@ -73,12 +73,15 @@ rules! {
     CURVE_NO_WORSE: f64 = 1.0, "ratio",
         "error on held-out records over that of the better linear model",
         "never worse than what was there";
-    CURVE_NAMED: f64 = 1.5, "noise",
+    CURVE_NAMED: f64 = 2.0, "noise",
         "error on held-out records under a loading curve up to which it is a drag by name",
-        "as for a law: down to the noise, or no name";
-    SLIDERS_PUSH: f64 = 0.15, "share",
-        "levels of the sliders of a loading curve that push, over those that resist, below which it is a drag",
+        "as for laws: a name leaves no several times the noise";
+    LOADING_FALLS: f64 = 0.15, "share",
+        "deepest fall of a loading curve over its height, below which it is a drag",
         "judgement: a drag takes energy; noise moves single knots";
+    LOADING_LEVEL: f64 = 0.6, "share",
+        "its value at the middle knot, an eighth of the way, over its height, above which it is a drag and no spring",
+        "a spring has an eighth there, a drag that slides all of it";
     CURVE_NEAR: f64 = 1.1, "ratio",
         "the same over that of a mixture of laws",
         "one curve instead of several laws may cost a tenth";

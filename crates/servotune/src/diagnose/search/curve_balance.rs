@@ -15,9 +15,10 @@ use crate::physics::{CurvePort, Sliders};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Knots of a curve; of one over time, where events are short.
+/// Knots of a curve; of one over the time of a record, where events are short; of one over the session, in which a gain drifts slowly.
 const KNOTS: usize = 33;
 const OVER_TIME: usize = 129;
+const SLOW: usize = 9;
 /// Share of the rows beyond the first and the last knot.
 const BEYOND: f64 = 1e-3;
 /// Stretches of each record, and parts of them that are left out in turn.
@@ -103,13 +104,20 @@ impl Balance<'_> {
     /// Knots over what the rows go over.
     fn knots(&self, port: CurvePort) -> Option<Vec<f64>> {
         let arm = self.arm(port);
-        let rows = self.parts.iter().flat_map(|p| p.rows.iter().map(move |&k| p.samples[k].scaled(arm)));
+        let rows = self.parts.iter().flat_map(|p| p.rows.iter().map(move |&k| p.sharp[k].scaled(arm)));
         let mut all: Vec<f64> = rows.map(|s| port.argument(&s)).filter(|a| a.is_finite()).collect();
         all.sort_by(f64::total_cmp);
         let off = (BEYOND * all.len() as f64) as usize;
         let [low, high] = [*all.get(off)?, *all.get(all.len().checked_sub(off + 1)?)?];
-        let [low, high] = if port == CurvePort::TorqueOverLoading { [0.0, high - low] } else { [low, high] };
-        let count = if port == CurvePort::TorqueOverTime { OVER_TIME } else { KNOTS };
+        if port == CurvePort::TorqueOverLoading {
+            let records = self.parts.iter().map(|p| p.sharp.iter().map(|s| arm * s.x).collect::<Vec<_>>());
+            return Shape::loading_knots(records, KNOTS);
+        }
+        let count = match port {
+            CurvePort::TorqueOverTime => OVER_TIME,
+            CurvePort::GainOverTime => SLOW,
+            _ => KNOTS,
+        };
         (low < high).then(|| Shape::spread_of(port, low, high, count))
     }
 
@@ -132,7 +140,7 @@ impl Balance<'_> {
             .into_par_iter()
             .map(|j| {
                 let of = |part: &Smoothed, r: usize| -> Vec<f64> {
-                    let hats = part.samples.iter().map(|s| hat(at, j, port.argument(&s.scaled(arm))));
+                    let hats = part.sharp.iter().map(|s| hat(at, j, port.argument(&s.scaled(arm))));
                     match port {
                         CurvePort::AmplifierOverCommand => {
                             let acts = held(&hats.collect::<Vec<_>>());
@@ -156,9 +164,9 @@ impl Balance<'_> {
         let mut sliders: Vec<Vec<f64>> = vec![Vec::with_capacity(self.total()); at.len() - 1];
         for part in &self.parts {
             let mut row = Sliders::of(at);
-            let mut stretch = vec![vec![0.0; part.samples.len()]; at.len() - 1];
-            for k in 1..part.samples.len() {
-                let dx = arm * (part.samples[k].x - part.samples[k - 1].x);
+            let mut stretch = vec![vec![0.0; part.sharp.len()]; at.len() - 1];
+            for k in 1..part.sharp.len() {
+                let dx = arm * (part.sharp[k].x - part.sharp[k - 1].x);
                 row.go(dx).iter().zip(&mut stretch).for_each(|(z, s)| s[k] = *z);
             }
             for (out, s) in sliders.iter_mut().zip(&stretch) {
@@ -175,9 +183,8 @@ impl Balance<'_> {
             let own = i.checked_sub(1);
             (0..total)
                 .map(|k| {
-                    let rises = before.map_or(0.0, |w| {
-                        w * (slider(own, k) - slider(own.and_then(|o| o.checked_sub(1)), k))
-                    });
+                    let rises =
+                        before.map_or(0.0, |w| w * (slider(own, k) - slider(own.and_then(|o| o.checked_sub(1)), k)));
                     let falls = behind.map_or(0.0, |w| w * (slider(Some(i), k) - slider(own, k)));
                     rises - falls
                 })
@@ -242,6 +249,13 @@ impl Balance<'_> {
         };
         let (mut viscous, mut stiffness) = (viscous, stiffness);
         match port {
+            // What still resists more behind all turns is a spring.
+            CurvePort::TorqueOverLoading => {
+                let from = at.len() / 2;
+                let rise = line(&at[from..], &value[from..]);
+                stiffness += gain * rise;
+                value.iter_mut().zip(&at).for_each(|(v, a)| *v -= rise * a);
+            }
             CurvePort::TorqueOverVelocity => viscous = (-gain * line(&at, &value)).max(0.0),
             CurvePort::TorqueOverPosition => stiffness = (-gain * line(&at, &value)).max(0.0),
             _ => {}
@@ -297,4 +311,3 @@ pub(in crate::diagnose) fn curves(balances: &[Balance]) -> Vec<Curved> {
     all.sort_by(|a, b| a.share.total_cmp(&b.share));
     all
 }
-

@@ -73,7 +73,17 @@ pub fn select(
         bootstrap(bench, library, &baseline, settings.iterations, settings.false_alarm, settings.bootstrap)
     });
     let model = baseline.clone();
-    let mut search = Search { bench, library, settings, baseline, model, steps: Vec::new(), retraced: 0, felt: false, disk_only: false };
+    let mut search = Search {
+        bench,
+        library,
+        settings,
+        baseline,
+        model,
+        steps: Vec::new(),
+        retraced: 0,
+        felt: false,
+        disk_only: false,
+    };
     while search.model.chosen.len() < settings.most && search.step(&mut progress) == Onward::Next {}
     search.finished(given, calibration, &mut progress)
 }

@@ -18,6 +18,9 @@ pub(in crate::diagnose) const SMOOTHINGS: [f64; 3] = [3.0, 8.0, 20.0];
 pub(super) const LATER: usize = 4;
 /// Smoothings between rows of the balance.
 const ROWS: f64 = 0.5;
+/// Widths of the filter that a curve's argument is seen through (samples), and what noise may make of the speed there, over the motion's.
+const SHARP: [f64; 6] = [1.0, 1.5, 2.5, 4.0, 6.0, 10.0];
+const BLUR: f64 = 0.03;
 /// Least natural frequency of a body that is made (rad/s): plants go down to a tenth of it.
 pub(super) const SLOWEST_RAD_S: f64 = 1e-3;
 /// A record's mean run, smoothed: its motion and what stands on both sides of the balance.
@@ -26,6 +29,8 @@ pub(in crate::diagnose) struct Smoothed {
     pub acceleration: Vec<f64>,
     /// Rows that are used.
     pub rows: Vec<usize>,
+    /// The motion smoothed no more than a curve's argument needs: what bends sharply must not be seen through a wide filter first.
+    pub sharp: Vec<Sample>,
 }
 
 /// Weights of a Gaussian, from its middle on.
@@ -43,35 +48,56 @@ pub(super) fn smooth(x: &[f64], k: usize, weights: &[f64]) -> f64 {
     weights[0] * x[k] + weights.iter().enumerate().skip(1).map(both).sum::<f64>()
 }
 
+/// The motion of a run behind a filter of these weights.
+fn motion(run: &Run, t: f64, weights: &[f64], spindle_rad_s: f64) -> Vec<Sample> {
+    let n = run.len();
+    let x: Vec<f64> = (0..n).map(|k| smooth(&run.position, k, weights)).collect();
+    let sample = |k: usize| Sample {
+        t: k as f64 * t,
+        session: run.began_s + k as f64 * t,
+        x: x[k],
+        v: (x[(k + 1).min(n - 1)] - x[k.saturating_sub(1)]) / (2.0 * t),
+        u: run.input[k],
+        i: run.input[k],
+        spindle_rad: run.spindle_rad.as_ref().map_or(spindle_rad_s * k as f64 * t, |s| s[k]),
+        temperature: run.temperature.as_ref().map_or(0.0, |c| c[k]),
+    };
+    (0..n).map(sample).collect()
+}
+
+/// The narrowest of some filters behind which the noise's speed is small beside the motion's.
+fn sharpest(means: &[Run], t: f64, width: f64) -> f64 {
+    let noise = roughness(means);
+    let square: f64 = means.iter().flat_map(|m| m.position.windows(2)).map(|w| ((w[1] - w[0]) / t).powi(2)).sum();
+    let count: usize = means.iter().map(Run::len).sum();
+    let speed = (square / count.max(1) as f64 - 2.0 * (noise / t).powi(2)).max(0.0).sqrt();
+    let narrow = SHARP.into_iter().find(|w| jitter(noise, t, *w) < BLUR * speed);
+    narrow.unwrap_or(width).min(width)
+}
+
+/// Speed that white noise makes behind a Gaussian of this width (rms).
+fn jitter(noise: f64, t: f64, width: f64) -> f64 {
+    noise / (2.0 * std::f64::consts::PI.sqrt().sqrt() * width.powf(1.5) * t)
+}
+
 impl Smoothed {
     /// Of rows, those whose speed is above `slides` (position_unit/s).
-    fn of(run: &Run, t: f64, width: f64, slides: f64, spindle_rad_s: f64) -> Smoothed {
-        let (weights, n) = (weights(width), run.len());
-        let x: Vec<f64> = (0..n).map(|k| smooth(&run.position, k, &weights)).collect();
-        let beside = |k: usize| [x[k.saturating_sub(1)], x[k], x[(k + 1).min(n - 1)]];
-        let sample = |k: usize| {
-            let [before, here, after] = beside(k);
-            Sample {
-                t: k as f64 * t,
-                session: run.began_s + k as f64 * t,
-                x: here,
-                v: (after - before) / (2.0 * t),
-                u: run.input[k],
-                i: run.input[k],
-                spindle_rad: run.spindle_rad.as_ref().map_or(spindle_rad_s * k as f64 * t, |s| s[k]),
-                temperature: run.temperature.as_ref().map_or(0.0, |c| c[k]),
-            }
-        };
+    fn of(run: &Run, t: f64, [width, sharp]: [f64; 2], slides: f64, spindle_rad_s: f64) -> Smoothed {
+        let n = run.len();
+        let sharp = motion(run, t, &weights(sharp), spindle_rad_s);
+        let weights = weights(width);
+        let samples = motion(run, t, &weights, spindle_rad_s);
+        let beside = |k: usize| [k.saturating_sub(1), k, (k + 1).min(n - 1)].map(|k| samples[k].x);
         let bent = |k: usize| {
             let [before, here, after] = beside(k);
             (after - 2.0 * here + before) / (t * t)
         };
         let edge = weights.len() + LATER + 1;
         let stride = (ROWS * width).max(1.0) as usize;
-        let samples: Vec<Sample> = (0..n).map(sample).collect();
         let mut rows: Vec<usize> = (edge..n.saturating_sub(edge)).step_by(stride).collect();
         rows.retain(|&k| samples[k].v.abs() >= slides);
-        Smoothed { samples, acceleration: (0..n).map(bent).collect(), rows }
+        let acceleration = (0..n).map(bent).collect();
+        Smoothed { samples, acceleration, rows, sharp }
     }
 }
 
@@ -111,10 +137,9 @@ impl<'a> Balance<'a> {
     pub fn of(bench: &'a DiagnosisData, means: &'a [Run], width: f64, slides: f64) -> Balance<'a> {
         let t = bench.scene.sample_time_s;
         let spindle = std::f64::consts::TAU * bench.scene.spindle_hz.unwrap_or(0.0);
-        // White noise behind a Gaussian of this width: the root mean square of its slope.
-        let jitter = roughness(means) / (2.0 * std::f64::consts::PI.sqrt().sqrt() * width.powf(1.5) * t);
-        let parts: Vec<Smoothed> =
-            means.par_iter().map(|m| Smoothed::of(m, t, width, slides * jitter, spindle)).collect();
+        let slides = slides * jitter(roughness(means), t, width);
+        let widths = [width, sharpest(means, t, width)];
+        let parts: Vec<Smoothed> = means.par_iter().map(|m| Smoothed::of(m, t, widths, slides, spindle)).collect();
         let moving = parts.iter().flat_map(|p| p.rows.iter().map(|&k| p.samples[k].v.abs()));
         let speed = moving.fold(0.0f64, f64::max).max(1e-12);
         let noise = roughness(means).min(bench.levels.sensor_rms);

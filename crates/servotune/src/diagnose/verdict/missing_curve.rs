@@ -19,14 +19,14 @@ use crate::diagnose::free_form::likeness::likeness;
 use crate::diagnose::free_form::shape::{Shape, lag};
 use crate::diagnose::free_form::stretches::Stretches;
 use crate::diagnose::rules::{
-    CURVE_CLEARLY, CURVE_NAMED, CURVE_NEAR, CURVE_NO_WORSE, NAMED_SHARE, SLIDERS_PUSH,
+    CURVE_CLEARLY, CURVE_NAMED, CURVE_NEAR, CURVE_NO_WORSE, LOADING_FALLS, LOADING_LEVEL, NAMED_SHARE,
 };
 use crate::diagnose::search::curve_balance::curves;
 use crate::diagnose::search::selection::Selection;
 use crate::diagnose::search::torque_balance::{Balance, SMOOTHINGS, recorded_means};
 use crate::lti::{CurveKnot, PhysicsEntry, Plant};
 use crate::physics::sensor_curve::{self, SensorCurve};
-use crate::physics::{CurvePort, Facts, Setting, coulomb_friction, pivot_friction, shortest_loop, slider_levels};
+use crate::physics::{CurvePort, Facts, Setting, coulomb_friction, pivot_friction, shortest_loop};
 use crate::recording::Role;
 
 /// A model with a curve.
@@ -77,7 +77,8 @@ pub(in crate::diagnose) fn stand_in(
     let near = explained_share >= NAMED_SHARE && after <= CURVE_NAMED * standing.floor;
     let finding = reading.or_else(|| bearing_finding(bench, best, &found).filter(|_| near));
     let curved = matches!(best.trial.shape, Shape::Curve(..));
-    let curve = curved.then(|| described(bench, &found, explained_share.clamp(-1.0, 1.0)));
+    let named = finding.is_some();
+    let curve = curved.then(|| described(bench, &found, explained_share.clamp(-1.0, 1.0), named));
     Some(StandIn { corrected: model, errors, curve, finding })
 }
 
@@ -177,7 +178,7 @@ pub fn curve_title(port: &str, argument: &str) -> String {
     }
 }
 
-fn described(bench: &DiagnosisData, found: &Estimated, explained_share: f64) -> FreeForm {
+fn described(bench: &DiagnosisData, found: &Estimated, explained_share: f64, named: bool) -> FreeForm {
     let c = &found.plain;
     let form = &bench.form.given;
     let [port, argument] = c.port.names();
@@ -185,8 +186,12 @@ fn described(bench: &DiagnosisData, found: &Estimated, explained_share: f64) -> 
     let like = likeness(c);
     let what = curve_title(port, argument);
     let beside = if found.reading.is_some() { "beside the reading that was found" } else { "for it" };
+    let begin = match named && found.reading.is_none() {
+        true => "The law has a loading curve of its own".to_owned(),
+        false => format!("A curve without a name stands in {beside}"),
+    };
     let says = format!(
-        "A curve without a name stands in {beside}: {what}; it is {}. It explains {:.1} % of what the better linear model leaves beyond the noise.",
+        "{begin}: {what}; it is {}. It explains {:.1} % of what the better linear model leaves beyond the noise.",
         like.says,
         100.0 * explained_share
     );
@@ -239,13 +244,18 @@ fn bearing_finding(bench: &DiagnosisData, best: &Foretelling, found: &Estimated)
     if c.port != CurvePort::TorqueOverLoading || !matches!(best.trial.shape, Shape::Curve(..)) {
         return None;
     }
-    let levels = slider_levels(&c.at, &c.value);
-    let [resist, push] = [1.0, -1.0].map(|s: f64| levels.iter().map(|l| (s * l).max(0.0)).sum::<f64>());
-    if !(push < SLIDERS_PUSH * resist) {
+    let last = c.value.len() - 1;
+    let most = c.value.iter().fold(0.0f64, |m, v| m.max(*v));
+    let mut highest = 0.0f64;
+    let falls = c.value.iter().fold(0.0f64, |falls, v| {
+        highest = highest.max(*v);
+        falls.max(highest - v)
+    });
+    // A drag rises with the way until it slides; a spring would go on rising.
+    if !(falls < LOADING_FALLS * most && c.value[last / 2] > LOADING_LEVEL * most) {
         return None;
     }
     let [position, command] = [&bench.form.given.position_unit, &bench.form.given.command_unit];
-    let last = c.value.len() - 1;
     let level = Estimate {
         value: c.value[last],
         low: c.value[last] - 1.96 * c.spread[last],
@@ -295,12 +305,11 @@ pub struct MissingCurve {
 /// The curve at the port where it foretells best, whatever the verdict; none where it foretells no better than a linear plant.
 pub fn missing_curve(bench: &DiagnosisData, selection: &Selection) -> Option<MissingCurve> {
     let [ground, one_place] = grounds(bench);
-    let found =
-        estimated(bench, [&ground, &one_place], &starts(bench, selection), &balanced(bench), &mut |_| {})?;
+    let found = estimated(bench, [&ground, &one_place], &starts(bench, selection), &balanced(bench), &mut |_| {})?;
     let best = taken(&found).filter(|b| matches!(b.trial.shape, Shape::Curve(..)))?;
     let errors = shown(bench, &model(bench, best, &found.plain), best, &one_place, None);
     let share = 1.0 - best.left_out / found.linear.left_out;
-    Some(MissingCurve { curve: described(bench, &found, share), errors })
+    Some(MissingCurve { curve: described(bench, &found, share, false), errors })
 }
 
 /// Linear parameters from which curves are looked for: the given plant, the refit, and the plant beside the laws that were found.
