@@ -44,8 +44,10 @@ fn parameters_and_restore_are_inverse_at_every_point_of_every_grid() {
             let grid = e.grid(&scene);
             assert!(!grid.is_empty(), "{}", facts.name);
             for law in grid {
+                // A form of a law may have a strength of its own: play with a contact.
+                let fixed = law.facts().fixed;
                 let strengths: Vec<f64> =
-                    (0..facts.columns).map(|c| if facts.fixed { 1.0 } else { 0.03 * (c as f64 - 1.4) }).collect();
+                    (0..facts.columns).map(|c| if fixed { 1.0 } else { 0.03 * (c as f64 - 1.4) }).collect();
                 let mut setting = Setting { law, strengths };
                 // What a simpler form of a law leaves out has no strength.
                 let unused = |law: &AnyLaw, c: usize| match law {

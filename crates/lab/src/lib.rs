@@ -69,7 +69,7 @@ pub use reached::Reached;
 pub use reader_mutations::{Tally, reader_mutations};
 pub use recordings::recordings;
 pub use reliability_readers::readers;
-pub use sealed::{SealedCase, digests, sealed, sealed_cases, sealed_set};
+pub use sealed::{SealedCase, digests, sealed, sealed_cases, sealed_of_lines, sealed_set};
 pub use sealed_row::{Outcome, Row, outcome};
 
 /// What a study hands over: files by name, relative to the results' folder.

@@ -40,6 +40,9 @@ struct StudyArguments {
     /// Cases of the set, 208 unless told (studies `sealed` and `sealed-digests`)
     #[arg(long, value_name = "N")]
     count: Option<usize>,
+    /// Lines that a run printed: the page is of these cases, and nothing is run (study `sealed`)
+    #[arg(long, value_name = "FILE")]
+    lines: Option<PathBuf>,
     /// Folder with the measured records (studies `mirror`, `motor`, `hdd`)
     #[arg(long, value_name = "DIR", default_value = "../shared/data")]
     data: PathBuf,
@@ -149,7 +152,10 @@ fn run(a: &StudyArguments, say: &mut (dyn FnMut(&str) + Send)) -> Result<Vec<Pat
         StudyName::Sealed if !a.cases.is_empty() => Pages(study::sealed_cases(a.seed, a.count, &a.cases, say)?),
         StudyName::Sealed => {
             let known = std::fs::read_to_string(a.out.join("mismatch/sealed_digests.txt")).ok();
-            Pages(study::sealed(a.seed, a.count, known.as_deref(), say)?)
+            Pages(match &a.lines {
+                Some(file) => study::sealed_of_lines(a.seed, known.as_deref(), &lines_of(file)?)?,
+                None => study::sealed(a.seed, a.count, known.as_deref(), say)?,
+            })
         }
         StudyName::Classes => Pages(study::classes()?),
         StudyName::FreeForm => Pages(study::free_form(&a.data)?),
@@ -178,6 +184,12 @@ fn run(a: &StudyArguments, say: &mut (dyn FnMut(&str) + Send)) -> Result<Vec<Pat
         Ok(file)
     };
     pages.files.iter().map(write).collect()
+}
+
+/// The lines that a run printed.
+fn lines_of(file: &Path) -> Result<String, StudyError> {
+    let refused = |source| StudyError::Child { what: format!("read {}", file.display()), source };
+    std::fs::read_to_string(file).map_err(refused)
 }
 
 /// `reliability.md`: the halves that the folder holds, one below the other.

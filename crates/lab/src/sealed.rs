@@ -160,7 +160,7 @@ impl SealedCase {
         };
         Row {
             id: self.id.clone(),
-            kind: self.drawn.kind,
+            kind: self.drawn.kind.into(),
             fitted_under,
             lambda: if self.acts() { self.lambda() } else { 0.0 },
             expected: self.drawn.expected.join(", "),
@@ -196,14 +196,29 @@ pub fn sealed(
     say: &mut (dyn FnMut(&str) + Send),
 ) -> Result<Study, StudyError> {
     let cases = sealed_set(seed, count.unwrap_or(WHOLE), SAMPLES);
+    let rows: Vec<Row> = rows(&cases, say)?.into_iter().map(|(row, _)| row).collect();
+    written(seed, &cases, known, &rows)
+}
+
+/// The page of the lines that a run printed: one that was ended early has lines too.
+pub fn sealed_of_lines(seed: u64, known: Option<&str>, lines: &str) -> Result<Study, StudyError> {
+    let lines = lines.lines().filter(|l| l.starts_with('{'));
+    let mut rows: Vec<Row> = lines.map(serde_json::from_str).collect::<Result<_, _>>()?;
+    rows.sort_by(|a, b| a.id.cmp(&b.id));
+    let has = |place: &usize| rows.iter().any(|r| r.id == name(*place));
+    let cases = at_places(seed, SAMPLES, (0..WHOLE).filter(has).collect());
+    written(seed, &cases, known, &rows)
+}
+
+/// Page and lines of a run.
+fn written(seed: u64, cases: &[SealedCase], known: Option<&str>, rows: &[Row]) -> Result<Study, StudyError> {
     let published = known.map(|text| {
         let lines: Vec<&str> = text.lines().skip(1).collect();
         cases.iter().filter(|c| lines.contains(&format!("{} {}", c.digest(), c.id).as_str())).count()
     });
-    let rows: Vec<Row> = rows(&cases, say)?.into_iter().map(|(row, _)| row).collect();
     let mut study = Study::default();
-    study.page("mismatch/sealed.md", page(seed, &rows, published));
-    study.page("mismatch/sealed.json", serde_json::to_string_pretty(&rows)? + "\n");
+    study.page("mismatch/sealed.md", page(seed, rows, published));
+    study.page("mismatch/sealed.json", serde_json::to_string_pretty(rows)? + "\n");
     Ok(study)
 }
 

@@ -1,5 +1,6 @@
 //! The page of the sealed set of other forms.
 
+use super::sealed_draw::WHOLE;
 use super::sealed_row::{Outcome, Row};
 use std::fmt::Write;
 
@@ -26,10 +27,12 @@ pub(super) fn page(seed: u64, rows: &[Row], published: Option<usize>) -> String 
     use Outcome::{FalseAlarm, InFamily, Missed, Partly, Right, Unexplained, Wrong};
     let is = |r: &Row, of: &[Outcome]| of.contains(&r.outcome);
     let count = |of: &[&Row], f: &dyn Fn(&Row) -> bool| of.iter().filter(|r| f(r)).count();
-    let nulls: Vec<&Row> = rows.iter().filter(|r| NULLS.contains(&r.kind)).collect();
-    let outside: Vec<&Row> = rows.iter().filter(|r| OUTSIDE.contains(&r.kind) && r.lambda >= LAMBDA).collect();
-    let named: Vec<&Row> =
-        rows.iter().filter(|r| !NULLS.contains(&r.kind) && !OUTSIDE.contains(&r.kind) && r.lambda >= LAMBDA).collect();
+    let nulls: Vec<&Row> = rows.iter().filter(|r| NULLS.contains(&&*r.kind)).collect();
+    let outside: Vec<&Row> = rows.iter().filter(|r| OUTSIDE.contains(&&*r.kind) && r.lambda >= LAMBDA).collect();
+    let named: Vec<&Row> = rows
+        .iter()
+        .filter(|r| !NULLS.contains(&&*r.kind) && !OUTSIDE.contains(&&*r.kind) && r.lambda >= LAMBDA)
+        .collect();
     let singles: Vec<&Row> = named.iter().copied().filter(|r| !r.kind.contains('+')).collect();
     let pairs: Vec<&Row> = named.iter().copied().filter(|r| r.kind.contains('+')).collect();
     let every: Vec<&Row> = rows.iter().collect();
@@ -41,7 +44,7 @@ pub(super) fn page(seed: u64, rows: &[Row], published: Option<usize>) -> String 
     let mut text = format!(
         "# A sealed set of other forms\n\nMade by `lab sealed --seed {seed} --out results`: {} cases of two machines of another make (`crates/lab/src/foreign.rs`, `foreign_stage.rs`), drawn by \
          `crates/lab/src/sealed_draw.rs`: LuGre bristles, rounded dead bands, parallel sliders, soft limits, counts, wind, play with a contact, pushes locked in time, curves without a name, pairs. Bodies, sizes, lengths, units and rates \
-         (1 to 50 kHz) vary. {} The digests stood in `sealed_digests.txt` before the run{}.\n\nLambda is the sum of squares of what acts in the positions of the fitted records, over the sensor's noise.\n\n",
+         (1 to 50 kHz) vary. {} The digests stood in `sealed_digests.txt` before the run{}.{}\n\nLambda is the sum of squares of what acts in the positions of the fitted records, over the sensor's noise.\n\n",
         rows.len(),
         format_args!(
             "In {} the given model was fitted while the effect acted.",
@@ -49,6 +52,14 @@ pub(super) fn page(seed: u64, rows: &[Row], published: Option<usize>) -> String 
         ),
         published
             .map_or(" (the file was not there in this run)".into(), |n| format!("; {n} of {} are those", rows.len())),
+        if rows.len() < WHOLE {
+            format!(
+                " Of the set's {WHOLE} cases {} were run: kinds stand in turn, so that a part holds of all.",
+                rows.len()
+            )
+        } else {
+            String::new()
+        },
     );
     let line = |text: &mut String, what: &str, value: String, aim: &str| {
         // Writing to a String cannot fail.
@@ -119,7 +130,7 @@ pub(super) fn page(seed: u64, rows: &[Row], published: Option<usize>) -> String 
         "",
     );
     text += "\n## By kind\n\n| kind | cases | lambda, median | right | in family | partly | wrong | unexplained | nothing said | refused |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
-    let mut kinds: Vec<&str> = rows.iter().map(|r| r.kind).collect();
+    let mut kinds: Vec<&str> = rows.iter().map(|r| &*r.kind).collect();
     kinds.sort_unstable();
     kinds.dedup();
     for kind in kinds {
@@ -140,7 +151,7 @@ pub(super) fn page(seed: u64, rows: &[Row], published: Option<usize>) -> String 
         );
     }
     text += "\nFor kinds outside the library *unexplained* is right; for `sound` and `linear_off` *nothing said* is.\n\n## What did not come out right\n\n| case | model fitted under it | lambda | expected | verdict | findings | held out over noise: given, refit, findings | curve |\n|---|---|---:|---|---|---|---|---:|\n";
-    let fine = |r: &Row| match r.kind {
+    let fine = |r: &Row| match r.kind.as_str() {
         k if NULLS.contains(&k) => is(r, &[Outcome::Silent]),
         k if OUTSIDE.contains(&k) => !is(r, &[Wrong]) && explained(r),
         _ => is(r, &[Right]) && r.holdout[2] <= LEFT,

@@ -1,13 +1,13 @@
 //! One line of a sealed set: how a diagnosis came out beside the truth.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use servotune::diagnose::{Diagnosis, Verdict};
 
 /// Names that are of one family: a drag with a short and with a long sliding length, a line of the spindle and any other.
 const KIN: [&[&str]; 2] = [&["coulomb_friction", "pivot_friction"], &["repeatable_runout", "line_disturbance"]];
 
 /// How a diagnosis came out beside the truth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// Nothing acts, and nothing is found.
@@ -31,12 +31,12 @@ pub enum Outcome {
 }
 
 /// One case as it came out.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Row {
     /// Name in the set.
     pub id: String,
     /// What acts, in a word.
-    pub kind: &'static str,
+    pub kind: String,
     /// Whether the given model was fitted under it.
     pub fitted_under: bool,
     /// Squares of what acts in the positions of the fitted records, over the noise.

@@ -35,18 +35,26 @@ pub fn curve_figure(curve: &FreeForm) -> Result<Figure, ReportError> {
     };
     let (first, last) = (knots[0].at, knots[knots.len() - 1].at);
     let x: Vec<f64> = (0..POINTS).map(|i| first + (last - first) * i as f64 / (POINTS - 1) as f64).collect();
-    let along = |s: &Spline| x.iter().map(|x| s.value(*x)).collect::<Vec<f64>>();
+    let loading = curve.argument == "loading";
+    let straight = |s: &Spline, x: f64| {
+        let i = s.at().partition_point(|a| *a <= x).clamp(1, s.at().len() - 1);
+        let share = (x - s.at()[i - 1]) / (s.at()[i] - s.at()[i - 1]);
+        s.values()[i - 1] + share * (s.values()[i] - s.values()[i - 1])
+    };
+    let along =
+        |s: &Spline| x.iter().map(|x| if loading { straight(s, *x) } else { s.value(*x) }).collect::<Vec<f64>>();
     let value = along(&through(&|k| k.value));
     // The band's half width is drawn through the knots and never below nothing.
     let off = along(&through(&|k| 0.5 * (k.high.unwrap_or(k.value) - k.low.unwrap_or(k.value))));
     let edge = |side: f64| value.iter().zip(&off).map(|(v, o)| v + side * o.max(0.0)).collect::<Vec<f64>>();
     let port = CurvePort::ALL.into_iter().find(|p| p.names() == [curve.port, curve.argument]);
-    let mut argument = curve.argument.to_owned();
+    let mut argument = if loading { "way since the first turn".to_owned() } else { curve.argument.to_owned() };
     argument[..1].make_ascii_uppercase();
     let quantity = match curve.port {
         "amplifier" => "Output of the amplifier",
         "gain" => "Torque per command",
         "sensor" => "Reading",
+        _ if loading => "Torque that resists",
         _ => "Torque added",
     };
     let unit = if curve.unit == "1" { "" } else { &curve.unit };
@@ -63,9 +71,15 @@ pub fn curve_figure(curve: &FreeForm) -> Result<Figure, ReportError> {
     panel.marks.push(Series::new("knots", Ink::Data(0), Kind::Points, &at, &values)?.into());
     Ok(Figure {
         title: format!("A curve without a name: {}", curve_title(curve.port, curve.argument)),
-        caption: "Natural cubic spline, straight beyond its ends; its smoothness is the one under which stretches that were left out are simulated best. \
-                  What a linear plant can hold is in the plant, not in the curve."
-            .into(),
+        caption: format!(
+            "{}; its smoothness is the one under which stretches that were left out are simulated best. \
+             What a linear plant can hold is in the plant, not in the curve.",
+            if loading {
+                "First loading, straight between knots and level behind the last; loops follow Masing's rule"
+            } else {
+                "Natural cubic spline, straight beyond its ends"
+            }
+        ),
         share_x: false,
         panels: vec![panel],
     })
