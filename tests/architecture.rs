@@ -276,7 +276,7 @@ fn no_files_import_each_other_in_a_circle() {
     let known: BTreeSet<String> = files.keys().cloned().collect();
     let file = |path: &String| {
         let ends = path.match_indices('/').map(|(at, _)| at).chain([path.len()]);
-        ends.map(|end| &path[..end]).filter(|p| known.contains(*p)).last().map(str::to_owned)
+        ends.map(|end| &path[..end]).rfind(|p| known.contains(*p)).map(str::to_owned)
     };
     for (own, used) in &mut files {
         *used = used.iter().filter_map(file).filter(|f| f != own).collect();
