@@ -117,17 +117,7 @@ pub(in crate::diagnose) fn plain(
             &map * &theta
         }
         CurvePort::TorqueOverLoading => {
-            // What still rises behind all turns is a spring.
-            let behind: Vec<f64> = at.iter().map(|a| f64::from(u8::from(*a > TAIL * at[n - 1]))).collect();
-            let count: f64 = behind.iter().sum();
-            let behind: Vec<f64> = behind.iter().map(|w| w / count).collect();
-            let slope = slope_of(at, &behind);
-            if let Some((i, by)) = knob(&bench.form, p, port) {
-                let full = by * slope.dot(&theta);
-                let moved = full.max(LEFT - 1.0 - p[i]);
-                out.p[i] += moved;
-                map -= &places * slope.transpose() * if full == 0.0 { 1.0 } else { moved / full };
-            }
+            give_spring(&mut out, &mut map, bench, (at, &theta));
             let first = map.row(0).into_owned();
             map.row_iter_mut().for_each(|mut row| row -= &first);
             &map * &theta
@@ -159,6 +149,22 @@ pub(in crate::diagnose) fn plain(
     let spread = &map * covariance * map.transpose();
     out.spread = (0..n).map(|i| spread[(i, i)].max(0.0).sqrt()).collect();
     out
+}
+
+/// What of a loading curve still rises behind all turns is a spring, and goes to the plant.
+fn give_spring(out: &mut Plain, map: &mut DMatrix<f64>, bench: &DiagnosisData, (at, theta): (&[f64], &DVector<f64>)) {
+    let last = at.last().copied().unwrap_or(0.0);
+    let behind: Vec<f64> = at.iter().map(|a| f64::from(u8::from(*a > TAIL * last))).collect();
+    let count: f64 = behind.iter().sum();
+    let behind: Vec<f64> = behind.iter().map(|w| w / count).collect();
+    let slope = slope_of(at, &behind);
+    if let Some((i, by)) = knob(&bench.form, &out.p, CurvePort::TorqueOverLoading) {
+        let full = by * slope.dot(theta);
+        let moved = full.max(LEFT - 1.0 - out.p[i]);
+        out.p[i] += moved;
+        let share = if full == 0.0 { 1.0 } else { moved / full };
+        *map -= &DVector::from_column_slice(at) * slope.transpose() * share;
+    }
 }
 
 /// Least value of the damping's knob.

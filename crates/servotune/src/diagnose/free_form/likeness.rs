@@ -33,7 +33,14 @@ struct Form {
 /// Places of a kink, as shares of the range.
 const KINKS: [f64; 7] = [0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.75];
 
+/// The textbook shapes at a curve's port.
 fn forms(c: &Plain) -> Vec<Form> {
+    let of_torque = torque_forms(c);
+    if of_torque.is_empty() { other_forms(c) } else { of_torque }
+}
+
+/// Shapes of a torque over position, velocity, loading or time.
+fn torque_forms(c: &Plain) -> Vec<Form> {
     let [low, high] = [c.at[0], c.at[c.at.len() - 1]];
     let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
     let over = |facts, words, f: &dyn Fn(f64) -> f64| {
@@ -61,6 +68,35 @@ fn forms(c: &Plain) -> Vec<Form> {
                 all.push(over(&torque_ripple::FACTS, "a ripple of the torque", &|x| (w * (x - centre)).cos()));
             }
         }
+        CurvePort::TorqueOverLoading => {
+            for s in KINKS {
+                let length = 2.0 * s * half;
+                let first = |d: f64| -((low - d) / length).exp_m1();
+                all.push(over(&pivot_friction::FACTS, "a bearing that sticks", &first));
+            }
+        }
+        CurvePort::TorqueOverTime => {
+            let strongest = (0..c.at.len()).max_by(|a, b| c.value[*a].abs().total_cmp(&c.value[*b].abs())).unwrap_or(0);
+            for s in KINKS {
+                let push = |t: f64| (-((t - c.at[strongest]) / (s * half)).powi(2)).exp();
+                all.push(over(&shock::FACTS, "a push at one time of every record", &push));
+            }
+        }
+        _ => {}
+    }
+    all
+}
+
+/// Shapes of an amplifier, a gain or a sensor.
+fn other_forms(c: &Plain) -> Vec<Form> {
+    let [low, high] = [c.at[0], c.at[c.at.len() - 1]];
+    let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
+    let over = |facts, words, f: &dyn Fn(f64) -> f64| {
+        let value = c.at.iter().map(|a| f(*a)).collect();
+        Form { facts, words, value }
+    };
+    let mut all = Vec::new();
+    match c.port {
         CurvePort::AmplifierOverCommand => {
             for s in KINKS {
                 let edge = s * half;
@@ -79,20 +115,6 @@ fn forms(c: &Plain) -> Vec<Form> {
             all.push(over(&torque_factor_rolloff::FACTS, "a motor that pushes less towards the ends", &|x| {
                 -(x - centre).powi(4)
             }));
-        }
-        CurvePort::TorqueOverLoading => {
-            for s in KINKS {
-                let length = 2.0 * s * half;
-                let first = |d: f64| -((low - d) / length).exp_m1();
-                all.push(over(&pivot_friction::FACTS, "a bearing that sticks", &first));
-            }
-        }
-        CurvePort::TorqueOverTime => {
-            let strongest = (0..c.at.len()).max_by(|a, b| c.value[*a].abs().total_cmp(&c.value[*b].abs())).unwrap_or(0);
-            for s in KINKS {
-                let push = |t: f64| (-((t - c.at[strongest]) / (s * half)).powi(2)).exp();
-                all.push(over(&shock::FACTS, "a push at one time of every record", &push));
-            }
         }
         CurvePort::GainOverTime => {
             for s in KINKS {
@@ -120,6 +142,7 @@ fn forms(c: &Plain) -> Vec<Form> {
                 (x - centre).powi(3)
             }));
         }
+        _ => {}
     }
     all
 }

@@ -37,6 +37,15 @@ pub(in crate::diagnose) struct Cleared {
     pub curve: bool,
 }
 
+/// What plants and laws are tried on.
+struct Tried<'a> {
+    own: &'a DiagnosisData,
+    /// The linear refit.
+    linear: Model,
+    /// Mean runs, each with the number of records that it stands for.
+    whole: Vec<(&'a Run, usize)>,
+}
+
 /// The plant to set out from, where the given one conceals what acts; none where the given one, or a refit of it, does.
 pub(in crate::diagnose) fn cleared(
     bench: &DiagnosisData,
@@ -57,16 +66,12 @@ pub(in crate::diagnose) fn cleared(
     let mut own = bench.clone();
     let linear = refit(&mut own, iterations);
     let whole: Vec<(&Run, usize)> = means.iter().zip(&own.stack.segments).map(|(m, s)| (m, s.runs.len())).collect();
-    let mut given = linear.clone();
-    given.refitted.p.fill(0.0);
-    let plain = |b: &DiagnosisData, m: &Model| {
-        let mut problem = Problem::plain_error(b, m, None, &whole);
-        let x = problem.start();
-        size(&problem.settle(&x))
-    };
     let samples: f64 = whole.iter().map(|(r, n)| (r.len() * n) as f64).sum();
-    let least =
-        [plain(&own, &linear), plain(&own, &given)].into_iter().filter(|v| v.is_finite()).fold(f64::MAX, f64::min);
+    let tried = Tried { own: &own, linear, whole };
+    let mut given = tried.linear.clone();
+    given.refitted.p.fill(0.0);
+    let least = [tried.left(&own, &tried.linear), tried.left(&own, &given)];
+    let least = least.into_iter().filter(|v| v.is_finite()).fold(f64::MAX, f64::min);
     // Sums of squares count in the sensor's noise.
     if least < CLEARED_FAR * CLEARED_FAR * samples {
         return None;
@@ -74,71 +79,93 @@ pub(in crate::diagnose) fn cleared(
     say("a plant cleared of what bends it");
     laws.sort_by(|a, b| a.0.total_cmp(&b.0));
     laws.truncate(TRIED);
-    let model_of = |b: &Balanced| -> Option<(DiagnosisData, Model)> {
-        let ground = around(&own, &b.plant);
-        let zero = vec![0.0; ground.form.knobs.len()];
-        let mut model = linear.clone();
-        model.chosen = b.law.iter().cloned().collect();
-        (model.refitted.p, model.refitted.plant) = (zero, b.plant.clone());
-        Some((ground, model))
-    };
-    let mut tried: Vec<(f64, DiagnosisData, Model)> = Vec::new();
-    for (_, b) in &laws {
-        if let Some((ground, model)) = model_of(b) {
-            let left = plain(&ground, &model);
-            if left.is_finite() {
-                tried.push((left, ground, model));
-            }
+    let best = tried.of_curves(bent, tried.of_laws(&laws));
+    best.filter(|(left, _)| *left < CLEARED_BETTER * CLEARED_BETTER * least).map(|(_, cleared)| cleared)
+}
+
+/// A plant that was cleared, and the sum of squares that its simulation leaves.
+type Best = Option<(f64, Cleared)>;
+
+impl Tried<'_> {
+    /// What a model leaves in plain simulation: sum of squares.
+    fn left(&self, ground: &DiagnosisData, model: &Model) -> f64 {
+        let mut problem = Problem::plain_error(ground, model, None, &self.whole);
+        let x = problem.start();
+        size(&problem.settle(&x))
+    }
+
+    /// A plant with a law beside it, and the ground around it.
+    fn model(&self, plant: &Plant, law: Option<SelectedEffect>) -> (DiagnosisData, Model) {
+        let ground = around(self.own, plant);
+        let mut model = self.linear.clone();
+        model.chosen = law.into_iter().collect();
+        (model.refitted.p, model.refitted.plant) = (vec![0.0; ground.form.knobs.len()], plant.clone());
+        (ground, model)
+    }
+
+    fn fitted(&self, ground: &DiagnosisData, model: &Model) -> Option<Model> {
+        descended(ground, model, None, &self.whole)
+    }
+
+    /// The best law of some balances, in its fuller form where that is clearly better.
+    fn of_laws(&self, laws: &[(f64, Balanced)]) -> Best {
+        let simulated = |(_, b): &(f64, Balanced)| {
+            let (ground, model) = self.model(&b.plant, b.law.clone());
+            let left = self.left(&ground, &model);
+            left.is_finite().then_some((left, ground, model))
+        };
+        let mut tried: Vec<(f64, DiagnosisData, Model)> = laws.iter().filter_map(simulated).collect();
+        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut settled: Vec<(f64, DiagnosisData, Model)> = Vec::new();
+        for (left, ground, model) in tried.into_iter().take(FITTED) {
+            let fitted = self.fitted(&ground, &model).unwrap_or(model);
+            settled.push((self.left(&ground, &fitted).min(left), ground, fitted));
         }
-    }
-    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut settled: Vec<(f64, DiagnosisData, Model)> = Vec::new();
-    for (left, ground, model) in tried.into_iter().take(FITTED) {
-        let fitted = descended(&ground, &model, None, &whole).unwrap_or(model);
-        settled.push((plain(&ground, &fitted).min(left), ground, fitted));
-    }
-    settled.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut best: Option<(f64, Cleared)> = None;
-    let cleared = |ground: &DiagnosisData, m: &Model| Cleared {
-        plant: not_too_slow(ground.form.plant(&m.refitted.p)),
-        law: m.chosen.first().cloned(),
-        curve: false,
-    };
-    if let Some((least, ground, model)) = settled.first() {
-        best = Some((*least, cleared(ground, model)));
+        settled.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (left, ground, model) = settled.into_iter().next()?;
+        let mut best = (left, cleared_of(&ground, &model, false));
         let fuller = |law: &SelectedEffect| {
             let of = |full: AnyLaw| SelectedEffect {
                 setting: Setting::new(full, law.setting.strengths.clone()),
                 ..law.clone()
             };
-            law.setting.law.fuller(&own.scene).into_iter().map(of).collect::<Vec<_>>()
+            law.setting.law.fuller(&self.own.scene).into_iter().map(of).collect::<Vec<_>>()
         };
         for full in model.chosen.first().map(fuller).unwrap_or_default() {
-            let model = Model { chosen: vec![with_freedom(full, &own.scene)], ..model.clone() };
-            let Some(fitted) = descended(ground, &model, None, &whole) else { continue };
-            let after = plain(ground, &fitted);
-            if after < CLEARED_FULLER * best.as_ref().map_or(f64::MAX, |b| b.0) {
-                best = Some((after, cleared(ground, &fitted)));
+            let model = Model { chosen: vec![with_freedom(full, &self.own.scene)], ..model.clone() };
+            let Some(fitted) = self.fitted(&ground, &model) else { continue };
+            let after = self.left(&ground, &fitted);
+            if after < CLEARED_FULLER * best.0 {
+                best = (after, cleared_of(&ground, &fitted, false));
             }
         }
+        Some(best)
     }
-    let most = best.as_ref().map_or(f64::INFINITY, |b| b.0);
-    for c in bent.into_iter().take(CURVES) {
-        let Some(setting) = c.shape.effect() else { continue };
-        let ground = around(&own, &c.plant);
-        let mut model = linear.clone();
-        model.chosen = vec![SelectedEffect { setting, continuous: Vec::new(), range: Vec::new(), step: 0 }];
-        (model.refitted.p, model.refitted.plant) = (vec![0.0; ground.form.knobs.len()], c.plant);
-        if !plain(&ground, &model).is_finite() {
-            continue;
+
+    /// A curve without a name in the place of the best law, where it leaves far less.
+    fn of_curves(&self, bent: Vec<Curved>, mut best: Best) -> Best {
+        let most = best.as_ref().map_or(f64::INFINITY, |b| b.0);
+        for c in bent.into_iter().take(CURVES) {
+            let law = c.shape.effect();
+            let law = law.map(|setting| SelectedEffect { setting, continuous: Vec::new(), range: Vec::new(), step: 0 });
+            let (ground, model) = self.model(&c.plant, law);
+            if !self.left(&ground, &model).is_finite() {
+                continue;
+            }
+            let fitted = self.fitted(&ground, &model).unwrap_or(model);
+            let left = self.left(&ground, &fitted);
+            if left < CLEARED_BY_CURVE * most && left < best.as_ref().map_or(f64::INFINITY, |b| b.0) {
+                best = Some((left, cleared_of(&ground, &fitted, true)));
+            }
         }
-        let fitted = descended(&ground, &model, None, &whole).unwrap_or(model);
-        let left = plain(&ground, &fitted);
-        if left < CLEARED_BY_CURVE * most && left < best.as_ref().map_or(f64::INFINITY, |b| b.0) {
-            best = Some((left, Cleared { law: None, curve: true, ..cleared(&ground, &fitted) }));
-        }
+        best
     }
-    best.filter(|(left, _)| *left < CLEARED_BETTER * CLEARED_BETTER * least).map(|(_, cleared)| cleared)
+}
+
+/// The plant of a fitted model, and its law unless that is a curve.
+fn cleared_of(ground: &DiagnosisData, model: &Model, curve: bool) -> Cleared {
+    let law = model.chosen.first().filter(|_| !curve).cloned();
+    Cleared { plant: not_too_slow(ground.form.plant(&model.refitted.p)), law, curve }
 }
 
 /// The same acceleration and viscous rate on a spring that a plant may have: a fit may end at none.
