@@ -11,7 +11,9 @@
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
+use super::share::Share;
 use crate::lti::Body;
+use nalgebra::Complex;
 use std::f64::consts::TAU;
 
 /// The play. With a contact its strength is the share of e that the encoder reads.
@@ -253,6 +255,14 @@ impl Parametric for Backlash {
     /// A machine holds to this law to about a hundredth.
     fn form_uncertainty(&self, _parameter: &str) -> f64 {
         0.01
+    }
+
+    /// With a contact that of both masses touching: what motions large beside the gap meet. Without one the play's own loop.
+    fn response_share(&self, strengths: &[f64], _scene: &Scene, w_rad_s: f64) -> Share {
+        let Some(c) = self.contact else { return Share::Cycle };
+        let (w, read) = (TAU * c.hz, strengths.first().copied().unwrap_or(0.0));
+        let answer = Complex::new(w * w - w_rad_s * w_rad_s, 2.0 * c.damping_ratio * w * w_rad_s);
+        Share::Ratio(-read * c.drive * w_rad_s * w_rad_s / answer)
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(Backlash, Vec<f64>), PhysicsError> {
