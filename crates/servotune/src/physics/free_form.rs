@@ -132,6 +132,11 @@ impl CurvePort {
         }
     }
 
+    /// Whether the curve holds the gain of the command: it stands in its place or is a factor of it.
+    pub fn is_of_command(self) -> bool {
+        matches!(self, CurvePort::AmplifierOverCommand | CurvePort::GainOverPosition | CurvePort::GainOverTime)
+    }
+
     /// The value that changes nothing.
     pub fn idle(self, at: f64) -> f64 {
         match self {

@@ -52,15 +52,13 @@ impl Curved {
             (b * p.resonance_gain, k, c)
         };
         let ((b, k, c), (gain, spring, damper)) = (numbers(plant), numbers(&self.plant));
-        let of_command =
-            matches!(port, CurvePort::AmplifierOverCommand | CurvePort::GainOverPosition | CurvePort::GainOverTime);
         let line = match port {
             CurvePort::TorqueOverPosition => (k - spring) / b,
             CurvePort::TorqueOverLoading => (spring - k) / b,
             CurvePort::TorqueOverVelocity => (c - damper) / b,
             _ => 0.0,
         };
-        let ratio = if of_command || line != 0.0 { gain / b } else { 1.0 };
+        let ratio = if port.is_of_command() || line != 0.0 { gain / b } else { 1.0 };
         let value = at.iter().zip(value).map(|(a, v)| ratio * v + line * a).collect();
         Some(Shape::Curve(*port, at.clone(), value))
     }

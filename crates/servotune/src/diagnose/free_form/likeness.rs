@@ -33,6 +33,19 @@ struct Form {
 /// Places of a kink, as shares of the range.
 const KINKS: [f64; 7] = [0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.75];
 
+/// First knot, middle and half width of a curve.
+fn range(c: &Plain) -> (f64, f64, f64) {
+    let [low, high] = [c.at[0], c.at[c.at.len() - 1]];
+    (low, 0.5 * (low + high), 0.5 * (high - low))
+}
+
+impl Plain {
+    /// A shape at the curve's knots.
+    fn form(&self, facts: &'static Facts, words: &'static str, f: &dyn Fn(f64) -> f64) -> Form {
+        Form { facts, words, value: self.at.iter().map(|a| f(*a)).collect() }
+    }
+}
+
 /// The textbook shapes at a curve's port.
 fn forms(c: &Plain) -> Vec<Form> {
     let of_torque = torque_forms(c);
@@ -41,12 +54,8 @@ fn forms(c: &Plain) -> Vec<Form> {
 
 /// Shapes of a torque over position, velocity, loading or time.
 fn torque_forms(c: &Plain) -> Vec<Form> {
-    let [low, high] = [c.at[0], c.at[c.at.len() - 1]];
-    let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
-    let over = |facts, words, f: &dyn Fn(f64) -> f64| {
-        let value = c.at.iter().map(|a| f(*a)).collect();
-        Form { facts, words, value }
-    };
+    let (low, centre, half) = range(c);
+    let over = |facts, words, f: &dyn Fn(f64) -> f64| c.form(facts, words, f);
     let mut all = Vec::new();
     match c.port {
         CurvePort::TorqueOverVelocity => {
@@ -89,12 +98,8 @@ fn torque_forms(c: &Plain) -> Vec<Form> {
 
 /// Shapes of an amplifier, a gain or a sensor.
 fn other_forms(c: &Plain) -> Vec<Form> {
-    let [low, high] = [c.at[0], c.at[c.at.len() - 1]];
-    let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
-    let over = |facts, words, f: &dyn Fn(f64) -> f64| {
-        let value = c.at.iter().map(|a| f(*a)).collect();
-        Form { facts, words, value }
-    };
+    let (low, centre, half) = range(c);
+    let over = |facts, words, f: &dyn Fn(f64) -> f64| c.form(facts, words, f);
     let mut all = Vec::new();
     match c.port {
         CurvePort::AmplifierOverCommand => {

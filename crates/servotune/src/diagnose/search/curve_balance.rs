@@ -52,10 +52,7 @@ impl Balance<'_> {
 
     fn rows(&self, port: Option<CurvePort>, weights: &[f64]) -> Rows {
         let mut plant = Vec::new();
-        let of_command = |p: CurvePort| {
-            matches!(p, CurvePort::AmplifierOverCommand | CurvePort::GainOverPosition | CurvePort::GainOverTime)
-        };
-        if !port.is_some_and(of_command) {
+        if !port.is_some_and(CurvePort::is_of_command) {
             let acts = |r: usize| held(&self.means[r].input);
             plant.extend([0, LATER].map(|lag| self.at_rows(&|_, r| late(&acts(r), lag), weights)));
         }
@@ -193,17 +190,19 @@ impl Balance<'_> {
         (0..n).into_par_iter().map(column).collect()
     }
 
-    /// Plant and curve at a port; none where nothing moves there or nothing can be solved.
-    pub fn curved(&self, port: CurvePort) -> Option<Curved> {
+    /// What the balance without a curve leaves of the parts left out.
+    fn linear_left(&self) -> Option<f64> {
+        let rows = self.rows(None, &weights(self.width));
+        self.foretold(&rows, &[], &DMatrix::zeros(0, 0)).map(|f| f.0)
+    }
+
+    /// Plant and curve at a port, beside what the linear balance leaves; none where nothing moves there or nothing can be solved.
+    fn curved(&self, port: CurvePort, linear: f64) -> Option<Curved> {
         let weights = weights(self.width);
         let at = self.knots(port)?;
-        let plain = self.rows(None, &weights);
-        let (linear, _) = self.foretold(&plain, &[], &DMatrix::zeros(0, 0))?;
         let rows = self.rows(Some(port), &weights);
         let rough = roughness_rows(&at);
-        let of_command = rows.plant.len() + 1 < plain.plant.len()
-            || matches!(port, CurvePort::AmplifierOverCommand | CurvePort::GainOverPosition | CurvePort::GainOverTime);
-        let shares: Vec<f64> = match of_command {
+        let shares: Vec<f64> = match port.is_of_command() {
             true => (0..DELAYS).map(|k| k as f64 / (DELAYS - 1) as f64).collect(),
             false => vec![0.0],
         };
@@ -222,9 +221,7 @@ impl Balance<'_> {
         let (gain, late) = match port {
             CurvePort::AmplifierOverCommand => {
                 // The line of least squares through the curve is the gain.
-                let mean = at.iter().sum::<f64>() / at.len() as f64;
-                let square: f64 = at.iter().map(|a| (a - mean).powi(2)).sum();
-                (at.iter().zip(&value).map(|(a, v)| (a - mean) * v).sum::<f64>() / square, share)
+                (line(&at, &value), share)
             }
             CurvePort::GainOverPosition | CurvePort::GainOverTime => {
                 (value.iter().sum::<f64>() / value.len() as f64, share)
@@ -242,11 +239,6 @@ impl Balance<'_> {
         }
         value.iter_mut().for_each(|v| *v /= gain);
         // What the curve holds of spring and damper goes back to the plant, that it stays one.
-        let line = |at: &[f64], value: &[f64]| {
-            let mean = at.iter().sum::<f64>() / at.len() as f64;
-            let square: f64 = at.iter().map(|a| (a - mean).powi(2)).sum();
-            at.iter().zip(value).map(|(a, v)| (a - mean) * v).sum::<f64>() / square
-        };
         let (mut viscous, mut stiffness) = (viscous, stiffness);
         match port {
             // What still resists more behind all turns is a spring.
@@ -277,6 +269,13 @@ impl Balance<'_> {
     }
 }
 
+/// Slope of the line of least squares.
+fn line(at: &[f64], value: &[f64]) -> f64 {
+    let mean = at.iter().sum::<f64>() / at.len() as f64;
+    let square: f64 = at.iter().map(|a| (a - mean).powi(2)).sum();
+    at.iter().zip(value).map(|(a, v)| (a - mean) * v).sum::<f64>() / square
+}
+
 /// What a command held between samples comes to around each sample: the mean of the two beside it.
 fn held(u: &[f64]) -> Vec<f64> {
     (0..u.len()).map(|k| 0.5 * (u[k] + u[k.saturating_sub(1)])).collect()
@@ -303,8 +302,9 @@ fn hat(at: &[f64], j: usize, x: f64) -> f64 {
 /// Plants and curves by the balances of some smoothings, the best of each port, those that foretell best first.
 pub(in crate::diagnose) fn curves(balances: &[Balance]) -> Vec<Curved> {
     let ports = CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition);
+    let linear: Vec<Option<f64>> = balances.iter().map(Balance::linear_left).collect();
     let best = |port: CurvePort| {
-        let all = balances.iter().filter_map(|b| b.curved(port));
+        let all = balances.iter().zip(&linear).filter_map(|(b, l)| b.curved(port, (*l)?));
         all.min_by(|a, b| a.share.total_cmp(&b.share))
     };
     let mut all: Vec<Curved> = ports.filter_map(best).collect();
