@@ -57,7 +57,7 @@ fn slopes(b: Bencher) {
 #[divan::bench]
 fn slopes_on_a_response(b: Bencher) {
     let frf = paper_response();
-    let machine = Machine::Response { frf: &frf, hold: servotune::tune::Hold::NotIncluded, continuation: None };
+    let machine = Machine::Response { frf: &frf, continuation: None };
     slopes_of(b, &without_peak(), machine);
 }
 
@@ -74,11 +74,7 @@ fn candidate_with_command_peak(b: Bencher) {
 #[divan::bench]
 fn candidate_on_a_response(b: Bencher) {
     let frf = paper_response();
-    candidate_of(
-        b,
-        &without_peak(),
-        Machine::Response { frf: &frf, hold: servotune::tune::Hold::NotIncluded, continuation: None },
-    );
+    candidate_of(b, &without_peak(), Machine::Response { frf: &frf, continuation: None });
 }
 
 #[divan::bench(args = [1, 2], sample_count = 10, sample_size = 1)]

@@ -12,7 +12,7 @@ use servotune::frf::{PhaseDisplay, ReadSettings, read_file, write_bod_as};
 use servotune::identify::{IdentifySettings, identify};
 use servotune::lti::PlantFile;
 use servotune::numeric::random::Random;
-use servotune::tune::{Hold, InputDigest, Machine, Outcome, Spec, TuneError, TuneSettings, tune};
+use servotune::tune::{InputDigest, Machine, Outcome, Spec, TuneError, TuneSettings, tune};
 use servotune::twin::plants::{log_grid, measure};
 use servotune::twin::{MachineClass, nominal_controller, paper_machine};
 use servotune::verify::Assured;
@@ -68,7 +68,6 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     screen.say("3/7 tuning, straight on the measured response and over the model");
     let spec = Spec::read(&file("spec.toml")).map_err(TuneError::from)?;
     let settings = TuneSettings::default();
-    let hold = Hold::NotIncluded;
     let over_model = tune(&Machine::Model(&id.plant), &spec, Some(&start), &settings)?;
     let digest = |role: &str, sha256: String| InputDigest { role: role.into(), sha256 };
     let controller_text = read_text(&file("controller.toml"))?;
@@ -77,7 +76,6 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let (gain_table, spec_file) = (file("gains.toml"), file("spec.toml"));
     let job = OnSweep {
         sweep: &sweep,
-        hold,
         plant: &id.plant,
         spec: &spec,
         spec_file: &spec_file,
@@ -96,7 +94,7 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
         name: "demo, the paper's tunable machine",
         plant: &id.plant,
         units: slot::units(&id.plant),
-        sweep: Some((&sweep, hold)),
+        sweep: Some(&sweep),
         identified: Some(&id),
         spec: &spec,
         start: Some(&start),

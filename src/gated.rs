@@ -8,11 +8,11 @@ use super::{Failure, Screen};
 use serde::Serialize;
 use servotune::controller::Controller;
 use servotune::document::{FileSet, below, sha256_hex, write_text};
-use servotune::frf::{ReadSettings, read_file};
+use servotune::frf::{Hold, ReadSettings, read_file};
 use servotune::gate::features::{features, machine_folders, read_machines};
 use servotune::gate::{Action, Gate, Table, Verdict};
 use servotune::identify::{IdentifySettings, identify};
-use servotune::tune::{GainTable, Hold, InputDigest, Machine, Spec, TuneSettings, tune};
+use servotune::tune::{GainTable, InputDigest, Machine, Spec, TuneSettings, tune};
 use servotune_answer::Proof;
 use servotune_report::number::NumberFormat;
 use servotune_report::table::{self, Column};
@@ -177,7 +177,8 @@ fn judged(id: String, v: Verdict, problems: &[String]) -> Row {
 /// Tunes one machine on its response, as `tune --frf` does.
 fn tuned(job: &Job<'_>, row: &mut Row, screen: &mut Screen) -> Result<(), Failure> {
     let file = job.machines.join(&row.id).join("response.bod");
-    let sweep = read_file(&file, &job.reading)?;
+    let mut sweep = read_file(&file, &job.reading)?;
+    sweep.frf = sweep.frf.with_hold(job.hold);
     for note in &sweep.notes {
         screen.say(&format!("note: {}: {note}", file.display()));
     }
@@ -191,21 +192,12 @@ fn tuned(job: &Job<'_>, row: &mut Row, screen: &mut Screen) -> Result<(), Failur
     let (outcome, mut table, certificate) = match job.certify {
         Some(spec_file) => {
             let (plant, spec) = (&identified.plant, job.spec);
-            let on = OnSweep {
-                sweep: &sweep,
-                hold: job.hold,
-                plant,
-                spec,
-                spec_file,
-                start,
-                inputs: &inputs,
-                gains: &gains,
-            };
+            let on = OnSweep { sweep: &sweep, plant, spec, spec_file, start, inputs: &inputs, gains: &gains };
             let done = on.tune(&job.tuning, screen)?;
             (done.outcome, done.table, Some(done.certificate))
         }
         None => {
-            let machine = Machine::Response { frf: &sweep.frf, hold: job.hold, continuation: Some(&identified.plant) };
+            let machine = Machine::Response { frf: &sweep.frf, continuation: Some(&identified.plant) };
             let outcome = tune(&machine, job.spec, start, &job.tuning)?;
             let table = GainTable::of(&outcome, job.spec.search.seed, job.spec_sha256.clone(), inputs)?
                 .in_units(&identified.plant.position_unit, &identified.plant.command_unit);

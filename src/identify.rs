@@ -4,7 +4,7 @@ use super::arguments::IdentifyArguments;
 use super::outputs::Outputs;
 use super::{Ending, Failure, Screen, load};
 use servotune::document::FileSet;
-use servotune::identify::{Hold, Identified, identify};
+use servotune::identify::{Identified, identify};
 use servotune::lti::PlantFile;
 use servotune_answer::{IdentifiedDocument, identified_page};
 use servotune_report::identified::{identified_sentences, ladder_table, order_table, parameter_table};
@@ -15,8 +15,8 @@ pub(super) fn run(a: &IdentifyArguments, screen: &mut Screen) -> Result<Ending, 
     let inputs: Vec<PathBuf> = inputs.into_iter().flatten().collect();
     let written: Vec<&PathBuf> = [Some(&a.out), a.report.as_ref()].into_iter().flatten().collect();
     let outputs = Outputs::new(&written, &inputs, a.force)?;
-    let hold_included = a.model.settings().hold != Hold::NotIncluded;
-    let taken = load::Taken { how: &a.taken, unstable_poles: 0, hold_included, controller: a.controller.as_deref() };
+    let taken =
+        load::Taken { how: &a.taken, unstable_poles: 0, hold: a.model.hold(None), controller: a.controller.as_deref() };
     let sweep = load::sweep(&a.frf, &a.reading, &taken, screen)?;
     let id = identify(&sweep.frf, &a.model.settings())
         .map_err(|source| Failure::Identify { file: a.frf.clone(), source })?;

@@ -5,7 +5,7 @@ use super::{Failure, Screen};
 use servotune::controller::Controller;
 use servotune::document::read_text;
 use servotune::document::size_limits::SWEEP_BYTES;
-use servotune::frf::{Ground, Measured, Note, ReadSettings, Sweep, read_bytes, read_file};
+use servotune::frf::{Ground, Hold, Measured, Note, ReadSettings, Sweep, read_bytes, read_file};
 use servotune::lti::Plant;
 use servotune::pes::Profile;
 use servotune_answer::{self as answer, Ran, adjusted, opened};
@@ -34,8 +34,8 @@ pub(super) struct Taken<'a> {
     pub how: &'a MeasuredArguments,
     /// Poles of the plant in the right half-plane.
     pub unstable_poles: usize,
-    /// Whether the caller says that the hold is in the sweep.
-    pub hold_included: bool,
+    /// Whether the controller's hold is in the sweep, as the caller says.
+    pub hold: Hold,
     /// The controller that ran, where the caller's words name no other.
     pub controller: Option<&'a Path>,
 }
@@ -115,14 +115,14 @@ pub(super) fn sweep(
         let said = format!("note: {}: {note}", file.display());
         if stated(note) { screen.detail(&said) } else { screen.say(&said) }
     }
-    sweep.frf = sweep.frf.with_unstable_poles(taken.unstable_poles);
+    sweep.frf = sweep.frf.with_unstable_poles(taken.unstable_poles).with_hold(taken.hold);
     if measured == Measured::Plant {
         return match taken.how.measured_with {
             Some(_) => Err(Failure::MeasuredPlant),
             None => Ok(sweep),
         };
     }
-    if taken.hold_included {
+    if taken.hold != Hold::NotIncluded {
         return Err(Failure::HoldTwice { measured });
     }
     let ran = taken.how.measured_with.as_deref().or(taken.controller).ok_or(Failure::NoController { measured })?;

@@ -7,6 +7,7 @@ use serde::Serialize;
 use servotune::controller::Controller;
 use servotune::document::{read_text, sha256_hex, write_text};
 use servotune::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
+use servotune::frf::Hold;
 use servotune::lti::Plant;
 use servotune_answer::{ModelMargins, Named, compared_page, margins_page, model_margins};
 use servotune_report::margins::{margins_text, measured_text};
@@ -48,13 +49,13 @@ pub(super) fn run(a: &MarginsArguments, screen: &mut Screen) -> Result<Ending, F
             let taken = load::Taken {
                 how: &a.taken,
                 unstable_poles: a.unstable_poles,
-                hold_included: a.hold_included,
+                hold: Hold::of(a.hold_included.then_some(controller.value.sample_time_s)),
                 controller: Some(controller.file),
             };
             let sections = controller.value.sections();
             let sections = sections.map_err(|source| Failure::Controller { file: controller.file.into(), source })?;
             let sweep = load::sweep(file, &a.reading, &taken, screen)?;
-            let judged = measured_margins(&MeasuredLoop::new(&sweep.frf, &sections, a.hold_included)?)?;
+            let judged = measured_margins(&MeasuredLoop::new(&sweep.frf, &sections)?)?;
             screen.result(&judged, &measured_text(&judged)?)?;
             judged.verdict == LoopVerdict::Stable
         }

@@ -3,17 +3,18 @@
 use super::performance_arguments::NextSweepArguments;
 use super::{Ending, Failure, Screen, load};
 use servotune::feedback::{LoopVerdict, PlanSettings, sweep_plan};
+use servotune::frf::Hold;
 use servotune_report::budget::{narrowing_table, tones_table};
 
 pub(super) fn run(a: &NextSweepArguments, screen: &mut Screen) -> Result<Ending, Failure> {
+    let controller = load::controller(&a.controller)?;
     let taken = load::Taken {
         how: &a.taken,
         unstable_poles: a.unstable_poles,
-        hold_included: a.hold_included,
+        hold: Hold::of(a.hold_included.then_some(controller.sample_time_s)),
         controller: Some(&a.controller),
     };
     let sweep = load::sweep(&a.frf, &a.reading, &taken, screen)?;
-    let controller = load::controller(&a.controller)?;
     let sections =
         controller.sections().map_err(|source| Failure::Controller { file: a.controller.clone(), source })?;
     let settings = PlanSettings {
@@ -23,7 +24,6 @@ pub(super) fn run(a: &NextSweepArguments, screen: &mut Screen) -> Result<Ending,
         position_limit: a.position_limit.unwrap_or(f64::INFINITY),
         periods: a.periods,
         settle_s: a.settle_s,
-        hold_included: a.hold_included,
     };
     let plan = sweep_plan(&sweep.frf, &sections, &settings)?;
     let none = "No tone narrows the intervals by 1 % of their mean width: none is planned.\n";

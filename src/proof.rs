@@ -8,10 +8,8 @@ use servotune::controller::Controller;
 use servotune::document::FileSet;
 use servotune::frf::Sweep;
 use servotune::lti::Plant;
-use servotune::tune::{GainTable, Hold, InputDigest, Machine, SearchStep, Spec, TuneError, TuneSettings};
-use servotune::verify::{
-    Assurance, Assured, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, Watched, tune_assured,
-};
+use servotune::tune::{GainTable, InputDigest, Machine, SearchStep, Spec, TuneError, TuneSettings};
+use servotune::verify::{Assurance, Assured, Certificate, Ground, Source, Uncertainty, Watched, tune_assured};
 use servotune_answer::Proof;
 use std::path::Path;
 
@@ -47,7 +45,6 @@ pub(super) fn commit(files: FileSet, screen: &mut Screen) -> Result<(), Failure>
 /// A sweep that is tuned on, with the files that a certificate names.
 pub(super) struct OnSweep<'a> {
     pub sweep: &'a Sweep,
-    pub hold: Hold,
     /// The model that continues it.
     pub plant: &'a Plant,
     pub spec: &'a Spec,
@@ -63,10 +60,9 @@ impl OnSweep<'_> {
         let spec_source = Source::read(self.spec_file)?;
         let profile = Spec::profile_path(self.spec_file).map_err(TuneError::from)?;
         let profile = profile.map(|p| Source::read(&p)).transpose()?;
-        let assumption = SweepAssumption { least_damping: LEAST_DAMPING, hold_included: self.hold == Hold::Included };
-        let machine = Machine::Response { frf: &self.sweep.frf, hold: self.hold, continuation: Some(self.plant) };
+        let machine = Machine::Response { frf: &self.sweep.frf, continuation: Some(self.plant) };
         let job = Assurance {
-            ground: Ground::Sweep { sweep: self.sweep, machine, assumption },
+            ground: Ground::Sweep { sweep: self.sweep, machine },
             spec: self.spec,
             spec_source: &spec_source,
             profile: profile.as_ref(),

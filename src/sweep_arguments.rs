@@ -2,10 +2,10 @@
 
 use clap::{Args, ValueEnum};
 use servotune::frf::{
-    AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale, Measured,
-    Outliers, PhaseConvention, ReadSettings, Unsorted,
+    AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, Hold, MagnitudeScale,
+    Measured, Outliers, PhaseConvention, ReadSettings, Unsorted,
 };
-use servotune::identify::{BodyChoice, Hold, IdentifySettings, OrderChoice, ZeroSide};
+use servotune::identify::{BodyChoice, IdentifySettings, OrderChoice, ZeroSide};
 use std::path::PathBuf;
 
 /// How to read the sweep file; whatever is left at `auto` is decided from the file and said
@@ -195,8 +195,12 @@ impl ModelArguments {
                 .order
                 .map_or(OrderChoice::Auto { max: self.max_order / 2 - 1 }, |n| OrderChoice::Fixed(n / 2 - 1)),
             zeros: if self.minimum_phase { ZeroSide::Left } else { ZeroSide::Either },
-            hold: self.hold_s.map_or(Hold::NotIncluded, |sample_time_s| Hold::Included { sample_time_s }),
             ..IdentifySettings::default()
         }
+    }
+
+    /// The hold that is in the sweep: of a stated sample time, or of the controller's clock where it is only said to be there.
+    pub fn hold(&self, clock: Option<f64>) -> Hold {
+        Hold::of(self.hold_s.or(clock))
     }
 }

@@ -6,8 +6,7 @@ use super::tune_text::{physical_text, text};
 use super::{Ending, Failure, Screen, load, proof, tune_machines, verify};
 use servotune::controller::Controller;
 use servotune::document::{FileSet, check_target, read_text, sha256_hex};
-use servotune::identify;
-use servotune::tune::{Hold, InputDigest, Machine, SearchStep, Spec, TuneError, TuneSettings, sample_time_s, tune};
+use servotune::tune::{InputDigest, Machine, SearchStep, Spec, TuneError, TuneSettings, sample_time_s, tune};
 use servotune::verify::{Source, Watched};
 use servotune_answer::slot::{self, Slot};
 use servotune_answer::{Asked, Given, Named, Proof, Reached, TunedDocument, given_model, given_sweep, tuned};
@@ -107,12 +106,11 @@ fn given(
             let taken = load::Taken {
                 how: &a.taken,
                 unstable_poles: a.unstable_poles,
-                hold_included: a.hold_included || a.model.settings().hold != identify::Hold::NotIncluded,
+                hold: a.model.hold(a.hold_included.then_some(clock)),
                 controller: a.controller.as_deref(),
             };
             let sweep = load::sweep(file, &a.reading, &taken, screen)?;
-            let hold = if a.hold_included { Hold::Included } else { Hold::NotIncluded };
-            Ok(given_sweep(file, sweep, hold, &a.model.settings(), clock)?)
+            Ok(given_sweep(file, sweep, &a.model.settings())?)
         }
         (None, None) => Err(Failure::NoMachine),
     }
@@ -129,9 +127,9 @@ fn report(
 ) -> Result<String, Failure> {
     let (plant, sweep, identified, over_model) = match given {
         Given::Model { plant, .. } => (plant.as_ref(), None, None, None),
-        Given::Response { sweep, hold, identified } => {
+        Given::Response { sweep, identified } => {
             let over_model = tune(&Machine::Model(&identified.plant), spec, start, settings)?;
-            (&identified.plant, Some((sweep.as_ref(), *hold)), Some(identified.as_ref()), Some(over_model))
+            (&identified.plant, Some(sweep.as_ref()), Some(identified.as_ref()), Some(over_model))
         }
     };
     let name = a.plant.as_ref().or(a.frf.as_ref()).map(|f| f.display().to_string()).unwrap_or_default();

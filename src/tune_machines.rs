@@ -6,7 +6,7 @@ use super::{Ending, Failure, Screen, load};
 use serde::Serialize;
 use servotune::document::{read_text, sha256_hex};
 use servotune::gate::Gate;
-use servotune::tune::{Hold, Spec, TuneError, TuneSettings, sample_time_s};
+use servotune::tune::{Spec, TuneError, TuneSettings, sample_time_s};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -41,8 +41,8 @@ pub(super) fn run(a: &TuneArguments, machines: &Path, gate: &Path, screen: &mut 
         spec_sha256: sha256_hex(read_text(&a.spec)?.as_bytes()),
         start,
         reading: a.reading.settings(),
-        model: model_settings(a, clock),
-        hold: if a.hold_included { Hold::Included } else { Hold::NotIncluded },
+        model: a.model.settings(),
+        hold: a.model.hold(a.hold_included.then_some(clock)),
         tuning: settings,
         overrides,
         keep_infeasible: a.keep_infeasible,
@@ -57,14 +57,4 @@ pub(super) fn run(a: &TuneArguments, machines: &Path, gate: &Path, screen: &mut 
     let text = format!("{}\n{}\n", gated::sheet(&rows)?.text(), gated::summary(&rows));
     screen.result(&document, &text)?;
     Ok(if not_tuned == 0 { Ending::Accepted } else { Ending::Rejected })
-}
-
-/// Settings of the model that continues the sweep: a sweep with the hold in it has it divided out first.
-pub(super) fn model_settings(a: &TuneArguments, sample_time_s: f64) -> servotune::identify::IdentifySettings {
-    let asked = a.model.settings();
-    let hold = match (a.hold_included, asked.hold) {
-        (true, servotune::identify::Hold::NotIncluded) => servotune::identify::Hold::Included { sample_time_s },
-        (_, hold) => hold,
-    };
-    servotune::identify::IdentifySettings { hold, ..asked }
 }

@@ -4,10 +4,10 @@ use super::outputs::Outputs;
 use super::verify_arguments::VerifyArguments;
 use super::{Ending, Failure, Screen, load};
 use servotune::document::{check_target, read_text, write_text};
-use servotune::frf::Sweep;
+use servotune::frf::{Hold, Sweep};
 use servotune::tune::{GainTable, Spec};
 use servotune::verify::{
-    Certificate, Inputs, Source, SweepAssumption, VerifyError, VerifySettings, certify_watched, choices,
+    Certificate, Inputs, Source, VerifyError, VerifySettings, certify_watched, choices, table_clock_s,
 };
 use servotune_report::certificate::certificate_text;
 use servotune_report::certificate_page::{CertificateView, certificate_page};
@@ -32,12 +32,10 @@ pub(super) fn run(a: &VerifyArguments, screen: &mut Screen) -> Result<Ending, Fa
         None => Default::default(),
     };
     let plants = a.plant.iter().map(|p| Source::read(p)).collect::<Result<Vec<Source>, VerifyError>>()?;
-    let taken = load::Taken {
-        how: &a.taken,
-        unstable_poles: a.unstable_poles,
-        hold_included: a.hold_included,
-        controller: a.controller.as_deref(),
-    };
+    let gains = Source::read(&a.gains)?;
+    let hold = if a.hold_included { Hold::of(Some(table_clock_s(&gains)?)) } else { Hold::NotIncluded };
+    let taken =
+        load::Taken { how: &a.taken, unstable_poles: a.unstable_poles, hold, controller: a.controller.as_deref() };
     if a.frf.is_empty() && a.taken.any() {
         return Err(Failure::MeasuredWithout);
     }
@@ -46,10 +44,10 @@ pub(super) fn run(a: &VerifyArguments, screen: &mut Screen) -> Result<Ending, Fa
     let profile = Spec::profile_path(&a.spec).map_err(VerifyError::from)?;
     let profile = profile.map(|p| Source::read(&p)).transpose()?;
     let inputs = Inputs {
-        gains: &Source::read(&a.gains)?,
+        gains: &gains,
         plants: &plants,
         sweeps: &sweeps,
-        assumption: SweepAssumption { least_damping: a.min_damping, hold_included: a.hold_included },
+        least_damping: a.min_damping,
         spec: &Source::read(&a.spec)?,
         profile: profile.as_ref(),
         word: a.word().unwrap_or(word),

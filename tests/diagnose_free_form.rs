@@ -126,7 +126,7 @@ fn recovered(curve: &FreeForm, truth: impl Fn(f64) -> f64) -> (f64, f64) {
 
 fn curve(machine: &Machine) -> FreeForm {
     let made = machine.diagnosed();
-    missing_curve(&made.bench, &made.selection).unwrap().curve
+    missing_curve(&made.data, &made.selection).unwrap().curve
 }
 
 /// A spring that hardens, with a bump on one side.
@@ -193,5 +193,5 @@ fn a_sound_machine_has_no_curve() {
     let made = SOUND.diagnosed();
     assert_eq!(made.diagnosis.verdict, Verdict::NoMismatch, "{:?}", made.diagnosis.findings);
     assert!(made.diagnosis.free_form.is_none());
-    assert!(missing_curve(&made.bench, &made.selection).is_none());
+    assert!(missing_curve(&made.data, &made.selection).is_none());
 }

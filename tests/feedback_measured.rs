@@ -1,7 +1,9 @@
 //! Margins of a noisy sweep against those of the machine it was taken from.
 #![allow(clippy::unwrap_used)]
 
+use nalgebra::Complex;
 use servotune::feedback::{FeedbackError, MeasuredLoop, ModelLoop, margins, measured_margins};
+use servotune::frf::{Frf, Hold};
 use servotune::lti::DiscretePlant;
 use servotune::numeric::random::Random;
 use servotune::twin::plants::{log_grid, measure, random_plant};
@@ -17,7 +19,7 @@ fn intervals_cover_the_truth_and_are_narrow() {
     let (mut covered, mut width) = ([0; 4], 0.0);
     for seed in 0..seeds {
         let frf = measure(&plant, &log_grid(40.0, 5000.0, 400), 0.01, &mut Random::new(seed)).unwrap();
-        let found = measured_margins(&MeasuredLoop::new(&frf, &sections, false).unwrap()).unwrap();
+        let found = measured_margins(&MeasuredLoop::new(&frf, &sections).unwrap()).unwrap();
         assert!(found.margins.stable);
         let i = found.intervals;
         let inside = |i: servotune::feedback::Interval, x: f64| i.low <= x && x <= i.high;
@@ -45,7 +47,7 @@ fn a_dense_exact_sweep_gives_the_models_own_margins() {
         let sampled = DiscretePlant::of(&plant, sections.sample_time_s).unwrap();
         let truth = margins(&ModelLoop::new(&sampled, &sections).unwrap());
         let frf = measure(&plant, &log_grid(20.0, 11_000.0, 6000), 0.0, &mut Random::new(1)).unwrap();
-        let found = measured_margins(&MeasuredLoop::new(&frf, &sections, false).unwrap()).unwrap().margins;
+        let found = measured_margins(&MeasuredLoop::new(&frf, &sections).unwrap()).unwrap().margins;
         assert_eq!(found.stable, truth.stable);
         if truth.stable {
             stable += 1
@@ -71,16 +73,38 @@ fn a_sweep_that_ends_too_early_or_holds_too_little_is_no_stable_loop() {
     };
     // The loop crosses 1 at some 600 Hz: at 200 Hz all that decides is still to come.
     let early = swept(40.0, 200.0, 50);
-    let l = MeasuredLoop::new(&early, &sections, false).unwrap();
+    let l = MeasuredLoop::new(&early, &sections).unwrap();
     match measured_margins(&l).unwrap_err() {
         FeedbackError::OpenEnd { end_hz, gain } => assert!((end_hz - 200.0).abs() < 1e-6 && gain > 1.0, "{gain}"),
         other => panic!("{other}"),
     }
     assert!(!margins(&l).stable);
     let half = 0.5 / sections.sample_time_s;
-    let few = MeasuredLoop::new(&swept(40.0, 5000.0, 3), &sections, false).unwrap_err();
+    let few = MeasuredLoop::new(&swept(40.0, 5000.0, 3), &sections).unwrap_err();
     assert_eq!(few, FeedbackError::FewPoints { found: 3, half_rate_hz: half, expected: 4 });
     let beyond = swept(2.0 * half, 3.0 * half, 9);
-    let none = MeasuredLoop::new(&beyond, &sections, false).unwrap_err();
+    let none = MeasuredLoop::new(&beyond, &sections).unwrap_err();
     assert!(matches!(none, FeedbackError::Band { half_rate_hz, .. } if half_rate_hz == half), "{none}");
+}
+
+#[test]
+fn a_hold_that_is_in_the_sweep_is_not_applied_again_and_another_clock_is_refused() {
+    let plant = paper_machine(MachineClass::Healthy).unwrap();
+    let sections = nominal_controller().unwrap().sections().unwrap();
+    let t = sections.sample_time_s;
+    let free = measure(&plant, &log_grid(20.0, 11_000.0, 2000), 0.0, &mut Random::new(1)).unwrap();
+    // A zero-order hold is a pulse of one sample: sinc, late by half of it.
+    let hold = |w: f64| Complex::from_polar((0.5 * w * t).sin() / (0.5 * w * t), -0.5 * w * t);
+    let value = free.w_rad_s().iter().zip(free.value()).map(|(w, v)| v * hold(*w)).collect();
+    let held = Frf::new(free.w_rad_s().to_vec(), value, None).unwrap();
+    let judged = |frf: &Frf| measured_margins(&MeasuredLoop::new(frf, &sections).unwrap()).unwrap().margins;
+    let phase = |frf: &Frf| judged(frf).phase_margin_deg.unwrap();
+    let right = held.clone().with_hold(Hold::of(Some(t)));
+    assert!((phase(&free) - phase(&right)).abs() < 1e-6);
+    // Unsaid, it is applied twice: half a sample more of delay at the crossover.
+    let late = 0.5 * t * judged(&free).gain_crossover_hz.unwrap() * 360.0;
+    assert!((phase(&free) - phase(&held) - late).abs() < 0.2 * late, "{late} deg");
+    let other = held.with_hold(Hold::of(Some(2.0 * t)));
+    let e = MeasuredLoop::new(&other, &sections).unwrap_err();
+    assert!(matches!(e, FeedbackError::Hold { found_s, expected_s } if found_s == 2.0 * t && expected_s == t), "{e}");
 }

@@ -3,7 +3,7 @@
 
 use servotune::frf::Frf;
 use servotune::lti::{Body, FrequencyResponse, Plant};
-use servotune::tune::{Hold, Machine};
+use servotune::tune::Machine;
 use servotune::twin::fleet::FleetSettings;
 use servotune::twin::{MachineClass, paper_machine};
 use servotune_fleet::{Evidence, FileSource, Fleet, FleetError, Input, SlotSource, Temperature};
@@ -92,7 +92,7 @@ fn a_warmer_machine_is_the_plant_with_its_gain_frequencies_and_dead_time_moved()
         frequency_per_c: -3e-4,
         delay_per_c: 1e-7,
     };
-    let e = Evidence::of(&response(&plant), Hold::NotIncluded, &plant, &[], 24.0, &temperature).unwrap();
+    let e = Evidence::of(&response(&plant), &plant, &[], 24.0, &temperature).unwrap();
     assert_eq!((e.count(), e.case(0), e.case(1)), (2, "as measured", "at 34 deg C"));
     let (gain, frequency) = ((-2e-3f64 * 10.0).exp(), (-3e-4f64 * 10.0).exp());
     let mut warm = plant.clone();
@@ -119,7 +119,7 @@ fn a_drawn_plant_acts_as_the_ratio_to_the_identified_one() {
     let mut drawn = plant.clone();
     drawn.delay_s *= 1.1;
     drawn.modes[0].pole_damping_ratio *= 0.8;
-    let e = Evidence::of(&response(&plant), Hold::NotIncluded, &plant, &[drawn.clone()], 24.0, &Temperature::default());
+    let e = Evidence::of(&response(&plant), &plant, &[drawn.clone()], 24.0, &Temperature::default());
     let e = e.unwrap();
     let machines = e.machines();
     let Machine::Response { frf, .. } = machines[1] else { panic!() };

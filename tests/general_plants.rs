@@ -6,7 +6,7 @@ use servotune::controller::{Controller, Lowpass, Pid};
 use servotune::feedback::{
     LoopOnGrid, LoopVerdict, MeasuredLoop, ModelLoop, SampledPlant, closed_loop_poles, margins, measured_margins,
 };
-use servotune::frf::Frf;
+use servotune::frf::{Frf, Hold};
 use servotune::lti::{Body, DiscretePlant, FrequencyResponse, Mode, Plant, PlantFile, PlantState, Rational};
 use servotune::numeric::random::Random;
 use servotune::verify::{Stability, Uncertainty, VerifySettings, prove_loop};
@@ -306,8 +306,9 @@ fn a_sweep_of_an_unstable_plant_needs_its_number_of_unstable_poles() {
             continue;
         }
         let value = w.iter().map(|&w| sampled.at(w)).collect();
-        let frf = Frf::new(w, value, None).unwrap().with_unstable_poles(count);
-        let measured = measured_margins(&MeasuredLoop::new(&frf, &sections, true).unwrap()).unwrap();
+        let frf =
+            Frf::new(w, value, None).unwrap().with_unstable_poles(count).with_hold(Hold::Included { sample_time_s: T });
+        let measured = measured_margins(&MeasuredLoop::new(&frf, &sections).unwrap()).unwrap();
         if measured.verdict == LoopVerdict::NotKnown {
             unknown += 1;
             continue;
@@ -318,7 +319,7 @@ fn a_sweep_of_an_unstable_plant_needs_its_number_of_unstable_poles() {
         stable += usize::from(truth.stable);
         // One unstable pole beside a stable one looks like an inertia, and is as stable; two look like nothing else.
         if count == 2 {
-            let blind = measured_margins(&MeasuredLoop::new(&frf.with_unstable_poles(0), &sections, true).unwrap());
+            let blind = measured_margins(&MeasuredLoop::new(&frf.clone().with_unstable_poles(0), &sections).unwrap());
             assert_ne!(blind.unwrap().margins.unstable_poles, truth.unstable_poles);
             pairs += 1;
         }

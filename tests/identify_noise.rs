@@ -17,7 +17,7 @@ fn intervals_cover_the_truth_in_95_of_100_sweeps() {
     for seed in 0..100 {
         let frf = measure(&truth, &w, 0.01, &mut Random::new(1000 + seed)).unwrap();
         let found = identify(&frf, &settings).unwrap();
-        let inside = |i: &servotune::identify::Interval, t: f64| i32::from(i.low <= t && t <= i.high);
+        let inside = |i: &servotune::identify::ParameterEstimate, t: f64| i32::from(i.low <= t && t <= i.high);
         delay += inside(&found.intervals.delay_s, truth.delay_s);
         body += inside(&found.intervals.natural_frequency_rad_s.unwrap(), natural_frequency_rad_s);
         pole += inside(&found.intervals.modes[0].pole_rad_s, truth.modes[0].pole_rad_s);

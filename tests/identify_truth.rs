@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use nalgebra::Complex;
-use servotune::frf::Frf;
+use servotune::frf::{Frf, Hold};
 use servotune::identify::{
-    BodyChoice, BodyEvidence, Hold, Identified, IdentifyError, IdentifySettings, OrderChoice, identify,
+    BodyChoice, BodyEvidence, Identified, IdentifyError, IdentifySettings, OrderChoice, identify,
 };
 use servotune::lti::{Body, FrequencyResponse, Mode, Plant};
 use servotune::numeric::golden::Bound;
@@ -159,8 +159,8 @@ fn the_hold_is_divided_out() {
         .map(|&w| truth.at(w) * Complex::from_polar((0.5 * w * t).sin() / (0.5 * w * t), -0.5 * w * t))
         .collect();
     let frf = Frf::new(w, value, None).unwrap();
-    let settings = IdentifySettings { hold: Hold::Included { sample_time_s: t }, ..fixed(1) };
-    let found = identify(&frf, &settings).unwrap();
+    let held = frf.clone().with_hold(Hold::Included { sample_time_s: t });
+    let found = identify(&held, &fixed(1)).unwrap();
     assert!(worst(&found, &truth) < 1e-6, "{}", worst(&found, &truth));
     // Left in, the hold is half a sample of delay more.
     let found = identify(&frf, &fixed(1)).unwrap();
@@ -191,7 +191,7 @@ fn what_is_refused_and_with_which_numbers() {
     let error = identify(&frf, &IdentifySettings { low_hz: 6000.0, ..IdentifySettings::default() }).unwrap_err();
     assert!(matches!(error, IdentifyError::EmptyBand { low_hz, .. } if low_hz == 6000.0));
     let hold = Hold::Included { sample_time_s: 1e-3 };
-    let error = identify(&frf, &IdentifySettings { hold, ..IdentifySettings::default() }).unwrap_err();
+    let error = identify(&frf.clone().with_hold(hold), &IdentifySettings::default()).unwrap_err();
     assert!(matches!(error, IdentifyError::HoldBand { nyquist_hz, .. } if nyquist_hz == 500.0));
     let error = identify(&frf, &IdentifySettings { folds: 1, ..IdentifySettings::default() }).unwrap_err();
     assert!(matches!(error, IdentifyError::Setting { key: "folds", found, .. } if found == 1.0));

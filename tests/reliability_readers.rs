@@ -14,7 +14,7 @@ use servotune::lti::{DiscretePlant, FrequencyResponse, LtiError, Plant, PlantFil
 use servotune::numeric::random::Random;
 use servotune::pes::{Profile, figures};
 use servotune::recording::{Record, RecordSettings, RecordingError, gzip, read_columns};
-use servotune::tune::{Hold, Machine, Spec, SpecError, judge};
+use servotune::tune::{Machine, Spec, SpecError, judge};
 use servotune::twin::plants::{log_grid, measure};
 use servotune::twin::{MachineClass, nominal_controller, paper_machine};
 use servotune::verify::{Uncertainty, VerifyError, VerifySettings, prove_loop};
@@ -91,7 +91,7 @@ fn a_gain_margin_beyond_the_sweep_is_that_of_its_last_point() {
     let rows: Vec<[f64; 3]> = rows(400, 0.0).into_iter().filter(|r| r[0] < 700.0).collect();
     let frf = read(&bod(&rows), &ReadSettings::default()).unwrap().frf;
     let c = nominal_controller().unwrap();
-    let machine = Machine::Response { frf: &frf, hold: Hold::NotIncluded, continuation: None };
+    let machine = Machine::Response { frf: &frf, continuation: None };
     let p = judge(&machine, &c, &Spec::parse(PAPER, SPIRAL).unwrap()).unwrap();
     assert_eq!(p.margins.gain_margin_db, None);
     // The last point of the sweep itself, by the plant's closed form, hold and sections.
@@ -324,7 +324,7 @@ fn five_points_do_not_tell_stability() {
     let sections = c.sections().unwrap();
     let verdict = |points: usize| {
         let frf = measure(&healthy(), &log_grid(40.0, 5000.0, points), 0.003, &mut Random::new(3)).unwrap();
-        let m = measured_margins(&MeasuredLoop::new(&frf, &sections, false).unwrap()).unwrap();
+        let m = measured_margins(&MeasuredLoop::new(&frf, &sections).unwrap()).unwrap();
         assert_eq!(m.margins.stable, m.verdict == LoopVerdict::Stable);
         m.verdict
     };

@@ -4,9 +4,10 @@
 use crate::tune_common::{paper_plant, paper_profile, paper_response, paper_spec, start_controller, sweep};
 use servotune::controller::Feedforward;
 use servotune::feedback::{MeasuredLoop, ModelLoop, ResponseCurve, margins};
+use servotune::frf::Hold;
 use servotune::lti::{DiscretePlant, FrequencyResponse};
 use servotune::pes::{ExpectedNoise, Noise, NoiseWork, Runout, SpectralPes, SpectralWork, figures, simulate};
-use servotune::tune::{Hold, Machine, Outcome, Route, TuneError, TuneSettings, judge, tune};
+use servotune::tune::{Machine, Outcome, Route, TuneError, TuneSettings, judge, tune};
 use std::f64::consts::TAU;
 
 const T: f64 = 39.6e-6;
@@ -17,7 +18,8 @@ fn dense() -> servotune::frf::Frf {
     let (from, to, n) = (1.0f64, 12_600.0f64, 3000);
     let w: Vec<f64> = (0..n).map(|i| TAU * from * (to / from).powf(i as f64 / (n - 1) as f64)).collect();
     let value = w.iter().map(|w| plant.at(*w)).collect();
-    servotune::frf::Frf::new(w, value, None).unwrap()
+    let frf = servotune::frf::Frf::new(w, value, None).unwrap();
+    frf.with_hold(Hold::Included { sample_time_s: T })
 }
 
 #[test]
@@ -30,7 +32,7 @@ fn the_spectrum_gives_the_simulated_pes() {
     profile.noise.runout = vec![Runout { order: 7, amplitude: 0.001, phase_deg: 30.0 }];
     let write = simulate(&paper_plant(), &c, &profile).unwrap();
     let timed = figures(&write.pes, &profile);
-    let curve = ResponseCurve::of(&dense(), T, |_| 1.0.into()).unwrap();
+    let curve = ResponseCurve::of(&dense(), T).unwrap();
     let s = SpectralPes::new(&profile, &curve, &c, (1..=100).collect(), true).unwrap();
     let (mut work, mut amplitude) = (SpectralWork::default(), Vec::new());
     let chain = c.sections().unwrap().chain;
@@ -55,7 +57,7 @@ fn expected_noise_is_the_mean_over_many_draws() {
     profile.spiral.velocity = 1e-9;
     profile.spiral.distance = 1e-9;
     profile.noise.windage_rms = 2e-3;
-    let curve = ResponseCurve::of(&dense(), T, |_| 1.0.into()).unwrap();
+    let curve = ResponseCurve::of(&dense(), T).unwrap();
     let s = SpectralPes::new(&profile, &curve, &c, (5..=21).collect(), false).unwrap();
     let mut amplitude = Vec::new();
     s.write(&c.sections().unwrap().chain, &mut SpectralWork::default(), &mut amplitude);
@@ -87,7 +89,7 @@ fn margins_of_the_sweep_are_those_of_the_model() {
     let sections = c.sections().unwrap();
     let plant = DiscretePlant::of(&paper_plant(), T).unwrap();
     let exact = margins(&ModelLoop::new(&plant, &sections).unwrap());
-    let measured = margins(&MeasuredLoop::new(&dense(), &sections, true).unwrap());
+    let measured = margins(&MeasuredLoop::new(&dense(), &sections).unwrap());
     assert!(measured.stable);
     // 3000 points: steps of 0.3 %, a tenth of the narrowest half-width; cubics leave less than 1e-4 of it.
     assert!((measured.phase_margin_deg.unwrap() - exact.phase_margin_deg.unwrap()).abs() < 1e-3);
@@ -98,7 +100,7 @@ fn margins_of_the_sweep_are_those_of_the_model() {
 #[test]
 fn tuning_on_the_sweep_meets_the_limits_on_the_machine_itself() {
     let (plant, frf, spec) = (paper_plant(), paper_response(), paper_spec());
-    let machine = Machine::Response { frf: &frf, hold: Hold::NotIncluded, continuation: None };
+    let machine = Machine::Response { frf: &frf, continuation: None };
     let start = start_controller();
     let settings = TuneSettings { starts: 6, ..TuneSettings::default() };
     let Outcome::Tuned(t) = tune(&machine, &spec, Some(&start), &settings).unwrap() else { panic!("feasible") };
@@ -115,7 +117,7 @@ fn tuning_on_the_sweep_meets_the_limits_on_the_machine_itself() {
 #[test]
 fn a_sweep_too_short_is_refused() {
     let frf = sweep(&paper_plant(), 10.0, 12_000.0, 12);
-    let machine = Machine::Response { frf: &frf, hold: Hold::NotIncluded, continuation: None };
+    let machine = Machine::Response { frf: &frf, continuation: None };
     let e = tune(&machine, &paper_spec(), None, &TuneSettings::default()).unwrap_err();
     assert!(matches!(e, TuneError::Sweep { points: 12, needed: 20, .. }), "{e}");
 }

@@ -10,8 +10,7 @@ use servotune::numeric::random::Random;
 use servotune::tune::{GainTable, Machine, Provenance, Route, Spec, Summary, judge};
 use servotune::twin::plants::random_plant;
 use servotune::verify::{
-    Certificate, Inputs, LEAST_DAMPING, ProvenLimit, Source, SweepAssumption, Uncertainty, Verdict, VerifySettings,
-    Word, certify,
+    Certificate, Inputs, LEAST_DAMPING, ProvenLimit, Source, Uncertainty, Verdict, VerifySettings, Word, certify,
 };
 use std::f64::consts::TAU;
 
@@ -67,7 +66,7 @@ fn proof_of_write(
         gains: &source("gains.toml", table.text().unwrap()),
         plants: &[source("plant.toml", plant.into())],
         sweeps: &[],
-        assumption: SweepAssumption { least_damping: LEAST_DAMPING, hold_included: false },
+        least_damping: LEAST_DAMPING,
         spec: &source("spec.toml", spec_text.into()),
         profile: profile.as_ref(),
         word: Word::Double,

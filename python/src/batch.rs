@@ -8,17 +8,17 @@ use crate::refusal::words;
 use crate::rows::{Row, rows};
 use crate::settings::{Reading, model, reading, uncertainty};
 use crate::spec::Spec;
-use crate::tune::{Job, Machine, run};
+use crate::tune::{Held, Job, Machine, run};
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use servotune::feedback::{Amplitudes, Margins, MeasuredLoop, measured_margins};
-use servotune::frf::{Sweep, read_bytes};
-use servotune::identify::{IdentifySettings, identify};
+use servotune::frf::{Hold, Sweep, read_bytes};
+use servotune::identify::identify;
 use servotune::lti::PlantFile;
-use servotune::tune::{Hold, Outcome, TuneSettings};
-use servotune::verify::{Inputs, LEAST_DAMPING, Source, SweepAssumption, VerifySettings, Word, certify};
+use servotune::tune::{Outcome, TuneSettings};
+use servotune::verify::{Inputs, LEAST_DAMPING, Source, VerifySettings, Word, certify};
 use servotune_answer::{self as answer, IdentifiedDocument, Named, Proof, TunedDocument, adjusted, model_margins};
 use std::fmt::Write;
 use std::path::Path;
@@ -145,13 +145,13 @@ pub fn batch_tune(
     let reading = plain(reading_words)?;
     let settings = TuneSettings { sample_time_s, starts, ..TuneSettings::default() };
     let job = Job { spec, settings, certificate, uncertainty: Default::default() };
-    let model = model(model_words, (&units.0, &units.1))?;
-    let hold = if hold_included { Hold::Included } else { Hold::NotIncluded };
+    let (model, hold_s) = model(model_words, (&units.0, &units.1))?;
+    let held = Held { hold_s, by_controller: hold_included };
     let all = for_all(controller);
     let one = |i: usize| -> Result<TunedRow, String> {
         let sweep = lists.sweep(i, &slots[i], &reading)?;
         let start = law(&slots[i], controllers[i].as_deref(), all.as_ref())?;
-        let machine = Machine::Sweep(Path::new(&slots[i]), Box::new(sweep), &model, hold);
+        let machine = Machine::Sweep(Path::new(&slots[i]), Box::new(sweep), &model, held);
         let start = start.as_ref().map(|(c, text)| (c, text.as_str()));
         let (given, reached) = run(machine, &job, start, &mut |_| ()).map_err(|e| words(&e))?;
         let verdict = match &reached.outcome {
@@ -206,9 +206,10 @@ pub fn batch_identify(
 ) -> PyResult<Vec<Row<IdentifiedRow>>> {
     let lists = sweeps.lists()?;
     let reading = plain(reading_words)?;
-    let settings: IdentifySettings = model(model_words, (&units.0, &units.1))?;
+    let (settings, hold_s) = model(model_words, (&units.0, &units.1))?;
     let one = |i: usize| -> Result<IdentifiedRow, String> {
-        let sweep = lists.sweep(i, &slots[i], &reading)?;
+        let mut sweep = lists.sweep(i, &slots[i], &reading)?;
+        sweep.frf = sweep.frf.with_hold(Hold::of(hold_s));
         let id = identify(&sweep.frf, &settings).map_err(|e| format!("{}: {}", slots[i], words(&e)))?;
         let document = IdentifiedDocument::of(&sweep, &id);
         let text = toml::to_string(&PlantFile::from(&id.plant)).map_err(|e| e.to_string())?;
@@ -279,9 +280,10 @@ pub fn batch_margins(
                 Ok(margins_row(m, judged.stable(), json(&judged)?))
             }
             (None, Some(lists)) => {
-                let sweep = lists.sweep(i, slot, &reading)?;
+                let mut sweep = lists.sweep(i, slot, &reading)?;
+                sweep.frf = sweep.frf.with_hold(Hold::of(hold_included.then_some(law.sample_time_s)));
                 let sections = law.sections().map_err(|e| format!("{law_name}: {}", words(&e)))?;
-                let l = MeasuredLoop::new(&sweep.frf, &sections, hold_included).map_err(|e| words(&e))?;
+                let l = MeasuredLoop::new(&sweep.frf, &sections).map_err(|e| words(&e))?;
                 let judged = measured_margins(&l).map_err(|e| words(&e))?;
                 Ok(margins_row(&judged.margins, judged.margins.stable, json(&judged)?))
             }
@@ -318,7 +320,7 @@ pub fn batch_verify(
             gains: &source("gains", gains[i].as_ref())?,
             plants: std::slice::from_ref(&plant),
             sweeps: &[],
-            assumption: SweepAssumption { least_damping: LEAST_DAMPING, hold_included: false },
+            least_damping: LEAST_DAMPING,
             spec: &spec.source,
             profile: spec.profile.as_ref(),
             word: Word::default(),

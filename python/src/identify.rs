@@ -7,15 +7,16 @@ use crate::refusal::raise;
 use crate::{picture, settings};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use servotune::frf::Hold;
 use servotune_answer::{AnswerError, IdentifiedDocument};
 use servotune_report::identified::identified_figure;
-use std::sync::Arc;
 
 /// The model of a sweep, and the document of `identify --json`.
 #[pyfunction]
 pub fn identify(py: Python<'_>, frf: &Frf, keywords: &Bound<'_, PyDict>) -> PyResult<(Plant, Answer)> {
-    let settings = settings::model(keywords, (&frf.units.0, &frf.units.1))?;
-    let sweep = Arc::clone(&frf.sweep);
+    let (settings, hold_s) = settings::model(keywords, (&frf.units.0, &frf.units.1))?;
+    let mut sweep = frf.sweep.as_ref().clone();
+    sweep.frf = sweep.frf.with_hold(Hold::of(hold_s));
     let id = py
         .detach(|| servotune::identify::identify(&sweep.frf, &settings))
         .map_err(|source| raise(AnswerError::Identify { file: frf.file.clone(), source }))?;

@@ -8,8 +8,8 @@ use crate::plant::Plant;
 use crate::refusal::raise;
 use pyo3::prelude::*;
 use servotune::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
+use servotune::frf::Hold;
 use servotune_answer::{AnswerError, ModelMargins, Named, model_margins};
-use std::sync::Arc;
 
 /// Margins of a plant model's loop; amplitudes (position_unit) matter to physics only.
 #[pyfunction]
@@ -37,13 +37,15 @@ pub fn margins_of_model(
 /// Margins of a sweep's loop, each with its interval.
 #[pyfunction]
 pub fn margins_of_sweep(py: Python<'_>, frf: &Frf, controller: &Controller, hold_included: bool) -> PyResult<Answer> {
+    let hold = Hold::of(hold_included.then_some(controller.controller.sample_time_s));
+    let held = frf.sweep.frf.clone().with_hold(hold);
     let judge = || {
         let sections = controller.controller.sections();
         let sections = sections.map_err(|source| AnswerError::Controller { file: controller.file.clone(), source })?;
-        Ok::<_, AnswerError>(measured_margins(&MeasuredLoop::new(&frf.sweep.frf, &sections, hold_included)?)?)
+        Ok::<_, AnswerError>(measured_margins(&MeasuredLoop::new(&held, &sections)?)?)
     };
     let judged = py.detach(judge).map_err(raise)?;
     let answer = Answer::of(&judged, judged.verdict == LoopVerdict::Stable, Vec::new())?;
-    let (sweep, controller) = (Arc::clone(&frf.sweep), controller.controller.clone());
-    Ok(answer.drawn(move || picture::of_measured_loop(&sweep.frf, &controller, hold_included, &judged.margins)))
+    let controller = controller.controller.clone();
+    Ok(answer.drawn(move || picture::of_measured_loop(&held, &controller, &judged.margins)))
 }

@@ -82,9 +82,9 @@ pub fn of_model_loop(plant: &Plant, controller: &Controller, m: &Margins) -> Res
 }
 
 /// The open loop of a sweep.
-pub fn of_measured_loop(frf: &Frf, controller: &Controller, hold: bool, m: &Margins) -> Result<String, ReportError> {
+pub fn of_measured_loop(frf: &Frf, controller: &Controller, m: &Margins) -> Result<String, ReportError> {
     let sections = controller.sections().map_err(|_| unmade())?;
-    let l = MeasuredLoop::new(frf, &sections, hold).map_err(|_| unmade())?;
+    let l = MeasuredLoop::new(frf, &sections).map_err(|_| unmade())?;
     Ok(svg(&of_loop(&l, m)?))
 }
 

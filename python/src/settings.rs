@@ -4,7 +4,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use servotune::frf::{ColumnChoice, Measured, ReadSettings, UnknownWord};
-use servotune::identify::{BodyChoice, Hold, IdentifySettings, OrderChoice, ZeroSide};
+use servotune::identify::{BodyChoice, IdentifySettings, OrderChoice, ZeroSide};
 use servotune::verify::Uncertainty;
 use std::path::Path;
 use std::str::FromStr;
@@ -120,14 +120,15 @@ fn columns(roles: &Bound<'_, PyDict>) -> PyResult<ColumnChoice> {
     Ok(choice)
 }
 
-/// Keywords of `identify`, beside the units of the sweep.
-pub fn model(keywords: &Bound<'_, PyDict>, units: (&str, &str)) -> PyResult<IdentifySettings> {
+/// Keywords of `identify`, beside the units of the sweep; and the sample time of a hold that is stated to be in it (s).
+pub fn model(keywords: &Bound<'_, PyDict>, units: (&str, &str)) -> PyResult<(IdentifySettings, Option<f64>)> {
     const KNOWN: [&str; 6] = ["order", "max_order", "body", "minimum_phase", "hold_s", "band_hz"];
     let mut s = IdentifySettings {
         position_unit: units.0.to_owned(),
         command_unit: units.1.to_owned(),
         ..IdentifySettings::default()
     };
+    let mut hold_s = None;
     let (mut order, mut most): (Option<usize>, Option<usize>) = (None, None);
     for (key, value) in keywords {
         let key: String = key.extract()?;
@@ -147,11 +148,7 @@ pub fn model(keywords: &Bound<'_, PyDict>, units: (&str, &str)) -> PyResult<Iden
             }
             "minimum_phase" if value.extract()? => s.zeros = ZeroSide::Left,
             "minimum_phase" => s.zeros = ZeroSide::Either,
-            "hold_s" => {
-                if let Some(sample_time_s) = value.extract()? {
-                    s.hold = Hold::Included { sample_time_s };
-                }
-            }
+            "hold_s" => hold_s = value.extract()?,
             "band_hz" => {
                 if let Some((low, high)) = value.extract::<Option<(f64, f64)>>()? {
                     (s.low_hz, s.high_hz) = (low, high);
@@ -172,7 +169,7 @@ pub fn model(keywords: &Bound<'_, PyDict>, units: (&str, &str)) -> PyResult<Iden
     if let Some(n) = order {
         s.order = OrderChoice::Fixed(n / 2 - 1);
     }
-    Ok(s)
+    Ok((s, hold_s))
 }
 
 /// A box around a plant: shares by name.

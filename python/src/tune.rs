@@ -12,10 +12,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use servotune::document::sha256_hex;
 use servotune::feedback::{Margins, MeasuredLoop, ModelLoop, confirmed_margins, margins};
-use servotune::frf::Sweep;
+use servotune::frf::{Hold, Sweep};
 use servotune::identify::IdentifySettings;
 use servotune::lti::DiscretePlant;
-use servotune::tune::{Hold, InputDigest, TuneSettings, sample_time_s};
+use servotune::tune::{InputDigest, TuneSettings, sample_time_s};
 use servotune::verify::Uncertainty;
 use servotune_answer::{
     AnswerError, Asked, Given, Named, Proof, Reached, TunedDocument, given_model, given_sweep, tuned,
@@ -46,12 +46,28 @@ pub struct Tuned {
     controller: Py<Controller>,
 }
 
+/// What the caller says of the hold in a sweep.
+#[derive(Clone, Copy)]
+pub struct Held {
+    /// Sample time that is stated (s).
+    pub hold_s: Option<f64>,
+    /// Whether it is the controller's own.
+    pub by_controller: bool,
+}
+
+impl Held {
+    /// The hold, under a controller of this sample time (s).
+    fn hold(self, clock_s: f64) -> Hold {
+        Hold::of(self.hold_s.or(self.by_controller.then_some(clock_s)))
+    }
+}
+
 /// A machine to tune.
 pub enum Machine<'a> {
     /// A model.
     Model(&'a Plant),
-    /// A sweep, its name, how its model is identified, and whether the hold is in it.
-    Sweep(&'a Path, Box<Sweep>, &'a IdentifySettings, Hold),
+    /// A sweep, its name, how its model is identified, and the sample time (s) of a hold that is in it.
+    Sweep(&'a Path, Box<Sweep>, &'a IdentifySettings, Held),
 }
 
 /// What is asked, the same for every row of a batch.
@@ -81,7 +97,10 @@ pub fn run(
             let source = servotune::verify::Source { file: p.file.clone(), text: p.text.clone() };
             given_model(Named { file: &p.file, value: &p.plant }, source, spec, controller, clock, say)?
         }
-        Machine::Sweep(file, sweep, model, hold) => given_sweep(file, *sweep, hold, model, clock)?,
+        Machine::Sweep(file, mut sweep, model, held) => {
+            sweep.frf = sweep.frf.with_hold(held.hold(clock));
+            given_sweep(file, *sweep, model)?
+        }
     };
     let mut inputs = vec![digest];
     inputs
@@ -109,9 +128,7 @@ fn judged(given: &Given, c: &servotune::controller::Controller) -> Result<Margin
         Given::Model { plant, .. } => {
             confirmed_margins(&ModelLoop::new(&DiscretePlant::of(plant, c.sample_time_s)?, &sections)?)?
         }
-        Given::Response { sweep, hold, .. } => {
-            margins(&MeasuredLoop::new(&sweep.frf, &sections, *hold == Hold::Included)?)
-        }
+        Given::Response { sweep, .. } => margins(&MeasuredLoop::new(&sweep.frf, &sections)?),
     })
 }
 
@@ -124,7 +141,7 @@ fn draw(given: &Given, c: &servotune::controller::Controller) -> Result<String, 
     })?;
     match given {
         Given::Model { plant, .. } => picture::of_model_loop(plant, c, &m),
-        Given::Response { sweep, hold, .. } => picture::of_measured_loop(&sweep.frf, c, *hold == Hold::Included, &m),
+        Given::Response { sweep, .. } => picture::of_measured_loop(&sweep.frf, c, &m),
     }
 }
 
@@ -146,12 +163,12 @@ pub fn tune(
 ) -> PyResult<Tuned> {
     let settings = TuneSettings { sample_time_s, starts, ..TuneSettings::default() };
     let job = Job { spec, settings, certificate, uncertainty: uncertainty(shares)?.unwrap_or_default() };
-    let hold = if hold_included { Hold::Included } else { Hold::NotIncluded };
     let units = frf.map_or(("", ""), |f| (f.units.0.as_str(), f.units.1.as_str()));
-    let model = model(keywords, units)?;
+    let (model, hold_s) = model(keywords, units)?;
+    let held = Held { hold_s, by_controller: hold_included };
     let machine = match (plant, frf) {
         (Some(plant), _) => Machine::Model(plant),
-        (None, Some(frf)) => Machine::Sweep(&frf.file, Box::new(frf.sweep.as_ref().clone()), &model, hold),
+        (None, Some(frf)) => Machine::Sweep(&frf.file, Box::new(frf.sweep.as_ref().clone()), &model, held),
         (None, None) => return Err(pyo3::exceptions::PyTypeError::new_err("expected a Plant or an Frf")),
     };
     let start = controller.map(|c| (&c.controller, c.text.as_str()));

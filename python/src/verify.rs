@@ -8,8 +8,8 @@ use crate::settings::uncertainty;
 use crate::spec::Spec;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use servotune::frf::Sweep;
-use servotune::verify::{Inputs, Source, SweepAssumption, VerifySettings, Word, certify};
+use servotune::frf::{Hold, Sweep};
+use servotune::verify::{Inputs, Source, VerifySettings, Word, certify, table_clock_s};
 use servotune_report::certificate::certificate_text;
 
 /// The certificate of the gain table in a text, on plants and sweeps that must all pass, and what it says in words.
@@ -29,18 +29,24 @@ pub fn verify(
     single: bool,
 ) -> PyResult<(Answer, String)> {
     let plants: Vec<Source> = plants.iter().map(|p| Source { file: p.file.clone(), text: p.text.clone() }).collect();
-    let sweeps: Vec<Sweep> = sweeps.iter().map(|f| f.sweep.as_ref().clone()).collect();
     let word = match (single, fixed_point) {
         (true, _) => Word::Single,
         (false, Some((bits, fraction))) => Word::Fixed { bits, fraction },
         (false, None) => Word::default(),
     };
     let gains = Source { file: name.into(), text: gains };
+    let clock_s = if hold_included { Some(table_clock_s(&gains).map_err(raise)?) } else { None };
+    let taken = |f: &PyRef<'_, Frf>| {
+        let mut sweep = f.sweep.as_ref().clone();
+        sweep.frf = sweep.frf.with_hold(Hold::of(clock_s));
+        sweep
+    };
+    let sweeps: Vec<Sweep> = sweeps.iter().map(taken).collect();
     let inputs = Inputs {
         gains: &gains,
         plants: &plants,
         sweeps: &sweeps,
-        assumption: SweepAssumption { least_damping, hold_included },
+        least_damping,
         spec: &spec.source,
         profile: spec.profile.as_ref(),
         word,

@@ -2,7 +2,7 @@
 
 use super::{AnswerError, fleet_slot};
 use servotune::lti::Plant;
-use servotune_fleet::{Context, Proved, SlotRow, Store, Verdict, assigned, drift, work_list};
+use servotune_fleet::{Context, SlotRow, Store, Verdict, WorstCase, assigned, drift, work_list};
 use servotune_report::fleet::{CoverageLine, FleetView, SlotLine, fleet_page};
 use servotune_report::tuned::figure_name;
 use std::collections::{BTreeMap, BTreeSet};
@@ -96,7 +96,7 @@ fn line(row: &SlotRow, shared: Option<String>) -> SlotLine {
         Verdict::Keeps => now,
         _ => row.table.as_ref().or(row.nearest.as_ref()).map(|t| &t.proved),
     };
-    let of = |f: &dyn Fn(&Proved) -> Option<f64>| [now, then].map(|p| p.and_then(f).unwrap_or(f64::NAN));
+    let of = |f: &dyn Fn(&WorstCase) -> Option<f64>| [now, then].map(|p| p.and_then(f).unwrap_or(f64::NAN));
     let gate = row.gate.as_ref();
     let limit = then.or(now).map(|p| {
         let name = figure_name(p.limit);

@@ -27,7 +27,8 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
     let found = row.table.as_ref().or(row.nearest.as_ref());
     let gains = found.map_or(start, |t| &t.gains);
     let proved = found.map_or(current, |t: &OwnTable| &t.proved);
-    let machine = Machine::Response { frf: &frf, hold: context.hold, continuation: Some(&plant) };
+    let frf = frf.with_hold(context.hold);
+    let machine = Machine::Response { frf: &frf, continuation: Some(&plant) };
     let work = Work {
         route: Route::Response,
         starts: 0,
@@ -54,7 +55,7 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
         name: &name,
         plant: &plant,
         units: slot::units(&plant),
-        sweep: Some((&sweep, context.hold)),
+        sweep: Some(&sweep),
         identified: None,
         spec: &context.spec,
         // Gains that stay are no tuning: there is nothing before them.

@@ -10,7 +10,7 @@ use servotune::lti::{DiscretePlant, Plant};
 use servotune::pes::{figures, simulate, simulate_physical};
 use servotune::physics::Restored;
 use servotune::tune::{
-    DERIVATIVE_FILTER, GainTable, Hold, Judged, Machine, Outcome, PhysicalTuning, Spec, judge, margin_intervals,
+    DERIVATIVE_FILTER, GainTable, Judged, Machine, Outcome, PhysicalTuning, Spec, judge, margin_intervals,
 };
 use servotune_report::identified::{
     identified_figure, identified_sentences, ladder_table, order_table, parameter_table,
@@ -34,7 +34,7 @@ pub struct Slot<'a> {
     /// Units of position and command.
     pub units: Units<'a>,
     /// The sweep with the hold it contains, where there is one.
-    pub sweep: Option<(&'a Sweep, Hold)>,
+    pub sweep: Option<&'a Sweep>,
     /// What identification said of it, with intervals.
     pub identified: Option<&'a Identified>,
     /// The limits.
@@ -264,7 +264,7 @@ fn plant_sections(slot: &Slot<'_>) -> Result<Vec<Section>, AnswerError> {
     let sampled = DiscretePlant::of(slot.plant, slot.outcome.controller().sample_time_s)?;
     let table = Block::Table(sampled_table(&sampled)?);
     let eq31 = Block::Details("Sampled plant, exact (counterpart of the paper's eq. 31)".into(), vec![table]);
-    let (Some((sweep, _)), Some(id)) = (slot.sweep, slot.identified) else {
+    let (Some(sweep), Some(id)) = (slot.sweep, slot.identified) else {
         return Ok(vec![Section { heading: "Plant".into(), blocks: vec![eq31] }]);
     };
     let mut blocks = identified_blocks(sweep, id)?;
@@ -287,8 +287,8 @@ fn gain_sections(slot: &Slot<'_>) -> Result<Vec<Section>, AnswerError> {
     blocks.push(Block::Details("Sections".into(), vec![Block::Table(sections_table(slot.table.sections())?)]));
     blocks.push(Block::Details("Gain table (gains.toml)".into(), vec![Block::Code(slot.table.text()?)]));
     let mut sections = vec![Section { heading: "Gains".into(), blocks }];
-    if let (Some(over_model), Some((sweep, hold))) = (slot.over_model, slot.sweep) {
-        let on_response = Machine::Response { frf: &sweep.frf, hold, continuation: Some(slot.plant) };
+    if let (Some(over_model), Some(sweep)) = (slot.over_model, slot.sweep) {
+        let on_response = Machine::Response { frf: &sweep.frf, continuation: Some(slot.plant) };
         let on_model = Machine::Model(slot.plant);
         let judged = |machine: &Machine<'_>, o: &Outcome| judge(machine, o.controller(), slot.spec).map(|p| p.judged);
         let first = (judged(&on_response, slot.outcome)?, judged(&on_model, slot.outcome)?);

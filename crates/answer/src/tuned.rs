@@ -5,17 +5,15 @@ use serde::Serialize;
 use servotune::controller::{Controller, Pid};
 use servotune::feedback::{Amplitudes, LoopVerdict, MeasuredLoop, measured_margins};
 use servotune::frf::Sweep;
-use servotune::identify::{self, Identified, IdentifySettings, identify};
+use servotune::identify::{Identified, IdentifySettings, identify};
 use servotune::lti::Plant;
 use servotune::pes::context;
 use servotune::physics::Restored;
 use servotune::tune::{
-    GainTable, Hold, InputDigest, Machine, Outcome, PhysicalProof, PhysicalTuning, Spec, TuneError, TuneSettings,
+    GainTable, InputDigest, Machine, Outcome, PhysicalProof, PhysicalTuning, Spec, TuneError, TuneSettings,
     tune_physical, tune_watched,
 };
-use servotune::verify::{
-    Assurance, Certificate, Ground, LEAST_DAMPING, Source, SweepAssumption, Uncertainty, Watched, tune_assured,
-};
+use servotune::verify::{Assurance, Certificate, Ground, Source, Uncertainty, Watched, tune_assured};
 use servotune_report::tuned::Units;
 use std::path::Path;
 
@@ -35,8 +33,6 @@ pub enum Given {
     Response {
         /// The sweep.
         sweep: Box<Sweep>,
-        /// Whether the controller's hold is in it.
-        hold: Hold,
         /// The model; its units are those of the table.
         identified: Box<Identified>,
     },
@@ -140,22 +136,11 @@ pub fn given_model(
 }
 
 /// A sweep to be tuned on, with its digest; a sweep with the hold in it has it divided out of the model.
-pub fn given_sweep(
-    file: &Path,
-    sweep: Sweep,
-    hold: Hold,
-    model: &IdentifySettings,
-    clock: f64,
-) -> Result<(Given, InputDigest), AnswerError> {
-    let divided = match (hold, model.hold) {
-        (Hold::Included, identify::Hold::NotIncluded) => identify::Hold::Included { sample_time_s: clock },
-        (_, asked) => asked,
-    };
-    let settings = IdentifySettings { hold: divided, ..model.clone() };
+pub fn given_sweep(file: &Path, sweep: Sweep, model: &IdentifySettings) -> Result<(Given, InputDigest), AnswerError> {
     let identified =
-        identify(&sweep.frf, &settings).map_err(|source| AnswerError::Identify { file: file.into(), source })?;
+        identify(&sweep.frf, model).map_err(|source| AnswerError::Identify { file: file.into(), source })?;
     let digest = InputDigest { role: "frf".into(), sha256: sweep.source_digest.clone() };
-    Ok((Given::Response { sweep: Box::new(sweep), hold, identified: Box::new(identified) }, digest))
+    Ok((Given::Response { sweep: Box::new(sweep), identified: Box::new(identified) }, digest))
 }
 
 impl Given {
@@ -178,17 +163,17 @@ impl Given {
 
     /// Whether `margins` would accept the loop: of a sweep it asks that the points tell stability.
     fn knows(&self, controller: &Controller) -> Result<bool, AnswerError> {
-        let Given::Response { sweep, hold, .. } = self else { return Ok(true) };
+        let Given::Response { sweep, .. } = self else { return Ok(true) };
         let sections = controller.sections().map_err(TuneError::from)?;
-        let l = MeasuredLoop::new(&sweep.frf, &sections, *hold == Hold::Included)?;
+        let l = MeasuredLoop::new(&sweep.frf, &sections)?;
         Ok(measured_margins(&l)?.verdict != LoopVerdict::NotKnown)
     }
 
     fn machine(&self) -> Machine<'_> {
         match self {
             Given::Model { plant, .. } => Machine::Model(plant),
-            Given::Response { sweep, hold, identified } => {
-                Machine::Response { frf: &sweep.frf, hold: *hold, continuation: Some(&identified.plant) }
+            Given::Response { sweep, identified } => {
+                Machine::Response { frf: &sweep.frf, continuation: Some(&identified.plant) }
             }
         }
     }
@@ -230,11 +215,7 @@ fn reach(given: &Given, asked: &Asked<'_>, say: Say<'_>) -> Result<Reached, Answ
     }
     let ground = match given {
         Given::Model { plant, source, .. } => Ground::Plant { plant, source },
-        Given::Response { sweep, hold, .. } => Ground::Sweep {
-            sweep,
-            machine: given.machine(),
-            assumption: SweepAssumption { least_damping: LEAST_DAMPING, hold_included: *hold == Hold::Included },
-        },
+        Given::Response { sweep, .. } => Ground::Sweep { sweep, machine: given.machine() },
     };
     let job = Assurance {
         ground,

@@ -7,7 +7,7 @@ use super::look::{distance, nearest};
 use super::slot::Prepared;
 use super::{Context, Ready};
 use servotune::controller::Controller;
-use servotune::tune::{Machine, TuningProblem, roomiest_table};
+use servotune::tune::{Machine, TuningProblem, table_with_most_room};
 
 /// Numbers of groups.
 pub const LEVELS: [usize; 6] = [1, 2, 3, 4, 6, 8];
@@ -78,7 +78,7 @@ pub(super) fn group_table(
     let mut starts: Vec<(f64, usize)> = from.iter().enumerate().map(|(i, c)| (score(c, &mut work), i)).collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let polished =
-        starts.iter().take(STARTS).filter_map(|(_, i)| roomiest_table(&problem, &from[*i], STEPS, &mut work));
+        starts.iter().take(STARTS).filter_map(|(_, i)| table_with_most_room(&problem, &from[*i], STEPS, &mut work));
     polished.min_by(|a, b| a.1.violation.total_cmp(&b.1.violation)).map(|(c, _)| c)
 }
 

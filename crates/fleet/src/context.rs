@@ -6,9 +6,10 @@ use super::FleetError;
 use super::settings::{Fleet, FleetFile};
 use servotune::controller::Controller;
 use servotune::document::{parse_toml, read_text, sha256_hex};
+use servotune::frf::Hold;
 use servotune::gate::Gate;
-use servotune::identify::{self, IdentifySettings};
-use servotune::tune::{Hold, Spec, SpecError, TuneSettings};
+use servotune::identify::IdentifySettings;
+use servotune::tune::{Spec, SpecError, TuneSettings};
 
 /// What every slot's work needs.
 #[derive(Clone, Debug)]
@@ -64,19 +65,12 @@ impl Context {
             }
             None => None,
         };
-        let included = f.input.hold_included;
         let mut words = format!("{}\n", env!("CARGO_PKG_VERSION"));
         inputs.iter().for_each(|(name, sha256)| words += &format!("{name} {sha256}\n"));
         Ok(Context {
             guarded: Spec { guard: f.robust.guard, ..spec.clone() },
-            hold: if included { Hold::Included } else { Hold::NotIncluded },
-            identify: IdentifySettings {
-                hold: match included {
-                    true => identify::Hold::Included { sample_time_s: base.sample_time_s },
-                    false => identify::Hold::NotIncluded,
-                },
-                ..IdentifySettings::default()
-            },
+            hold: Hold::of(f.input.hold_included.then_some(base.sample_time_s)),
+            identify: IdentifySettings::default(),
             search: TuneSettings { sample_time_s: Some(base.sample_time_s), starts: STARTS, ..TuneSettings::default() },
             digest: sha256_hex(words.as_bytes()),
             file: f.clone(),

@@ -7,6 +7,7 @@
 use super::row::SlotRow;
 use super::{FleetError, Store};
 use serde::Serialize;
+use servotune::numeric::statistics::median;
 use std::collections::BTreeMap;
 
 /// One quantity over the runs.
@@ -68,23 +69,17 @@ const HALF: f64 = 0.6745;
 /// A run with more slots than this is not held in memory for its trends.
 const MOST_SLOTS: usize = 200_000;
 
-fn median(mut v: Vec<f64>) -> Option<f64> {
-    v.sort_by(f64::total_cmp);
-    let n = v.len();
-    (n > 0).then(|| 0.5 * (v[(n - 1) / 2] + v[n / 2]))
-}
-
 /// Scatter of one value about its line, from all slots together (one standard deviation).
 fn scatter<'a>(all: impl Iterator<Item = &'a Series> + Clone) -> Option<f64> {
     // e1 - 2 e2 + e3 of equally spaced runs has six times the variance of one.
     let second = all.clone().flat_map(|s| s.windows(3)).map(|w| (w[0].1 - 2.0 * w[1].1 + w[2].1).abs() / 6f64.sqrt());
     let second: Vec<f64> = second.collect();
     if !second.is_empty() {
-        return median(second).map(|m| m / HALF);
+        return median(&second).map(|m| m / HALF);
     }
     let first: Vec<f64> = all.flat_map(|s| s.windows(2)).map(|w| w[1].1 - w[0].1).collect();
-    let middle = median(first.clone())?;
-    median(first.iter().map(|d| (d - middle).abs() / 2f64.sqrt()).collect()).map(|m| m / HALF)
+    let middle = median(&first)?;
+    median(&first.iter().map(|d| (d - middle).abs() / 2f64.sqrt()).collect::<Vec<_>>()).map(|m| m / HALF)
 }
 
 /// The line through a series; the floor's scatter where the slot cannot know its own.

@@ -8,7 +8,7 @@ use super::settings::{Robust, Temperature};
 use nalgebra::Complex;
 use servotune::frf::{Frf, FrfShapeError};
 use servotune::lti::{Body, FrequencyResponse, Plant};
-use servotune::tune::{Hold, Machine};
+use servotune::tune::Machine;
 
 /// One case.
 #[derive(Clone, Debug)]
@@ -20,8 +20,8 @@ struct Case {
 }
 
 impl Case {
-    fn machine(&self, hold: Hold) -> Machine<'_> {
-        Machine::Response { frf: &self.frf, hold, continuation: Some(&self.plant) }
+    fn machine(&self) -> Machine<'_> {
+        Machine::Response { frf: &self.frf, continuation: Some(&self.plant) }
     }
 }
 
@@ -29,7 +29,6 @@ impl Case {
 #[derive(Clone, Debug)]
 pub struct Evidence {
     cases: Vec<Case>,
-    hold: Hold,
 }
 
 /// A change of temperature as it acts on a response.
@@ -89,7 +88,7 @@ impl Shift {
         let w: Vec<f64> = frf.w_rad_s().iter().map(|w| w * f).collect();
         let turned = |(v, w): (&Complex<f64>, &f64)| v * Complex::from_polar(self.gain, -w * late);
         let value = frf.value().iter().zip(&w).map(turned).collect();
-        Frf::new(w, value, frf.relative_std().map(<[f64]>::to_vec))
+        frf.alike(w, value, frf.relative_std().map(<[f64]>::to_vec))
     }
 }
 
@@ -97,7 +96,6 @@ impl Evidence {
     /// The cases: as measured; then temperatures and drawn plants dealt out together, as many as the longer list has.
     pub fn of(
         frf: &Frf,
-        hold: Hold,
         plant: &Plant,
         drawn: &[Plant],
         measured_c: f64,
@@ -112,7 +110,7 @@ impl Evidence {
             let (mut case, mut model) = (frf.clone(), plant.clone());
             if let Some(draw) = draw {
                 let value = frf.w_rad_s().iter().zip(frf.value()).map(|(&w, v)| v * draw.at(w) / plant.at(w)).collect();
-                case = Frf::new(frf.w_rad_s().to_vec(), value, frf.relative_std().map(<[f64]>::to_vec))?;
+                case = frf.alike(frf.w_rad_s().to_vec(), value, frf.relative_std().map(<[f64]>::to_vec))?;
                 model = draw.clone();
             }
             let words =
@@ -120,12 +118,12 @@ impl Evidence {
             let name = words.into_iter().flatten().collect::<Vec<_>>().join(", ");
             cases.push(Case { name, frf: shift.of_frf(&case, model.delay_s)?, plant: shift.of_plant(&model) });
         }
-        Ok(Evidence { cases, hold })
+        Ok(Evidence { cases })
     }
 
     /// The cases as machines to be tuned or judged; the first is the response as measured.
     pub fn machines(&self) -> Vec<Machine<'_>> {
-        self.cases.iter().map(|c| c.machine(self.hold)).collect()
+        self.cases.iter().map(Case::machine).collect()
     }
 
     /// The same cases, each with another response and another plant.
@@ -137,7 +135,7 @@ impl Evidence {
             let (frf, plant) = change(&c.frf, &c.plant)?;
             Ok(Case { name: c.name.clone(), frf, plant })
         };
-        Ok(Evidence { cases: self.cases.iter().map(of).collect::<Result<_, _>>()?, hold: self.hold })
+        Ok(Evidence { cases: self.cases.iter().map(of).collect::<Result<_, _>>()? })
     }
 
     /// The plants of the cases, in their order.

@@ -5,7 +5,7 @@
 //! with a table polished anew for every trial and judged at the end.
 
 use super::certified::{Certified, certified};
-use super::prove::{Proved, prove};
+use super::prove::{WorstCase, prove};
 use super::row::{OwnTable, SlotRow};
 use super::slot::{Prepared, search};
 use super::{Context, Evidence, Ready};
@@ -259,7 +259,7 @@ fn guilty(plant: &Plant, at_hz: Option<f64>) -> Option<Mode> {
 
 /// The cause: of a margin the mode or the dead time at its frequency; of a figure of the write the noise, or the move.
 fn cause(context: &Context, slot: &Prepared, nearest: &OwnTable) -> Cause {
-    let p: &Proved = &nearest.proved;
+    let p: &WorstCase = &nearest.proved;
     let write = matches!(p.limit, What::DftLow | What::DftHigh | What::Harmonic { .. } | What::CommandPeak);
     if write {
         let mut quiet = context.spec.clone();
@@ -289,7 +289,7 @@ impl Evidence {
             use servotune::lti::FrequencyResponse;
             let changed = change(plant);
             let value = frf.w_rad_s().iter().zip(frf.value()).map(|(&w, v)| v * changed.at(w) / plant.at(w)).collect();
-            let frf = servotune::frf::Frf::new(frf.w_rad_s().to_vec(), value, frf.relative_std().map(<[f64]>::to_vec))?;
+            let frf = frf.alike(frf.w_rad_s().to_vec(), value, frf.relative_std().map(<[f64]>::to_vec))?;
             Ok((frf, changed))
         })
     }

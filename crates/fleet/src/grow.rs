@@ -10,7 +10,7 @@ use super::slot::Prepared;
 use super::{Context, Ready};
 use rayon::prelude::*;
 use servotune::controller::Controller;
-use servotune::tune::{Machine, TuningProblem, roomiest_table};
+use servotune::tune::{Machine, TuningProblem, table_with_most_room};
 
 /// Scouts a table is polished on at once: those that it serves with the least room, and those that it misses by least.
 const BINDING: usize = 5;
@@ -111,6 +111,6 @@ fn grow(context: &Context, left: &mut [&mut Scout<'_>], mut table: Controller) -
 /// The table near `start` with the most room on all machines.
 pub(super) fn polished(context: &Context, machines: &[Machine<'_>], start: &Controller) -> Option<Controller> {
     let problem = TuningProblem::around(machines, &context.guarded, &context.base).ok()?;
-    let (table, _) = roomiest_table(&problem, start, STEPS, &mut problem.work())?;
+    let (table, _) = table_with_most_room(&problem, start, STEPS, &mut problem.work())?;
     Some(table)
 }

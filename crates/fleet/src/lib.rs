@@ -62,7 +62,7 @@ pub use look::{Level, looks, nearest};
 pub use order::{Carried, End, Healed, Order, Which};
 pub use output::{Asked, gain_table, gain_table_of, page_file, write_tables};
 pub use pilot::{Pilot, pilot, places};
-pub use prove::{Proved, UNSTABLE, prove};
+pub use prove::{UNSTABLE, WorstCase, prove};
 pub use ready::{Quick, Ready};
 pub use revision::{Action, Revision, table_text};
 pub use row::{GateRow, ModelRow, OwnTable, Serves, SlotRow, Verdict, Way};

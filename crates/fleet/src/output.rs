@@ -4,7 +4,7 @@
 
 use super::drift::{SlotDrift, Trend};
 use super::leftovers::clear_tables;
-use super::prove::Proved;
+use super::prove::WorstCase;
 use super::row::{SlotRow, Verdict};
 use super::share::assigned;
 use super::store_run::json;
@@ -150,7 +150,7 @@ pub fn gain_table_of(
     context: &Context,
     row: &SlotRow,
     gains: &Controller,
-    proved: &Proved,
+    proved: &WorstCase,
 ) -> Result<GainTable, FleetError> {
     let digest = |role: &str, sha256: &str| InputDigest { role: role.into(), sha256: sha256.into() };
     let mut inputs = vec![digest("slot", &row.digest)];

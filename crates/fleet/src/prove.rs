@@ -1,17 +1,17 @@
 //! Whether a table meets every limit in a slot, in every case: the one place that says "accepted".
 //!
-//! In: the slot's cases, a controller, the spec. Out: [`Proved`]: figures as measured, and the worst case with the limit that it misses most.
+//! In: the slot's cases, a controller, the spec. Out: [`WorstCase`]: figures as measured, and the worst case with the limit that it misses most.
 //! No margin is the search grid's.
 
 use super::Ready;
 use serde::{Deserialize, Serialize};
 use servotune::controller::Controller;
 use servotune::feedback::{MeasuredLoop, margins};
-use servotune::tune::{Found, Hold, Judged, Machine, Proof, Requirement, Spec, Summary, TuneError, What, judge};
+use servotune::tune::{Found, Judged, Judgement, Machine, Requirement, Spec, Summary, TuneError, What, judge};
 
 /// A table judged in every case of a slot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Proved {
+pub struct WorstCase {
     /// Every limit is met in every case.
     pub passes: bool,
     /// Figures as measured.
@@ -33,7 +33,7 @@ pub const UNSTABLE: f64 = 1e3;
 ///
 /// Margins are refined on the measured curve; the write is read off the spectrum, prepared once for the slot. Gains of another shape than
 /// the fleet's are judged by [`judge`], which prepares everything again.
-pub fn prove(ready: &mut Ready<'_>, controller: &Controller) -> Result<Proved, TuneError> {
+pub fn prove(ready: &mut Ready<'_>, controller: &Controller) -> Result<WorstCase, TuneError> {
     let spec = ready.spec;
     let sections = controller.sections()?;
     // What the bench knows of the write; none where it saw an unstable case, whose write means nothing.
@@ -41,11 +41,11 @@ pub fn prove(ready: &mut Ready<'_>, controller: &Controller) -> Result<Proved, T
     let unstable = matches!(writes, Some(None));
     let wanted = Requirement::list(&spec.margins, &spec.limits);
     let machines = ready.evidence.machines();
-    let judged = |i: usize| -> Result<Proof, TuneError> {
+    let judged = |i: usize| -> Result<Judgement, TuneError> {
         match (&writes, &machines[i]) {
-            (Some(writes), Machine::Response { frf, hold, .. }) => {
+            (Some(writes), Machine::Response { frf, .. }) => {
                 let found = writes.as_ref().map(|w| w[i].clone()).unwrap_or_default();
-                Ok(measured(&MeasuredLoop::new(frf, &sections, *hold == Hold::Included)?, found, &wanted))
+                Ok(measured(&MeasuredLoop::new(frf, &sections)?, found, &wanted))
             }
             _ => judge(&machines[i], controller, spec),
         }
@@ -64,11 +64,11 @@ pub fn prove(ready: &mut Ready<'_>, controller: &Controller) -> Result<Proved, T
         (worst, limit) = (UNSTABLE, What::GainMargin);
     }
     let case = ready.evidence.case(case).to_owned();
-    Ok(Proved { passes: worst <= 0.0, figures, worst, limit, case, at_hz: at_hz.filter(|hz| hz.is_finite()) })
+    Ok(WorstCase { passes: worst <= 0.0, figures, worst, limit, case, at_hz: at_hz.filter(|hz| hz.is_finite()) })
 }
 
 /// The judgement of a measured loop whose write is known.
-fn measured(l: &MeasuredLoop<'_>, write: Found, wanted: &[Requirement]) -> Proof {
+fn measured(l: &MeasuredLoop<'_>, write: Found, wanted: &[Requirement]) -> Judgement {
     let margins = margins(l);
     let found = Found {
         unstable_poles: margins.unstable_poles,
@@ -78,11 +78,11 @@ fn measured(l: &MeasuredLoop<'_>, write: Found, wanted: &[Requirement]) -> Proof
         gain_crossover_hz: margins.gain_crossover_hz,
         ..write
     };
-    Proof { judged: Judged::of(wanted, found), margins }
+    Judgement { judged: Judged::of(wanted, found), margins }
 }
 
 /// The limit nearest to being missed: its violation, what it is, and where.
-fn nearest(proof: &Proof, spec: &Spec) -> (f64, What, Option<f64>) {
+fn nearest(proof: &Judgement, spec: &Spec) -> (f64, What, Option<f64>) {
     let m = &proof.margins;
     if proof.judged.found.unstable_poles != 0 || !m.stable {
         return (UNSTABLE, What::GainMargin, m.phase_crossover_hz);
@@ -110,7 +110,7 @@ fn nearest(proof: &Proof, spec: &Spec) -> (f64, What, Option<f64>) {
 }
 
 /// The figures; what is infinite becomes the largest number, which can be written.
-fn figures_of(proof: &Proof) -> Summary {
+fn figures_of(proof: &Judgement) -> Summary {
     let mut s = Summary::of(proof);
     let values = [&mut s.max_sensitivity, &mut s.max_sensitivity_hz, &mut s.modulus_margin, &mut s.disk_margin];
     let figures = [&mut s.dft_low, &mut s.dft_high, &mut s.command_peak].into_iter().flatten();

@@ -3,7 +3,7 @@
 //! Units stand in the fields' names; figures are those of [`super::prove`].
 
 use super::certified::Certified;
-use super::prove::Proved;
+use super::prove::WorstCase;
 use serde::{Deserialize, Serialize};
 use servotune::controller::Controller;
 use servotune::lti::PlantFile;
@@ -85,7 +85,7 @@ pub struct OwnTable {
     /// How it was found.
     pub way: Way,
     /// What it reaches.
-    pub proved: Proved,
+    pub proved: WorstCase,
 }
 
 /// A candidate of the library that is accepted in a slot.
@@ -149,7 +149,7 @@ pub struct SlotRow {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub own_text: Option<String>,
     /// The gains in the slot, judged.
-    pub current: Option<Proved>,
+    pub current: Option<WorstCase>,
     /// The table found for it.
     pub table: Option<OwnTable>,
     /// What the second prover says of that table.

@@ -184,6 +184,7 @@ pub(super) fn evidence(
     index: usize,
     temperature_c: f64,
 ) -> Result<(Plant, Evidence, ModelRow), SlotError> {
+    let frf = &frf.clone().with_hold(context.hold);
     let r = &context.file.robust;
     let (seed, temperature) = (r.seed_of(index), &context.file.temperature);
     let (plant, drawn, rms, near) = match identify_near(frf, plants, &context.identify)? {
@@ -197,7 +198,7 @@ pub(super) fn evidence(
             (found.plant, drawn, found.rms_relative_error, false)
         }
     };
-    let evidence = Evidence::of(frf, context.hold, &plant, &drawn, temperature_c, temperature)?;
+    let evidence = Evidence::of(frf, &plant, &drawn, temperature_c, temperature)?;
     let row = model_row(&plant, rms, near);
     Ok((plant, evidence, row))
 }

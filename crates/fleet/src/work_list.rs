@@ -32,7 +32,7 @@ pub fn work_list(store: &Store, run: &str) -> Result<Vec<WorkItem>, FleetError> 
     let mut good: Vec<f64> = Vec::new();
     let mut items: Vec<(WorkItem, bool)> = Vec::new();
     store.each_row(run, None, |row| {
-        let dft = |p: &super::Proved| p.figures.dft();
+        let dft = |p: &super::WorstCase| p.figures.dft();
         match row.verdict {
             Verdict::Keeps => good.extend(row.current.as_ref().map(dft)),
             Verdict::Tuned => good.extend(row.table.as_ref().map(|t| dft(&t.proved))),
@@ -85,7 +85,7 @@ fn untunable(row: &SlotRow, found: Option<&super::Explained>) -> WorkItem {
         };
     }
     let remedy = found.and_then(|f| f.remedies.first());
-    let dft = |p: &super::Proved| p.figures.dft();
+    let dft = |p: &super::WorstCase| p.figures.dft();
     let work = match (remedy, found) {
         (Some(r), _) => r.words.clone(),
         (None, Some(_)) => "no single change within reach makes it tunable; look at the machine".into(),

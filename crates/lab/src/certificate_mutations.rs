@@ -7,9 +7,7 @@ use servotune::lti::{Plant, PlantFile};
 use servotune::numeric::random::Random;
 use servotune::tune::{GainTable, InputDigest, Machine, Spec, TuneSettings, tune};
 use servotune::twin::{MachineClass, nominal_controller};
-use servotune::verify::{
-    Certificate, Inputs, Source, SweepAssumption, Uncertainty, VerifyError, VerifySettings, Word, certify,
-};
+use servotune::verify::{Certificate, Inputs, Source, Uncertainty, VerifyError, VerifySettings, Word, certify};
 use std::path::Path;
 
 /// One machine with its table and certificate.
@@ -53,10 +51,18 @@ fn spec() -> (Source, Source) {
 fn prove(plant: &Source, gains: &Source, word: Word, uncertainty: Uncertainty) -> Result<Certificate, VerifyError> {
     let (spec, profile) = spec();
     let plants = [plant.clone()];
-    let assumption = SweepAssumption { least_damping: 0.005, hold_included: false };
+    let least_damping = 0.005;
     let sweeps = &[];
-    let i =
-        Inputs { gains, plants: &plants, sweeps, assumption, spec: &spec, profile: Some(&profile), word, uncertainty };
+    let i = Inputs {
+        gains,
+        plants: &plants,
+        sweeps,
+        least_damping,
+        spec: &spec,
+        profile: Some(&profile),
+        word,
+        uncertainty,
+    };
     certify(&i, &VerifySettings::default())
 }
 

@@ -5,11 +5,11 @@ use super::certificate_loops::{T, draw};
 use super::hdd::{RATE_HZ, cases, joint};
 use rayon::prelude::*;
 use servotune::feedback::{ModelLoop, closed_loop_poles, margins};
-use servotune::frf::Frf;
+use servotune::frf::{Frf, Hold};
 use servotune::lti::{DiscretePlant, FrequencyResponse};
 use servotune::tune::Spec;
 use servotune::twin::plants::log_grid;
-use servotune::verify::{Bounded, Stability, SweepAssumption, Uncertainty, VerifySettings, prove_sweep};
+use servotune::verify::{Bounded, Stability, Uncertainty, VerifySettings, prove_sweep};
 use std::path::Path;
 
 /// Least damping taken of the benchmark: its modes have 0.016 and more; the one above half the rate shows up four times wider.
@@ -25,7 +25,7 @@ pub(super) fn benchmark(data: &Path) -> Result<String, StudyError> {
     let c = outcome.controller();
     let t = 1.0 / RATE_HZ;
     let sections = c.sections()?.chain;
-    let assumption = SweepAssumption { least_damping: BENCHMARK_DAMPING, hold_included: true };
+    let least_damping = BENCHMARK_DAMPING;
     let m = &spec.margins;
     let mut text = format!(
         "One table tuned jointly on all nine ({}); limits: phase margin {} deg, gain margin {} dB, Ms {}. Each case is certified from its response alone, \
@@ -42,7 +42,7 @@ pub(super) fn benchmark(data: &Path) -> Result<String, StudyError> {
             &case.frf,
             &sections,
             t,
-            assumption,
+            least_damping,
             &Uncertainty::default(),
             away,
             &VerifySettings::default(),
@@ -121,14 +121,13 @@ fn one(seed: u64, points: usize) -> Result<Case, StudyError> {
     let w = log_grid(20.0, 12_000.0, points);
     // The sampled plant's own response, hold and aliases included, as a sweep through the controller reads it.
     let value = w.iter().map(|w| sampled.at(*w)).collect();
-    let frf = Frf::new(w, value, None)?;
-    let assumption = SweepAssumption { least_damping, hold_included: true };
+    let frf = Frf::new(w, value, None)?.with_hold(Hold::Included { sample_time_s: T });
     let limit = m.max_sensitivity * if seed.is_multiple_of(2) { 1.05 } else { 0.95 };
     let proof = prove_sweep(
         &frf,
         &sections.chain,
         T,
-        assumption,
+        least_damping,
         &Uncertainty::default(),
         1.0 / limit,
         &VerifySettings::default(),

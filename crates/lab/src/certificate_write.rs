@@ -1,10 +1,10 @@
 //! The write over boxes of parameters: proved bounds beside members drawn from the box and simulated by another algorithm.
 
-use super::hdd::{RATE_HZ, cases, joint};
+use super::hdd::{cases, joint};
 use super::{Study, StudyError};
 use servotune::controller::Controller;
 use servotune::frf::Frf;
-use servotune::identify::{BodyChoice, Hold, IdentifySettings, identify};
+use servotune::identify::{BodyChoice, IdentifySettings, identify};
 use servotune::lti::Plant;
 use servotune::numeric::random::Random;
 use servotune::pes::{Profile, figures, simulate};
@@ -54,11 +54,7 @@ pub fn certificate_write(data: &Path, say: &mut dyn FnMut(&str)) -> Result<Study
 
 /// The benchmark has no model in product form: the one identified from its response.
 fn model(frf: &Frf) -> Result<Plant, StudyError> {
-    let settings = IdentifySettings {
-        hold: Hold::Included { sample_time_s: 1.0 / RATE_HZ },
-        body: BodyChoice::Auto,
-        ..IdentifySettings::default()
-    };
+    let settings = IdentifySettings { body: BodyChoice::Auto, ..IdentifySettings::default() };
     Ok(identify(frf, &settings)?.plant)
 }
 

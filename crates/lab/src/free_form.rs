@@ -70,7 +70,7 @@ fn told(text: &mut String, made: &Diagnosed, (factor, unit): (f64, &str), skip: 
     }
     let _ =
         writeln!(text, "\n| held-out record | model as given ({unit} rms) | linear refit | after |\n|---|---|---|---|");
-    for (i, run) in made.bench.runs.iter().enumerate().filter(|(_, r)| r.role == Role::Holdout) {
+    for (i, run) in made.data.runs.iter().enumerate().filter(|(_, r)| r.role == Role::Holdout) {
         let [given, refit, after] = [0, 1, 2].map(|m| factor * rms(&made.errors[m][i], skip));
         let _ = writeln!(text, "| {} | {given:.4} | {refit:.4} | {after:.4} |", run.name);
     }
@@ -82,11 +82,11 @@ fn told(text: &mut String, made: &Diagnosed, (factor, unit): (f64, &str), skip: 
 
 /// The curve estimated on a bench whatever the verdict, with its picture and held-out error.
 fn curve(study: &mut Study, text: &mut String, made: &Diagnosed, name: &str, r: &Recording) -> Result<(), StudyError> {
-    let Some(found) = missing_curve(&made.bench, &made.selection) else {
+    let Some(found) = missing_curve(&made.data, &made.selection) else {
         text.push_str("No curve foretells clearly better than a linear plant.\n\n");
         return Ok(());
     };
-    let held = made.bench.runs.iter().position(|run| run.role == Role::Holdout).unwrap_or(0);
+    let held = made.data.runs.iter().position(|run| run.role == Role::Holdout).unwrap_or(0);
     let (factor, unit) = r.metric;
     let _ = writeln!(
         text,
@@ -116,7 +116,7 @@ pub fn free_form(data: &Path) -> Result<Study, StudyError> {
     let (drive, plant) = pulley(data)?;
     let made = diagnose(&drive, &plant, None, &DiagnoseSettings::default(), |_| {})?;
     told(&mut text, &made, (1.0, "tick/s"), 0);
-    if let Some(found) = missing_curve(&made.bench, &made.selection) {
+    if let Some(found) = missing_curve(&made.data, &made.selection) {
         let _ = writeln!(
             text,
             "The sensor's curve, estimated freely: {}\n\n![curve](../figures/free_form_pulley.svg)\n",

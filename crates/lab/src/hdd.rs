@@ -7,10 +7,10 @@ use super::{Study, StudyError};
 use nalgebra::Complex;
 use servotune::controller::Controller;
 use servotune::feedback::{MeasuredLoop, measured_margins};
-use servotune::frf::Frf;
+use servotune::frf::{Frf, Hold};
 use servotune::lti::{DiscretePlant, FrequencyResponse, ModalForm, ModalTerm};
 use servotune::recording::read_columns;
-use servotune::tune::{Hold, Machine, Outcome, Spec, TuneSettings, tune, tune_jointly};
+use servotune::tune::{Machine, Outcome, Spec, TuneSettings, tune, tune_jointly};
 use servotune_report::bode::{BodeCurve, BodeMarks, bode};
 use servotune_report::number::NumberFormat;
 use servotune_report::table::{Column, Table};
@@ -66,7 +66,7 @@ pub(super) fn joint(cases: &[Case]) -> Result<Outcome, StudyError> {
     let spec = Spec::parse(include_str!("specs/hdd.toml"), include_str!("specs/hdd_profile.toml"))?;
     let settings = TuneSettings { sample_time_s: Some(1.0 / RATE_HZ), ..TuneSettings::default() };
     let machines: Vec<Machine<'_>> =
-        cases.iter().map(|c| Machine::Response { frf: &c.frf, hold: Hold::Included, continuation: None }).collect();
+        cases.iter().map(|c| Machine::Response { frf: &c.frf, continuation: None }).collect();
     Ok(tune_jointly(&machines, &spec, None, &settings)?)
 }
 
@@ -75,7 +75,7 @@ pub fn hdd(data: &Path) -> Result<Study, StudyError> {
     let cases = cases(data)?;
     let spec = Spec::parse(include_str!("specs/hdd.toml"), include_str!("specs/hdd_profile.toml"))?;
     let settings = TuneSettings { sample_time_s: Some(1.0 / RATE_HZ), ..TuneSettings::default() };
-    let first = Machine::Response { frf: &cases[0].frf, hold: Hold::Included, continuation: None };
+    let first = Machine::Response { frf: &cases[0].frf, continuation: None };
     let alone = tune(&first, &spec, None, &settings)?;
     let jointly = joint(&cases)?;
     let mut study = Study::default();
@@ -123,7 +123,7 @@ fn response(main: &DiscretePlant, fine: &DiscretePlant, fine_gain: f64) -> Resul
             main.at(w) / (1.0 + fine_gain * fine.at(w) * lag)
         })
         .collect();
-    Ok(Frf::new(grid, value, None)?)
+    Ok(Frf::new(grid, value, None)?.with_hold(Hold::Included { sample_time_s: t }))
 }
 
 fn page(cases: &[Case], alone: &Outcome, jointly: &Outcome) -> Result<String, StudyError> {
@@ -169,7 +169,7 @@ fn margin_table(caption: &str, cases: &[Case], c: &Controller) -> Result<(Table,
     let sections = c.sections()?;
     let mut missed = 0;
     for case in cases {
-        let m = measured_margins(&MeasuredLoop::new(&case.frf, &sections, true)?)?.margins;
+        let m = measured_margins(&MeasuredLoop::new(&case.frf, &sections)?)?.margins;
         let short = |found: Option<f64>, limit: Option<f64>| found.zip(limit).is_some_and(|(f, l)| f < l);
         let over = wanted.max_sensitivity.is_some_and(|l| m.max_sensitivity > l);
         if !m.stable

@@ -4,9 +4,9 @@ use super::StudyError;
 use nalgebra::Complex;
 use servotune::controller::Controller;
 use servotune::feedback::{MeasuredLoop, MeasuredMargins, measured_margins};
-use servotune::frf::Frf;
+use servotune::frf::{Frf, Hold};
 use servotune::identify::Identified;
-use servotune::tune::{Hold, Machine, Outcome, Spec, TuneSettings, tune};
+use servotune::tune::{Machine, Outcome, Spec, TuneSettings, tune};
 use servotune_report::identified::{
     identified_figure, identified_sentences, ladder_table, order_table, parameter_table,
 };
@@ -49,15 +49,16 @@ pub(super) fn tune_axis(axis: &Axis, spec: &str, profile: &str, sample_time_s: f
     } else {
         axis.frf.clone()
     };
+    let frf = frf.with_hold(Hold::Included { sample_time_s });
     let mut model = axis.identified.plant.clone();
     if turned {
         model.resonance_gain = -model.resonance_gain;
     }
-    let machine = Machine::Response { frf: &frf, hold: Hold::Included, continuation: Some(&model) };
+    let machine = Machine::Response { frf: &frf, continuation: Some(&model) };
     let outcome =
         tune(&machine, &spec, None, &TuneSettings { sample_time_s: Some(sample_time_s), ..TuneSettings::default() })?;
     let sections = outcome.controller().sections()?;
-    let margins = measured_margins(&MeasuredLoop::new(&frf, &sections, true)?)?;
+    let margins = measured_margins(&MeasuredLoop::new(&frf, &sections)?)?;
     let (name, frf, identified) = (axis.name.clone(), axis.frf.clone(), axis.identified.clone());
     Ok(Tuned { name, frf, identified, turned, outcome, margins })
 }

@@ -5,8 +5,8 @@
 use super::measured::{Axis, Tuned, axis_page, percent, tune_axis};
 use super::{Study, StudyError};
 use rayon::prelude::*;
-use servotune::frf::{ColumnChoice, Frf, ReadSettings, read_file};
-use servotune::identify::{Hold, IdentifySettings, OrderChoice, ZeroSide, identify};
+use servotune::frf::{ColumnChoice, Frf, Hold, ReadSettings, read_file};
+use servotune::identify::{IdentifySettings, OrderChoice, ZeroSide, identify};
 use servotune_report::identified::identified_figure;
 use servotune_report::number::NumberFormat;
 use servotune_report::table::{Column, Table};
@@ -72,10 +72,10 @@ fn axis(file: &Path, i: usize, j: usize) -> Result<Axis, StudyError> {
         high_hz: BAND_HZ.1,
         order: OrderChoice::Auto { max: PAIRS },
         zeros: ZeroSide::Either,
-        hold: Hold::Included { sample_time_s: 1.0 / RATE_HZ },
         ..IdentifySettings::default()
     };
-    let identified = identify(&sweep.frf, &settings)?;
+    let held = sweep.frf.clone().with_hold(Hold::Included { sample_time_s: 1.0 / RATE_HZ });
+    let identified = identify(&held, &settings)?;
     // The first points scatter most and are outside the band; the rest of the sweep is the measurement.
     let frf = from(&sweep.frf, BAND_HZ.0)?;
     Ok(Axis { name, diagonal: i == j, flat_at_rest: true, frf, identified })

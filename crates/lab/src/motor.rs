@@ -5,7 +5,7 @@
 use super::measured::{Axis, axis_page, percent, tune_axis, tuned_table};
 use super::{Study, StudyError};
 use servotune::frf::{PeriodicSettings, periodic};
-use servotune::identify::{BodyChoice, Hold, IdentifySettings, OrderChoice, identify};
+use servotune::identify::{BodyChoice, IdentifySettings, OrderChoice, identify};
 use servotune::recording::read_columns;
 use servotune_report::identified::{identified_figure, identified_sentences, order_table, parameter_table};
 use std::f64::consts::TAU;
@@ -36,7 +36,6 @@ pub fn motor(data: &Path) -> Result<Study, StudyError> {
         command_unit: "A".into(),
         body: BodyChoice::FreeInertia,
         order: OrderChoice::Fixed(1),
-        hold: Hold::NotIncluded,
         ..IdentifySettings::default()
     };
     let identified = identify(&estimate.frf, &settings)?;

@@ -9,6 +9,7 @@ use servotune::frf::Frf;
 use servotune::identify::{IdentifySettings, identify};
 use servotune::lti::{DiscretePlant, FrequencyResponse, Plant};
 use servotune::numeric::random::Random;
+use servotune::numeric::statistics::nearest_rank;
 use servotune::twin::nominal_controller;
 use servotune::twin::plants::{log_grid, measure, random_plant};
 use servotune_report::number::NumberFormat;
@@ -77,13 +78,6 @@ fn margin_errors(truth: &Plant, found: &Plant, nominal: &Controller) -> Result<[
     Ok([error(near(&a.gain_crossings, CROSSOVER_HZ)), error(smallest)])
 }
 
-/// The value below which the share `q` lies (nearest rank).
-fn quantile(mut values: Vec<f64>, q: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let rank = (q * values.len() as f64).ceil().max(1.0) as usize;
-    values.get(rank - 1).copied().unwrap_or(f64::NAN)
-}
-
 fn page(cases: &[Case]) -> Result<String, StudyError> {
     let digits = NumberFormat::Significant(3);
     let mut table = Table::new(
@@ -98,7 +92,7 @@ fn page(cases: &[Case]) -> Result<String, StudyError> {
         ],
     );
     let mut row = |name: &str, values: Vec<f64>, unit: &str, aim: &str| {
-        let at = |q| quantile(values.clone(), q).into();
+        let at = |q| nearest_rank(&values, q).into();
         table.push(vec![name.into(), at(0.5), at(0.95), at(1.0), unit.into(), aim.into()])
     };
     let percent = |f: &dyn Fn(&StudyCase) -> f64| cases.iter().map(|c| 100.0 * f(&c.figures)).collect::<Vec<f64>>();

@@ -19,7 +19,7 @@ use servotune::recording::{Case, RecordSettings, gzip, read_columns};
 use servotune::tune::{GainTable, InputDigest, Machine, Spec, TuneSettings, tune};
 use servotune::twin::plants::{log_grid, measure};
 use servotune::twin::{MachineClass, nominal_controller, paper_machine};
-use servotune::verify::{Certificate, Inputs, Source, SweepAssumption, Uncertainty, VerifySettings, Word, certify};
+use servotune::verify::{Certificate, Inputs, Source, Uncertainty, VerifySettings, Word, certify};
 use servotune_fleet::{FileSource, Fleet, SlotSource};
 use std::path::Path;
 
@@ -126,7 +126,7 @@ fn take_sweep(files: &Files, dead: bool, _: &Path) -> Reached {
     let sweep: Sweep = or_refused!(read_bytes("sweep", &files[0].1, &ReadSettings::default()));
     let controller = or_refused!(nominal_controller());
     let sections = or_refused!(controller.sections());
-    let judged = or_refused!(MeasuredLoop::new(&sweep.frf, &sections, false).and_then(|l| measured_margins(&l)));
+    let judged = or_refused!(MeasuredLoop::new(&sweep.frf, &sections).and_then(|l| measured_margins(&l)));
     if dead && judged.verdict == LoopVerdict::Stable {
         return Reached::Wrong(format!("a dead channel is stable, phase margin {:?}", judged.margins.phase_margin_deg));
     }
@@ -219,7 +219,7 @@ fn proof(files: &Files) -> Result<Certificate, servotune::verify::VerifyError> {
         gains: &gains,
         plants: &[plant],
         sweeps: &[],
-        assumption: SweepAssumption { least_damping: 0.005, hold_included: false },
+        least_damping: 0.005,
         spec: &spec,
         profile: Some(&profile),
         word: Word::Double,

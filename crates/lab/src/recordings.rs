@@ -6,7 +6,7 @@
 use super::{Study, StudyError};
 use servotune::diagnose::{DiagnoseSettings, Diagnosed, diagnose};
 use servotune::frf::{PeriodicSettings, periodic};
-use servotune::identify::{BodyChoice, Hold, IdentifySettings, OrderChoice, identify};
+use servotune::identify::{BodyChoice, IdentifySettings, OrderChoice, identify};
 use servotune::lti::{Body, Plant};
 use servotune::recording::{Case, ColumnNames, Record, RecordEntry, RecordSettings, Role, read_columns};
 use servotune_report::diagnosis::diagnosis_page;
@@ -104,7 +104,6 @@ pub(super) fn motor(data: &Path) -> Result<Recording, StudyError> {
         command_unit: "A".into(),
         body: BodyChoice::FreeInertia,
         order: OrderChoice::Fixed(1),
-        hold: Hold::NotIncluded,
         ..IdentifySettings::default()
     };
     let plant = identify(&estimate.frf, &settings)?.plant;
@@ -150,7 +149,7 @@ fn made(r: &Recording, data: &Path) -> Result<Diagnosed, StudyError> {
 /// What a diagnosis of one recording says, as lines of the page.
 fn section(r: &Recording, m: &Diagnosed) -> String {
     let d = &m.diagnosis;
-    let held = m.bench.runs.iter().position(|run| run.role == Role::Holdout).unwrap_or(0);
+    let held = m.data.runs.iter().position(|run| run.role == Role::Holdout).unwrap_or(0);
     let rmse = |errors: &[Vec<f64>]| {
         let e = &errors[held][r.skip.min(errors[held].len())..];
         r.metric.0 * (e.iter().map(|v| v * v).sum::<f64>() / e.len().max(1) as f64).sqrt()

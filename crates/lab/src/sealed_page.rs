@@ -2,6 +2,7 @@
 
 use super::sealed_draw::WHOLE;
 use super::sealed_row::{Outcome, Row};
+use servotune::numeric::statistics::median;
 use std::fmt::Write;
 
 /// Effect over noise from which a name is asked for.
@@ -15,11 +16,6 @@ const NULLS: [&str; 2] = ["sound", "linear_off"];
 
 fn share(of: usize, all: usize) -> String {
     if all == 0 { "none".into() } else { format!("{of} of {all} ({:.0} %)", 100.0 * of as f64 / all as f64) }
-}
-
-fn median(mut v: Vec<f64>) -> f64 {
-    v.sort_by(f64::total_cmp);
-    v.get(v.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// The page: score against its aims, a table of kinds, and every case that is not right.
@@ -126,7 +122,7 @@ pub(super) fn page(seed: u64, rows: &[Row], published: Option<usize>) -> String 
     line(
         &mut text,
         "seconds a case, median (two at once on two cores)",
-        format!("{:.1}", median(rows.iter().map(|r| r.seconds).collect())),
+        format!("{:.1}", median(&rows.iter().map(|r| r.seconds).collect::<Vec<_>>()).unwrap_or(f64::NAN)),
         "",
     );
     text += "\n## By kind\n\n| kind | cases | lambda, median | right | in family | partly | wrong | unexplained | nothing said | refused |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
@@ -140,7 +136,7 @@ pub(super) fn page(seed: u64, rows: &[Row], published: Option<usize>) -> String 
             text,
             "| {kind} | {} | {:.1e} | {} | {} | {} | {} | {} | {} | {} |",
             of.len(),
-            median(of.iter().map(|r| r.lambda).collect()),
+            median(&of.iter().map(|r| r.lambda).collect::<Vec<_>>()).unwrap_or(f64::NAN),
             n(&[Right]),
             n(&[InFamily]),
             n(&[Partly]),

@@ -6,6 +6,7 @@ use serde::Serialize;
 use servotune::identify::{Identified, IdentifyError, IdentifySettings, identify};
 use servotune::lti::{Body, FrequencyResponse, Mode, Plant};
 use servotune::numeric::random::Random;
+use servotune::numeric::statistics::nearest_rank;
 use servotune::twin::plants::{log_grid, measure, random_plant};
 use thiserror::Error;
 
@@ -97,11 +98,9 @@ pub enum StudyError {
     Identify { seed: u64, source: IdentifyError },
 }
 
-/// The value below which the share `q` of the sorted numbers lies (nearest rank); 0 for none.
-fn quantile(values: &mut [f64], q: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let rank = (q * values.len() as f64).ceil() as usize;
-    values.get(rank.clamp(1, values.len().max(1)) - 1).copied().unwrap_or(0.0)
+/// The nearest rank; 0 for none.
+fn rank(values: &[f64], q: f64) -> f64 {
+    if values.is_empty() { 0.0 } else { nearest_rank(values, q) }
 }
 
 /// Whether the sweep can show a pair: ln of its response, summed over the points, is five deviations of what noise makes.
@@ -122,7 +121,7 @@ pub fn visible(mode: &Mode, w_rad_s: &[f64], relative_std: f64) -> bool {
 pub fn judge(truth: &Plant, found: &Identified, w_rad_s: &[f64], relative_std: f64, seed: u64) -> StudyCase {
     let (low, high) = (w_rad_s[0], w_rad_s[w_rad_s.len() - 1]);
     let fine = log_grid(low / std::f64::consts::TAU, high / std::f64::consts::TAU, 10 * w_rad_s.len());
-    let mut error: Vec<f64> = fine.iter().map(|&w| (found.plant.at(w) / truth.at(w) - 1.0).norm()).collect();
+    let error: Vec<f64> = fine.iter().map(|&w| (found.plant.at(w) / truth.at(w) - 1.0).norm()).collect();
     let frequency_errors = truth
         .modes
         .iter()
@@ -133,7 +132,7 @@ pub fn judge(truth: &Plant, found: &Identified, w_rad_s: &[f64], relative_std: f
             if nearest <= 0.03 { nearest } else { 1.0 }
         })
         .collect();
-    let inside = |i: &servotune::identify::Interval, t: f64| i.low <= t && t <= i.high;
+    let inside = |i: &servotune::identify::ParameterEstimate, t: f64| i.low <= t && t <= i.high;
     let covered = match truth.body {
         Body::SecondOrder { dc_gain, natural_frequency_rad_s, .. } => {
             let i = &found.intervals;
@@ -148,9 +147,9 @@ pub fn judge(truth: &Plant, found: &Identified, w_rad_s: &[f64], relative_std: f
     StudyCase {
         seed,
         modes_found: found.plant.modes.len(),
-        median_error: quantile(&mut error, 0.5),
-        p95_error: quantile(&mut error, 0.95),
-        worst_error: quantile(&mut error, 1.0),
+        median_error: rank(&error, 0.5),
+        p95_error: rank(&error, 0.95),
+        worst_error: rank(&error, 1.0),
         frequency_errors,
         stable: found.plant.check().is_ok(),
         covered,
@@ -177,19 +176,19 @@ pub fn study(settings: &StudySettings, how: &IdentifySettings) -> Result<Study, 
         cases.push(judge(&truth, &found, &w, settings.relative_std, seed));
     }
     let share = |test: &dyn Fn(&StudyCase) -> bool| cases.iter().filter(|c| test(c)).count() as f64 / plants as f64;
-    let mut medians: Vec<f64> = cases.iter().map(|c| c.median_error).collect();
-    let mut p95: Vec<f64> = cases.iter().map(|c| c.p95_error).collect();
-    let mut frequency: Vec<f64> = cases.iter().flat_map(|c| c.frequency_errors.clone()).collect();
+    let medians: Vec<f64> = cases.iter().map(|c| c.median_error).collect();
+    let p95: Vec<f64> = cases.iter().map(|c| c.p95_error).collect();
+    let frequency: Vec<f64> = cases.iter().flat_map(|c| c.frequency_errors.clone()).collect();
     let visible_pairs = frequency.len();
     let within = frequency.iter().filter(|e| **e <= 0.003).count() as f64 / visible_pairs.max(1) as f64;
     Ok(Study {
         settings: settings.clone(),
-        median_error: quantile(&mut medians, 0.5),
-        p95_error_median: quantile(&mut p95, 0.5),
-        p95_error_p95: quantile(&mut p95, 0.95),
+        median_error: rank(&medians, 0.5),
+        p95_error_median: rank(&p95, 0.5),
+        p95_error_p95: rank(&p95, 0.95),
         share_within_two_percent: share(&|c| c.p95_error <= 0.02),
         visible_pairs,
-        frequency_error: [quantile(&mut frequency, 0.5), quantile(&mut frequency, 0.95)],
+        frequency_error: [rank(&frequency, 0.5), rank(&frequency, 0.95)],
         frequency_within_aim: within,
         stable_share: share(&|c| c.stable),
         coverage: [share(&|c| c.covered[0]), share(&|c| c.covered[1]), share(&|c| c.covered[2])],

@@ -4,7 +4,7 @@ use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Column, Table};
 use servotune::feedback::{Interval, SweepPlan};
-use servotune::pes::{Budget, Prediction, Range, Source};
+use servotune::pes::{Budget, PredictedRange, Prediction, Source};
 
 /// A source in words.
 pub(super) fn source_name(s: Source) -> &'static str {
@@ -70,7 +70,7 @@ pub fn prediction_table(caption: &str, p: &Prediction, unit: &str) -> Result<Tab
             Column::numbers("to", "", digits),
         ],
     );
-    let mut row = |name: &str, r: &Range| {
+    let mut row = |name: &str, r: &PredictedRange| {
         table.push(vec![name.into(), unit.into(), r.median.into(), r.low.into(), r.high.into()])
     };
     row("600-1500 Hz", &p.dft_low)?;

@@ -17,7 +17,7 @@ const INKS: [Ink; 3] = [Ink::Muted, Ink::Data(1), Ink::Data(0)];
 
 /// Position and error of the drawn record over time.
 pub(super) fn error_figure(s: &Shown) -> Result<Figure, ReportError> {
-    let run = &s.made.bench.runs[s.run];
+    let run = &s.made.data.runs[s.run];
     let at: Vec<f64> = (0..run.len()).map(|k| k as f64 * s.sample_time_s()).collect();
     let errors: [&Vec<f64>; 3] = std::array::from_fn(|m| &s.made.errors[m][s.run]);
     let simulated: Vec<f64> = run.position.iter().zip(errors[0]).map(|(y, e)| y - e).collect();
@@ -54,7 +54,7 @@ fn role(run: &Run) -> &'static str {
 pub(super) fn spectrum_figure(s: &Shown) -> Result<Figure, ReportError> {
     let t = s.sample_time_s();
     // Ticks read best near 1: the power of a thousand nearest the middle of the noise.
-    let level = s.made.bench.levels.sensor_rms * (2.0 * t).sqrt();
+    let level = s.made.data.levels.sensor_rms * (2.0 * t).sqrt();
     let power = if level > 0.0 { 3 * (level.log10() / 3.0).floor() as i32 } else { 0 };
     let unit = 10f64.powi(power);
     let words = if power == 0 { String::new() } else { format!("1e{power} ") };
@@ -70,7 +70,7 @@ pub(super) fn spectrum_figure(s: &Shown) -> Result<Figure, ReportError> {
             panel.marks.push(Series::new(name, INKS[m], Kind::Solid, &hz, &amplitude)?.into());
         }
     }
-    let repeats = repeat_noise(&s.made.errors[2], &s.made.bench.runs);
+    let repeats = repeat_noise(&s.made.errors[2], &s.made.data.runs);
     let views: Vec<&Vec<f64>> = repeats.iter().collect();
     let (hz, amplitude) = density(&views, t, unit);
     let (name, words) = if hz.is_empty() {

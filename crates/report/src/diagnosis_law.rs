@@ -45,14 +45,14 @@ pub(super) fn own(c: &SelectedEffect, segment: usize) -> &[f64] {
 
 /// A figure for each effect in the model.
 pub(super) fn law_figures(s: &Shown) -> Result<Vec<Figure>, ReportError> {
-    let bench = &s.made.bench;
+    let data = &s.made.data;
     let mut figures = Vec::new();
     for c in &s.made.selection.model.chosen {
-        let every: Vec<Vec<f64>> = bench
+        let every: Vec<Vec<f64>> = data
             .trajectories
             .iter()
             .enumerate()
-            .map(|(i, motion)| added(&c.setting.law, own(c, i), &bench.scene, motion))
+            .map(|(i, motion)| added(&c.setting.law, own(c, i), &data.scene, motion))
             .collect();
         let energy = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>() / x.len().max(1) as f64;
         let best = (0..every.len()).max_by(|&a, &b| energy(&every[a]).total_cmp(&energy(&every[b])));
@@ -64,8 +64,8 @@ pub(super) fn law_figures(s: &Shown) -> Result<Vec<Figure>, ReportError> {
 }
 
 fn law_figure(s: &Shown, c: &SelectedEffect, segment: usize, value: &[f64]) -> Result<Figure, ReportError> {
-    let (bench, facts) = (&s.made.bench, c.setting.facts());
-    let motion = &bench.trajectories[segment].samples;
+    let (data, facts) = (&s.made.data, c.setting.facts());
+    let motion = &data.trajectories[segment].samples;
     let way = c.effect().shown_over();
     let largest = motion.iter().fold(0.0f64, |m, k| m.max(k.i.abs()));
     let (quantity, unit) = match (facts.entry, way) {
@@ -128,11 +128,11 @@ fn law_figure(s: &Shown, c: &SelectedEffect, segment: usize, value: &[f64]) -> R
         panel.marks.push(RuleLine::horizontal(1.0, "model as given", Ink::Plain));
     }
     if facts.entry == Entry::Position {
-        let noise = bench.levels.sensor_rms;
+        let noise = data.levels.sensor_rms;
         panel.marks.push(RuleLine::horizontal(noise, "sensor noise (rms)", Ink::Limit));
         panel.marks.push(RuleLine::horizontal(-noise, "", Ink::Limit));
     }
-    let run = &bench.runs[bench.stack.segments[segment].runs[0]].name;
+    let run = &data.runs[data.stack.segments[segment].runs[0]].name;
     let caption = format!("{}. Along the motion of {run}, where it is strongest.", facts.equation);
     Ok(Figure {
         title: format!("{}: {name}", if s.named() { "The law found" } else { "The nearest law" }),
@@ -184,7 +184,7 @@ fn at_amplitude(plant: &Plant, effects: &[&Setting], scene: &Scene, amplitude: f
 
 /// Natural frequency and damping over amplitude; none where nothing that was found changes them.
 pub(super) fn amplitude_figure(s: &Shown) -> Result<Option<Figure>, ReportError> {
-    let (fixed, scene) = (&s.made.corrected, &s.made.bench.scene);
+    let (fixed, scene) = (&s.made.corrected, &s.made.data.scene);
     let effects: Vec<&Setting> = fixed.effects.iter().filter(|s| s.law.effect().acts_on_body()).collect();
     if effects.iter().all(|s| matches!(s.law, AnyLaw::CableSpring(_))) {
         return Ok(None);
@@ -235,7 +235,7 @@ const START: f64 = 0.03;
 
 /// Torque beyond the linear part of the corrected model over time, beside the torque of its effects, on the record with most.
 pub(super) fn unexplained_figure(s: &Shown) -> Result<Option<Figure>, ReportError> {
-    let bench = &s.made.bench;
+    let data = &s.made.data;
     // What the corrected plant carries, and what belongs to the record alone. A command acts as a torque one delay later.
     let drives = |e: Entry| matches!(e, Entry::Torque | Entry::Command);
     let settled = |mut x: Vec<f64>| x.split_off((START * x.len() as f64) as usize);
@@ -245,7 +245,7 @@ pub(super) fn unexplained_figure(s: &Shown) -> Result<Option<Figure>, ReportErro
         let passing = passing.map(|c| (&c.setting.law, own(c, i)));
         let mut sum: Option<Vec<f64>> = None;
         for (law, strengths) in lasting.chain(passing).filter(|p| drives(p.0.facts().entry)) {
-            let part = added(law, strengths, &bench.scene, &bench.trajectories[i]);
+            let part = added(law, strengths, &data.scene, &data.trajectories[i]);
             match &mut sum {
                 Some(sum) => sum.iter_mut().zip(part).for_each(|(f, p)| *f += p),
                 None => sum = Some(part),
@@ -256,27 +256,27 @@ pub(super) fn unexplained_figure(s: &Shown) -> Result<Option<Figure>, ReportErro
     // The last smoothing was told the torque of the refitted body and of the laws: what it left is beyond both, so that the laws'
     // own torque comes on top.
     let beyond = |i: usize| {
-        let mut torque = bench.trajectories[i].unexplained.clone();
+        let mut torque = data.trajectories[i].unexplained.clone();
         if let Some(found) = found(i) {
             torque.iter_mut().zip(found).for_each(|(t, f)| *t += f);
         }
         centred(settled(torque))
     };
-    let every: Vec<Vec<f64>> = (0..bench.trajectories.len()).map(beyond).collect();
+    let every: Vec<Vec<f64>> = (0..data.trajectories.len()).map(beyond).collect();
     let energy = |i: usize| every[i].iter().map(|v| v * v).sum::<f64>();
     let Some(i) = (0..every.len()).max_by(|&a, &b| energy(a).total_cmp(&energy(b))) else {
         return Ok(None);
     };
-    let at = settled(bench.trajectories[i].samples.iter().map(|m| m.t).collect());
+    let at = settled(data.trajectories[i].samples.iter().map(|m| m.t).collect());
     let found = found(i).map(|f| centred(settled(f)));
     let line = |name, value, ink| TimeCurve { name, time_s: &at, value, ink, kind: CurveKind::Line };
     let mut curves = vec![line("torque beyond the linear plant", &every[i], Ink::Muted)];
     curves.extend(found.as_ref().map(|f| line("torque of the laws in the model", f, Ink::Data(0))));
-    let noise = bench.levels.torque_rms;
+    let noise = data.levels.torque_rms;
     let limits = [(noise, "torque noise (rms)"), (-noise, "")];
     let limits: &[(f64, &str)] = if noise > 0.0 { &limits } else { &[] };
     let panel = TimePanel { quantity: "Torque", unit: s.command, curves: &curves, limits };
-    let run = &bench.runs[bench.stack.segments[i].runs[0]].name;
+    let run = &data.runs[data.stack.segments[i].runs[0]].name;
     let how = "Estimated from the recorded motion by a smoother, in command units, less its mean and without the first 3 % of the \
                record, where the smoother finds its start; the linear plant is the corrected one.";
     let caption = match found {

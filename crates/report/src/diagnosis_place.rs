@@ -9,6 +9,7 @@ use super::diagnosis_shown::{Shown, words};
 use super::figure::{Axis, Figure, Ink, Kind, Mark, Panel, Region, Series};
 use servotune::diagnose::Finding;
 use servotune::lti::{DiscretePlant, PlantState};
+use servotune::numeric::statistics::rms;
 use servotune::physics::Entry;
 
 /// Windows of a record, as where the findings are located.
@@ -29,11 +30,11 @@ pub(super) struct Map {
 impl Map {
     /// The error that a refit of the linear plant leaves.
     pub fn of(s: &Shown) -> Map {
-        let bench = &s.made.bench;
-        let fit = bench.fit(Vec::new());
+        let data = &s.made.data;
+        let fit = data.fit(Vec::new());
         let (error, _) = fit.screen_basis(&s.made.selection.baseline.refitted.p);
         let errors: Vec<Vec<f64>> =
-            bench.stack.segments.iter().map(|g| error[g.start..g.start + g.len].to_vec()).collect();
+            data.stack.segments.iter().map(|g| error[g.start..g.start + g.len].to_vec()).collect();
         let mean: Vec<f64> = errors.iter().map(|e| rms(e)).collect();
         let mut order: Vec<usize> = (0..errors.len()).collect();
         order.sort_by(|&a, &b| mean[b].total_cmp(&mean[a]));
@@ -41,21 +42,17 @@ impl Map {
     }
 }
 
-fn rms(x: &[f64]) -> f64 {
-    (x.iter().map(|v| v * v).sum::<f64>() / x.len().max(1) as f64).sqrt()
-}
-
 /// The segment that shows a finding most, which its intervals of time belong to: by what its law adds to the position, whitened;
 /// by the error itself where there is no law.
 fn strongest(s: &Shown, map: &Map, f: &Finding) -> Option<usize> {
-    let bench = &s.made.bench;
+    let data = &s.made.data;
     let chosen = &s.made.selection.model.chosen;
     let Some(c) = chosen.iter().find(|c| f.family.iter().any(|n| n == c.setting.facts().name)) else {
         return map.order.first().copied();
     };
-    let sampled = DiscretePlant::of(&bench.scene.plant, s.sample_time_s()).ok()?;
-    let mut signal = bench.stack.series(|i| {
-        let mut y = added(&c.setting.law, own(c, i), &bench.scene, &bench.trajectories[i]);
+    let sampled = DiscretePlant::of(&data.scene.plant, s.sample_time_s()).ok()?;
+    let mut signal = data.stack.series(|i| {
+        let mut y = added(&c.setting.law, own(c, i), &data.scene, &data.trajectories[i]);
         if c.setting.facts().entry != Entry::Position {
             let mut state = PlantState::at_rest(&sampled);
             for v in &mut y {
@@ -64,21 +61,21 @@ fn strongest(s: &Shown, map: &Map, f: &Finding) -> Option<usize> {
                 state.advance(&sampled);
             }
         }
-        bench.whitener.apply(&mut y);
+        data.whitener.apply(&mut y);
         y
     });
-    bench.fit(Vec::new()).local_basis().project(&mut signal);
+    data.fit(Vec::new()).local_basis().project(&mut signal);
     let energy = |g: usize| {
-        let part = &bench.stack.segments[g];
+        let part = &data.stack.segments[g];
         signal[part.start..part.start + part.len].iter().map(|v| v * v).sum::<f64>()
     };
-    (0..bench.stack.segments.len()).max_by(|&a, &b| energy(a).total_cmp(&energy(b)))
+    (0..data.stack.segments.len()).max_by(|&a, &b| energy(a).total_cmp(&energy(b)))
 }
 
 /// Name of a segment: its record, and how many repeats stand together.
 fn name(s: &Shown, segment: usize) -> String {
-    let runs = &s.made.bench.stack.segments[segment].runs;
-    let first = &s.made.bench.runs[runs[0]].name;
+    let runs = &s.made.data.stack.segments[segment].runs;
+    let first = &s.made.data.runs[runs[0]].name;
     if runs.len() > 1 { format!("{first}, mean of {} repeats", runs.len()) } else { first.clone() }
 }
 
@@ -129,12 +126,12 @@ fn level(panels: &mut [Panel]) {
 
 /// Error by zone of the stroke and direction of motion, the findings' zones shaded.
 pub(super) fn zone_map(s: &Shown, map: &Map) -> Result<Figure, ReportError> {
-    let bench = &s.made.bench;
-    let places = || bench.trajectories.iter().flat_map(|t| t.samples.iter().map(|m| m.x));
+    let data = &s.made.data;
+    let places = || data.trajectories.iter().flat_map(|t| t.samples.iter().map(|m| m.x));
     let (low, high) = places().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
     let width = ((high - low) / ZONES as f64).max(f64::MIN_POSITIVE);
     let mut sums = [[(0.0, 0.0); ZONES]; 2];
-    for (error, trajectory) in map.errors.iter().zip(&bench.trajectories) {
+    for (error, trajectory) in map.errors.iter().zip(&data.trajectories) {
         for (e, m) in error.iter().zip(&trajectory.samples) {
             let zone = (((m.x - low) / width) as usize).min(ZONES - 1);
             let sum = &mut sums[usize::from(m.v < 0.0)][zone];

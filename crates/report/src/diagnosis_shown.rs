@@ -23,7 +23,7 @@ impl Shown<'_> {
 
     /// Sample time (s).
     pub fn sample_time_s(&self) -> f64 {
-        self.made.bench.scene.sample_time_s
+        self.made.data.scene.sample_time_s
     }
 
     /// Whether the laws in the model are findings; otherwise they are only the nearest ones.

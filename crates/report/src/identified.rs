@@ -6,7 +6,7 @@ use super::figure::Figure;
 use super::number::NumberFormat;
 use super::table::{Cell, Column, Table, Verdict};
 use servotune::frf::Frf;
-use servotune::identify::{Identified, Interval, ModeIntervals};
+use servotune::identify::{Identified, ModeIntervals, ParameterEstimate};
 use servotune::lti::{Body, FrequencyResponse};
 use std::f64::consts::TAU;
 
@@ -36,7 +36,7 @@ fn unit_of_response(id: &Identified) -> String {
 /// Largest ratio of an interval's ends, and largest width in multiples of the value where it holds 0: beyond it the sweep says nothing of the number.
 const TELLING: f64 = 100.0;
 
-fn tells_nothing(i: Interval) -> bool {
+fn tells_nothing(i: ParameterEstimate) -> bool {
     let ends = (i.low.abs(), i.high.abs());
     let wide = i.high - i.low > TELLING * i.value.abs().max(f64::MIN_POSITIVE);
     let one_side = i.low * i.high > 0.0;
@@ -90,7 +90,7 @@ pub fn parameter_table(id: &Identified) -> Result<Table, ReportError> {
             Column::words("unit"),
         ],
     );
-    let mut row = |name: String, key: String, i: Interval, scale: f64, unit: &str| {
+    let mut row = |name: String, key: String, i: ParameterEstimate, scale: f64, unit: &str| {
         let value = Cell::from(i.value * scale);
         let value = if id.at_bound.contains(&key) { value.flagged(Verdict::Warn, "at bound") } else { value };
         if tells_nothing(i) {

@@ -23,7 +23,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let model = identify(&sweep.frf, &IdentifySettings::default())?.plant;
     let sampled = DiscretePlant::of(&model, controller.sample_time_s)?;
     let of_model = margins(&ModelLoop::new(&sampled, &sections)?);
-    let of_sweep = measured_margins(&MeasuredLoop::new(&sweep.frf, &sections, false)?)?;
+    let of_sweep = measured_margins(&MeasuredLoop::new(&sweep.frf, &sections)?)?;
 
     let line = |what: &str, pm: Option<f64>, ms: f64| {
         let pm = pm.map_or("none".to_owned(), |deg| format!("{deg:.2} deg"));

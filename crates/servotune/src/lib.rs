@@ -48,6 +48,7 @@ pub use feedback::{Margins, MeasuredLoop, MeasuredMargins, ModelLoop, margins, m
 pub use frf::{Frf, Sweep};
 pub use identify::{Identified, IdentifySettings, identify};
 pub use lti::{Body, DiscretePlant, Mode, Plant};
+pub use numeric::interval::Interval;
 pub use pes::{PesFigures, Profile, simulate};
 pub use recording::{Case, Record};
 pub use tune::{GainTable, Machine, Outcome, Spec, TuneSettings, Tuned, tune};

@@ -60,18 +60,18 @@ pub fn diagnose(
         let kept: usize = cut.iter().filter(|r| r.role == Role::Fit).map(Run::len).sum();
         remarks.push(format!("the search was made on excerpts of the fit records, {kept} samples together; figures are of the whole records"));
     }
-    let mut bench = DiagnosisData::new(given, cut.unwrap_or_else(|| whole.clone()), sample_time_s, case.spindle_hz)?;
-    preconditions::check(&bench)?;
+    let mut data = DiagnosisData::new(given, cut.unwrap_or_else(|| whole.clone()), sample_time_s, case.spindle_hz)?;
+    preconditions::check(&data)?;
     if controller.is_none() {
         progress("is the command held between samples, or measured");
-        let (better, measured) = held_or_measured(bench, case, given, settings.select.iterations, &mut remarks)?;
-        bench = better;
+        let (better, measured) = held_or_measured(data, case, given, settings.select.iterations, &mut remarks)?;
+        data = better;
         if measured {
             whole = whole.iter().map(Run::measured).collect();
         }
     }
     let sound = log_checks.finding.is_none();
-    let start = sound.then(|| cleared(&bench, settings.select.iterations, &mut |step: &str| progress(step))).flatten();
+    let start = sound.then(|| cleared(&data, settings.select.iterations, &mut |step: &str| progress(step))).flatten();
     if let Some(start) = start {
         remarks.push(match start.law {
             Some(_) => {
@@ -82,11 +82,14 @@ pub fn diagnose(
             }
             None => "the search set out from a plant fitted to the balance of torques: the given one is far off".into(),
         });
-        bench = DiagnosisData::new(&start.plant, bench.runs, sample_time_s, case.spindle_hz)?;
-        bench.foretold = start.law;
+        data = DiagnosisData::new(&start.plant, data.runs, sample_time_s, case.spindle_hz)?;
+        if !data.noise_known {
+            data = data.with_noise(start.left);
+        }
+        data.foretold = start.law;
     }
-    let shocks = set_aside(&mut bench, given, case.spindle_hz, settings.select.iterations)?;
-    whole.iter_mut().zip(&bench.runs).for_each(|(w, r)| w.shocked = r.shocked);
+    let (data, shocks) = set_aside(data, given, case.spindle_hz, settings.select.iterations)?;
+    whole.iter_mut().zip(&data.runs).for_each(|(w, r)| w.shocked = r.shocked);
     let closed = law.as_ref().filter(|_| log_checks.closed);
     let trial = Trial {
         case,
@@ -98,25 +101,24 @@ pub fn diagnose(
         shocks: &shocks,
         remarks: &remarks,
     };
-    trial.best(bench, &mut progress)
+    trial.best(data, &mut progress)
 }
 
 /// The diagnosis data with the command as it fits better: held between samples, or measured at them; and whether it is the latter.
 fn held_or_measured(
-    bench: DiagnosisData,
+    data: DiagnosisData,
     case: &Case,
     given: &Plant,
     iterations: usize,
     remarks: &mut Vec<String>,
 ) -> Result<(DiagnosisData, bool), DiagnoseError> {
-    let measured: Vec<Run> = bench.runs.iter().map(Run::measured).collect();
-    let other = DiagnosisData::new(given, measured, bench.scene.sample_time_s, case.spindle_hz)?;
+    let measured: Vec<Run> = data.runs.iter().map(Run::measured).collect();
+    let other = DiagnosisData::new(given, measured, data.scene.sample_time_s, case.spindle_hz)?;
     let left = |b: &DiagnosisData| {
-        let mut b = b.clone();
-        let p = refit(&mut b, iterations).refitted.p;
-        rms(&b.without_starts(b.fit(vec![]).errors(&p)))
+        let (b, linear) = refit(b.clone(), iterations);
+        rms(&b.without_starts(b.fit(vec![]).errors(&linear.refitted.p)))
     };
-    let (held, moving) = (left(&bench), left(&other));
+    let (held, moving) = (left(&data), left(&other));
     if moving < MEASURED_COMMAND * held {
         remarks.push(format!(
             "the command is taken as measured at the samples, not as held between them: the linear refit then leaves {:.3} of the error",
@@ -124,5 +126,5 @@ fn held_or_measured(
         ));
         return Ok((other, true));
     }
-    Ok((bench, false))
+    Ok((data, false))
 }

@@ -7,14 +7,14 @@ use super::rules::BEYOND_MOTION;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 
 /// Refuses a ground on which nothing can be computed.
-pub(super) fn check(bench: &DiagnosisData) -> Result<(), DiagnoseError> {
-    alike(bench)?;
-    finite(bench)
+pub(super) fn check(data: &DiagnosisData) -> Result<(), DiagnoseError> {
+    alike(data)?;
+    finite(data)
 }
 
 /// Refuses a ground on which nothing can be computed: what is no number here would be none everywhere after.
-fn finite(bench: &DiagnosisData) -> Result<(), DiagnoseError> {
-    let (l, s) = (&bench.levels, &bench.scene);
+fn finite(data: &DiagnosisData) -> Result<(), DiagnoseError> {
+    let (l, s) = (&data.levels, &data.scene);
     let numbers = [
         ("the level of the sensor's noise", l.sensor_rms),
         ("the level of the torque's noise", l.torque_rms),
@@ -24,7 +24,7 @@ fn finite(bench: &DiagnosisData) -> Result<(), DiagnoseError> {
         ("the speed of the records", s.speed),
         ("the motion of the arm per recorded position", s.arm_over_record()),
     ];
-    let moving = bench.trajectories.iter().flat_map(|t| &t.samples);
+    let moving = data.trajectories.iter().flat_map(|t| &t.samples);
     let lost = moving.map(|m| m.x + m.v + m.u + m.i).find(|sum| !sum.is_finite()).map(|x| ("the motion of the arm", x));
     match numbers.into_iter().find(|(_, x)| !x.is_finite()).or(lost) {
         Some((what, found)) => Err(DiagnoseError::NotFinite { what, found }),
@@ -33,9 +33,9 @@ fn finite(bench: &DiagnosisData) -> Result<(), DiagnoseError> {
 }
 
 /// Refuses a plant that simulates something else than these records.
-fn alike(bench: &DiagnosisData) -> Result<(), DiagnoseError> {
-    let none = vec![0.0; bench.form.knobs.len()];
-    for (record, error) in bench.means.iter().zip(bench.clone().fit(vec![]).errors(&none)) {
+fn alike(data: &DiagnosisData) -> Result<(), DiagnoseError> {
+    let none = vec![0.0; data.form.free_parameters.len()];
+    for (record, error) in data.means.iter().zip(data.clone().fit(vec![]).errors(&none)) {
         let mean = record.position.iter().sum::<f64>() / record.len() as f64;
         let moved: Vec<f64> = record.position.iter().map(|x| x - mean).collect();
         let size = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt();

@@ -49,9 +49,9 @@ fn settled(d: &Diagnosis) -> bool {
 
 impl Trial<'_> {
     /// The search, with a curve where it ends without a name, or cannot tell what is left from noise, and one is worth it.
-    pub fn best(&self, bench: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
-        let cut = bench.runs.clone();
-        let (first, open) = self.made(bench, progress)?;
+    pub fn best(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
+        let cut = data.runs.clone();
+        let (first, open) = self.made(data, progress)?;
         if settled(&first.diagnosis) {
             return Ok(first);
         }
@@ -64,46 +64,41 @@ impl Trial<'_> {
     fn with_curve(&self, mut made: Diagnosed, mut open: Errors, progress: &mut dyn FnMut(&str)) -> Diagnosed {
         let floor = made.diagnosis.fit.holdout.unwrap_or(made.diagnosis.fit.fit).noise_floor;
         let standing = Standing { closed: self.closed, errors: &made.errors, floor };
-        if let Some(found) = stand_in(&made.bench, &made.selection, &standing, progress) {
+        if let Some(found) = stand_in(&made.data, &made.selection, &standing, progress) {
             enter(&mut made.diagnosis, &found);
             [made.errors[2], open[2]] = found.errors;
-            let every: Vec<&Run> = made.bench.runs.iter().collect();
-            made.diagnosis.fit = figures_of(&made.bench, &every, [&open, &made.errors], self.closed.is_some());
+            let every: Vec<&Run> = made.data.runs.iter().collect();
+            made.diagnosis.fit = figures_of(&made.data, &every, [&open, &made.errors], self.closed.is_some());
             made.corrected = found.corrected;
-            propose(&mut made.diagnosis, &made.bench, &made.selection);
+            propose(&mut made.diagnosis, &made.data, &made.selection);
         }
         made
     }
 
     /// One search and what it comes to, with the errors of all runs in open loop.
-    fn made(
-        &self,
-        mut bench: DiagnosisData,
-        progress: &mut dyn FnMut(&str),
-    ) -> Result<(Diagnosed, Errors), DiagnoseError> {
+    fn made(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<(Diagnosed, Errors), DiagnoseError> {
         let mut remarks = self.remarks.to_vec();
-        let torque_noise = torque_noise(&bench.repeats, &bench.whitener, &bench.form.given, bench.scene.sample_time_s);
+        let torque_noise = torque_noise(&data.repeats, &data.whitener, &data.form.given, data.scene.sample_time_s);
         // Records whose samples slipped hold nothing that a model could be fitted to.
         // A log that slipped or is in other units is no ground for the long way.
         let sound = self.log_checks.finding.is_none();
         let search_settings = SelectSettings { by_simulation: sound, ..self.settings.select.clone() };
-        let selection = select(&mut bench, library(), &search_settings, &mut *progress);
+        let (data, selection) = select(data, library(), &search_settings, &mut *progress);
         progress("simulating all records");
         let last = selection.last();
         // Where commands bend, repeats differ by more than a linear arm answers: no sign of a push.
         let torque_noise = torque_noise.filter(|_| !last.chosen.iter().any(|c| c.effect().is_hard_nonlinearity()));
         remarks.extend(torque_noise.as_ref().map(|u| u.says(&self.given.command_unit)));
         // What the search found, whether or not it is offered.
-        let fixed = corrected(&bench.form, &last.refitted.p, &last.chosen, &bench.scene);
-        let refitted = corrected(&bench.form, &selection.baseline.refitted.p, &[], &bench.scene);
-        let reporting =
-            Reporting { bench: &bench, selection: &selection, runs: self.whole, closed: self.closed, sound };
+        let fixed = corrected(&data.form, &last.refitted.p, &last.chosen, &data.scene);
+        let refitted = corrected(&data.form, &selection.baseline.refitted.p, &[], &data.scene);
+        let reporting = Reporting { data: &data, selection: &selection, runs: self.whole, closed: self.closed, sound };
         let reported = reporting.offered(self.given);
-        let (figures, errors, open) = fit_report(&bench, self.given, &reporting, &reported);
+        let (figures, errors, open) = fit_report(&data, self.given, &reporting, &reported);
         remarks.extend(reported.remarks.iter().cloned());
-        let sse = bench.stack.total as f64;
+        let sse = data.stack.total as f64;
         let whitened = [selection.given / sse, selection.baseline.cost / sse, selection.best().cost / sse];
-        let held_out = held_out(&bench, &selection, &fixed)?;
+        let held_out = held_out(&data, &selection, &fixed)?;
         let mut diagnosis = Diagnosis {
             schema: "servotune.diagnosis/1",
             id: self.case.id.clone(),
@@ -113,29 +108,29 @@ impl Trial<'_> {
             free_form: None,
             corrected_model: None,
             next_experiment: NextExperiment { what: String::new(), expected_separation: 0.0 },
-            noise: bench.levels,
+            noise: data.levels,
             replay: self.log_checks.replay.clone(),
             sample_faults: self.log_checks.faults.clone(),
             whitened,
             holdout_whitened: mean(&held_out),
-            confirmed: confirm(&bench, &selection, &fixed, &held_out, self.settings.select.iterations)?,
+            confirmed: confirm(&data, &selection, &fixed, &held_out, self.settings.select.iterations)?,
             held_out,
             leftover: selection.leftover.clone(),
             remarks,
             search: search(&selection),
             bootstrap: selection.bootstrap.clone(),
         };
-        let linear = SimulatedModel { plant: &refitted.plant, effects: Vec::new(), ..fixed.judged(&bench, &selection) };
-        let shocks = beyond(&bench, self.shocks.to_vec(), &linear, &fixed.judged(&bench, &selection));
-        let shocks = shocks.iter().map(|b| b.finding(&bench.runs, &self.given.command_unit)).collect();
-        let noise = noise_findings(&bench, torque_noise.as_ref(), &self.settings.noise, diagnosis.fit.fit);
+        let linear = SimulatedModel { plant: &refitted.plant, effects: Vec::new(), ..fixed.judged(&data, &selection) };
+        let shocks = beyond(&data, self.shocks.to_vec(), &linear, &fixed.judged(&data, &selection));
+        let shocks = shocks.iter().map(|b| b.finding(&data.runs, &self.given.command_unit)).collect();
+        let noise = noise_findings(&data, torque_noise.as_ref(), &self.settings.noise, diagnosis.fit.fit);
         let by_others = ByOthers { logs: self.log_checks.finding.clone(), shocks, noise };
-        judge(&mut diagnosis, &bench, &selection, self.given, &reported, by_others);
-        propose(&mut diagnosis, &bench, &selection);
+        judge(&mut diagnosis, &data, &selection, self.given, &reported, by_others);
+        propose(&mut diagnosis, &data, &selection);
         // Pictures are of the whole records.
-        bench.runs = self.whole.to_vec();
+        let data = DiagnosisData { runs: self.whole.to_vec(), ..data };
         let (corrected, refitted) = (reported.fixed.made, reported.refitted.made.plant);
-        Ok((Diagnosed { diagnosis, bench, selection, corrected, refitted, errors }, open))
+        Ok((Diagnosed { diagnosis, data, selection, corrected, refitted, errors }, open))
     }
 }
 

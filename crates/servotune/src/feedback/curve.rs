@@ -4,7 +4,7 @@
 //! Above the last point nothing is claimed. What the search finds is judged over the sweep by [`super::MeasuredLoop`]. Spec: `specs/tuning.md`, "The measured route".
 
 use super::cubic::Cubic;
-use super::{FeedbackError, SampledPlant};
+use super::{FeedbackError, SampledPlant, hold};
 use crate::frf::Frf;
 use crate::lti::{DiscretePlant, FrequencyResponse};
 use nalgebra::Complex;
@@ -35,8 +35,11 @@ const SLOPE_OCTAVES: f64 = 1.0;
 const FEWEST: usize = 4;
 
 impl ResponseCurve {
-    /// The points of `frf` below half the sample rate, times `hold` at each frequency.
-    pub fn of(frf: &Frf, sample_time_s: f64, hold: impl Fn(f64) -> Complex<f64>) -> Result<Self, FeedbackError> {
+    /// The points of `frf` below half the sample rate, each times the hold unless it is part of the response.
+    pub fn of(frf: &Frf, sample_time_s: f64) -> Result<Self, FeedbackError> {
+        let differs = |found_s: f64| FeedbackError::Hold { found_s, expected_s: sample_time_s };
+        let held = frf.holds(sample_time_s).map_err(differs)?;
+        let hold = |w: f64| if held { Complex::new(1.0, 0.0) } else { hold(w * sample_time_s) };
         let end = PI / sample_time_s;
         let n = frf.w_rad_s().partition_point(|w| *w < end);
         let half_rate_hz = 0.5 / sample_time_s;

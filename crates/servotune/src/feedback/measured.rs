@@ -8,6 +8,7 @@ use super::open_loop::section_poles;
 use super::{FeedbackError, Margins, OpenLoop, ResponseCurve, margins};
 use crate::frf::{Frf, scatter};
 use crate::lti::{FrequencyResponse, Sections};
+use crate::numeric::interval::Interval;
 use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
@@ -26,15 +27,6 @@ pub struct MeasuredLoop<'a> {
     outside: usize,
     /// |L| at rest at most, as a share of |L| at the first point.
     rest_share: f64,
-}
-
-/// A range.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Interval {
-    /// Lower end.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
 }
 
 /// 95 % intervals of the named margins; `None` where the margin does not exist.
@@ -87,14 +79,14 @@ const NEAR_REST: f64 = 1e-6;
 const REACH: f64 = 1.96 * std::f64::consts::FRAC_1_SQRT_2;
 
 impl<'a> MeasuredLoop<'a> {
-    /// `hold_included`: the sweep was taken through the controller's own hold, so it is not applied again.
+    /// A hold that is part of the response is not applied again.
     ///
     /// A stable plant is taken to have a phase between +90 and -270 deg at the first point, counted from rest, as a positioner's is. Each
     /// unstable pole that the response is stated to have turns the value at rest by half a turn, as the negative stiffness of a bearing does;
     /// more than one of them are taken to lie above the first point.
-    pub fn new(frf: &Frf, sections: &'a Sections, hold_included: bool) -> Result<Self, FeedbackError> {
+    pub fn new(frf: &Frf, sections: &'a Sections) -> Result<Self, FeedbackError> {
         let t = sections.sample_time_s;
-        let curve = ResponseCurve::of(frf, t, |w| if hold_included { Complex::new(1.0, 0.0) } else { hold(w * t) })?;
+        let curve = ResponseCurve::of(frf, t)?;
         let (ln_w, ln_p) = (curve.ln_w(), curve.ln_p());
         let n = ln_w.len();
         let (ln_size, phase): (Vec<f64>, Vec<f64>) = ln_p.iter().map(|p| (p.re, p.im)).unzip();

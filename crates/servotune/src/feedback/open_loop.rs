@@ -33,6 +33,11 @@ pub enum FeedbackError {
     /// Plant and controller do not share a clock.
     #[error("the plant is sampled at {plant_s} s and the controller runs at {controller_s} s: one clock is expected")]
     SampleTime { plant_s: f64, controller_s: f64 },
+    /// The sweep was taken through a hold of another clock.
+    #[error(
+        "the sweep was taken through a hold of {found_s} s and the controller runs at {expected_s} s: take the controller of that clock, or a sweep without the hold"
+    )]
+    Hold { found_s: f64, expected_s: f64 },
     /// The eigenvalue iteration did not end.
     #[error("the poles of the closed loop, order {order}, were not found: the eigenvalue iteration did not end")]
     Poles { order: usize },

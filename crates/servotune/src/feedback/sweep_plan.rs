@@ -26,8 +26,6 @@ pub struct PlanSettings {
     pub periods: f64,
     /// Settling before each tone or point (s).
     pub settle_s: f64,
-    /// The sweep was taken through the controller's own hold.
-    pub hold_included: bool,
 }
 
 impl Default for PlanSettings {
@@ -39,7 +37,6 @@ impl Default for PlanSettings {
             position_limit: f64::INFINITY,
             periods: 50.0,
             settle_s: 0.02,
-            hold_included: false,
         }
     }
 }
@@ -83,9 +80,8 @@ const SAME_POINT: f64 = 2e-3;
 
 /// Plans the next tones.
 pub fn sweep_plan(frf: &Frf, sections: &Sections, settings: &PlanSettings) -> Result<SweepPlan, FeedbackError> {
-    let judge = |f: &Frf| -> Result<MeasuredMargins, FeedbackError> {
-        measured_margins(&MeasuredLoop::new(f, sections, settings.hold_included)?)
-    };
+    let judge =
+        |f: &Frf| -> Result<MeasuredMargins, FeedbackError> { measured_margins(&MeasuredLoop::new(f, sections)?) };
     let before = judge(frf)?;
     let seconds = |hz: f64| settings.settle_s + settings.periods / hz;
     let full_seconds = frf.w_rad_s().iter().map(|w| seconds(w / TAU)).sum();
@@ -168,7 +164,7 @@ fn with_tone(now: &Frf, old: &Frf, hz: f64, seconds: f64, s: &PlanSettings) -> (
     }
     let (w, rest): (Vec<f64>, Vec<(Complex<f64>, f64)>) = rows.into_iter().map(|(w, v, d)| (w, (v, d))).unzip();
     let (v, d) = rest.into_iter().unzip();
-    (Frf::new(w, v, Some(d)).ok().map(|f| f.with_unstable_poles(now.unstable_poles())), tone)
+    (now.alike(w, v, Some(d)).ok(), tone)
 }
 
 /// Relative deviation where a sweep carries none.

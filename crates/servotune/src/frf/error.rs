@@ -281,8 +281,6 @@ pub enum FrfError {
         "at {at_hz} Hz the result is not a finite, non-zero number: one plus the open loop is zero, or a number overflows"
     )]
     Singular { at_hz: f64 },
-    #[error("{wanted_hz} Hz lies outside the measured {low_hz} to {high_hz} Hz; nothing is extrapolated")]
-    Outside { wanted_hz: f64, low_hz: f64, high_hz: f64 },
     #[error("a response needs records of one length: input {input}, output {output} samples")]
     RecordLength { input: usize, output: usize },
     #[error("sample {sample} of the {record} is not finite")]

@@ -44,7 +44,7 @@ pub fn gathered(frf: &Frf) -> Option<Gathered> {
         out.cell(from, end, noise);
         from = end;
     }
-    let frf = Frf::new(out.w, out.value, Some(out.std)).ok()?;
+    let frf = frf.alike(out.w, out.value, Some(out.std)).ok()?;
     Some(Gathered { frf, points: n })
 }
 
@@ -136,7 +136,9 @@ mod tests {
                 .iter()
                 .map(|w| truth(*w) * (1.0 + Complex::new(noise * random.normal(), noise * random.normal())))
                 .collect();
-            let g = gathered(&Frf::new(w, value, None).unwrap()).unwrap();
+            let frf = Frf::new(w, value, None).unwrap().with_unstable_poles(1);
+            let g = gathered(&frf).unwrap();
+            assert_eq!(g.frf.unstable_poles(), 1, "the mean of a sweep is of the same plant");
             assert!(g.points == n && g.frf.len() < n / 10, "{}", g.frf.len());
             let std = g.frf.relative_std().unwrap();
             let score = |i: usize| (g.frf.value()[i] / truth(g.frf.w_rad_s()[i]) - 1.0).norm() / std[i];

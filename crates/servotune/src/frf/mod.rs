@@ -15,7 +15,6 @@ mod error;
 mod estimate;
 mod gather;
 mod header;
-mod interpolate;
 mod mat;
 mod mat_columns;
 mod minimum_phase;
@@ -40,11 +39,10 @@ pub use closed_loop::{Opened, open_loop, scatter};
 pub use error::{Doubt, FrfError, NotText, Question};
 pub use estimate::{Estimate, PeriodicSettings, SegmentSettings, periodic, segments};
 pub use gather::{GATHERED_ABOVE, Gathered, gathered};
-pub use interpolate::{Interpolation, resample};
 pub use note::{Ground, Note};
 pub use phase::{check_order, phase_rad};
 pub use read::{Sweep, read_bytes, read_file};
-pub use response::{Frf, FrfShapeError};
+pub use response::{Frf, FrfShapeError, Hold};
 pub use settings::{
     AngleUnit, BadPoints, ColumnChoice, Conjugate, DeviationScale, Duplicates, FrequencyUnit, MagnitudeScale, Measured,
     Outliers, PhaseConvention, ReadSettings, UnknownWord, Unsorted,

@@ -149,7 +149,8 @@ fn without_single_points(
     let pick = |all: &[f64]| kept.iter().map(|&i| all[i]).collect::<Vec<f64>>();
     let value = kept.iter().map(|&i| frf.value()[i]).collect();
     let coherence = coherence.map(|c| pick(&c));
-    let frf = Frf::new(pick(frf.w_rad_s()), value, frf.relative_std().map(pick))
+    let frf = frf
+        .alike(pick(frf.w_rad_s()), value, frf.relative_std().map(pick))
         .map_err(|source| FrfError::Shape { file: file.to_owned(), source })?;
     Ok((frf, coherence))
 }

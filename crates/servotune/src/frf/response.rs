@@ -2,7 +2,32 @@
 
 use crate::document::size_limits::{SWEEP_POINTS, SWEEP_RAD_S, VALUE};
 use nalgebra::Complex;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+/// Whether the controller's zero-order hold is part of a response.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Hold {
+    /// The response is that of the continuous plant, as in the paper.
+    #[default]
+    NotIncluded,
+    /// It was measured from the held command.
+    Included {
+        /// Sample time of the hold (s).
+        sample_time_s: f64,
+    },
+}
+
+impl Hold {
+    /// A hold of this sample time (s); none where there is none.
+    pub fn of(sample_time_s: Option<f64>) -> Hold {
+        sample_time_s.map_or(Hold::NotIncluded, |sample_time_s| Hold::Included { sample_time_s })
+    }
+}
+
+/// Difference of two sample times that are one clock (relative).
+const SAME_CLOCK: f64 = 1e-3;
 
 /// A frequency response on an ascending grid.
 ///
@@ -17,6 +42,7 @@ pub struct Frf {
     value: Vec<Complex<f64>>,
     relative_std: Option<Vec<f64>>,
     unstable_poles: usize,
+    hold: Hold,
 }
 
 /// Why numbers do not make a frequency response.
@@ -77,7 +103,7 @@ impl Frf {
             }
             before = w;
         }
-        Ok(Frf { w_rad_s, value, relative_std, unstable_poles: 0 })
+        Ok(Frf { w_rad_s, value, relative_std, unstable_poles: 0, hold: Hold::NotIncluded })
     }
 
     /// The same response of a plant that has so many poles in the right half-plane: no sweep shows them, its owner states them.
@@ -90,6 +116,35 @@ impl Frf {
     /// Poles of the plant in the right half-plane, as stated; 0 where nobody said so.
     pub fn unstable_poles(&self) -> usize {
         self.unstable_poles
+    }
+
+    /// The same response, the controller's hold being part of it or not; without a word it is not. One made of two others does not inherit it.
+    pub fn with_hold(self, hold: Hold) -> Frf {
+        Frf { hold, ..self }
+    }
+
+    /// Whether the controller's hold is part of it.
+    pub fn hold(&self) -> Hold {
+        self.hold
+    }
+
+    /// Whether a hold of this sample time (s) is part of it; an error with the hold's own sample time where that is another one.
+    pub fn holds(&self, sample_time_s: f64) -> Result<bool, f64> {
+        match self.hold {
+            Hold::NotIncluded => Ok(false),
+            Hold::Included { sample_time_s: own } if (own / sample_time_s - 1.0).abs() < SAME_CLOCK => Ok(true),
+            Hold::Included { sample_time_s: own } => Err(own),
+        }
+    }
+
+    /// Another response that was taken like this one: stated poles and hold stay.
+    pub fn alike(
+        &self,
+        w_rad_s: Vec<f64>,
+        value: Vec<Complex<f64>>,
+        relative_std: Option<Vec<f64>>,
+    ) -> Result<Frf, FrfShapeError> {
+        Ok(Frf { unstable_poles: self.unstable_poles, hold: self.hold, ..Frf::new(w_rad_s, value, relative_std)? })
     }
 
     /// Angular frequencies, ascending (rad/s).

@@ -4,7 +4,7 @@
 //! Adam is algorithm 1 of Kingma & Ba (2015) with epsilon 1e-7. Moments and derivatives too
 //! small to matter are put to zero: numbers below 1e-38 cost a processor many times as much as others. Spec: `specs/gate.md`.
 
-use super::network::{Desk, Network, TILE, softmax};
+use super::network::{Network, TILE, Workspace, softmax};
 use super::settings::FitSettings;
 use super::split::shuffle;
 use crate::numeric::random::Random;
@@ -147,21 +147,21 @@ impl Sink for Adam {
 
 /// Loss (sum over rows, nat) and rows right, with the derivatives of the mean loss left in the last delta.
 #[inline(always)]
-fn output(network: &Network, class: &[usize], desk: &mut Desk) -> (f64, usize) {
+fn output(network: &Network, class: &[usize], workspace: &mut Workspace) -> (f64, usize) {
     let last = network.layers();
     let k = network.sizes[last];
     let (mut loss, mut right) = (0.0, 0);
     let mut p = [0.0f64; 64];
     let p = &mut p[..k];
     for (r, &y) in class.iter().enumerate() {
-        let z = &desk.activations[last][r * k..(r + 1) * k];
+        let z = &workspace.activations[last][r * k..(r + 1) * k];
         p.iter_mut().zip(z).for_each(|(p, z)| *p = f64::from(*z));
         let (own, top) = (p[y], p.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v)));
         right += usize::from(own >= top);
         softmax(p);
         // The logarithm of a probability that rounds to zero is taken from the logits.
         loss -= if p[y] > 1e-300 { p[y].ln() } else { own - top };
-        for (j, d) in desk.deltas[last][r * k..(r + 1) * k].iter_mut().enumerate() {
+        for (j, d) in workspace.deltas[last][r * k..(r + 1) * k].iter_mut().enumerate() {
             let e = p[j] - f64::from(u8::from(j == y));
             *d = quiet((e / class.len() as f64) as f32, LEAST_GRADIENT);
         }
@@ -171,14 +171,14 @@ fn output(network: &Network, class: &[usize], desk: &mut Desk) -> (f64, usize) {
 
 /// Derivatives through all layers, the last first; each row of weights is used for the layer below and then handed to the sink.
 #[inline(always)]
-fn backward(network: &mut Network, rows: usize, desk: &mut Desk, sink: &mut impl Sink) {
+fn backward(network: &mut Network, rows: usize, workspace: &mut Workspace, sink: &mut impl Sink) {
     for l in (0..network.layers()).rev() {
         let (n, m) = (network.sizes[l], network.sizes[l + 1]);
         let at = network.offset(l);
         let values = &mut network.values[at..at + n * m + m];
-        let (below, above) = desk.deltas.split_at_mut(l + 1);
+        let (below, above) = workspace.deltas.split_at_mut(l + 1);
         let (below, deltas) = (&mut below[l], &above[0]);
-        let x = &desk.activations[l];
+        let x = &workspace.activations[l];
         for i in 0..n {
             let w = &mut values[i * m..(i + 1) * m];
             let mut live = 0;
@@ -190,16 +190,16 @@ fn backward(network: &mut Network, rows: usize, desk: &mut Desk, sink: &mut impl
                         if reaches { quiet(dot(&deltas[r * m..(r + 1) * m], w), LEAST_GRADIENT) } else { 0.0 };
                 }
                 if reaches {
-                    desk.live[live] = (r * m, a);
+                    workspace.live[live] = (r * m, a);
                     live += 1;
                 }
             }
-            sink.row(at + i * m, &desk.live[..live], deltas, w);
+            sink.row(at + i * m, &workspace.live[..live], deltas, w);
         }
         for r in 0..rows {
-            desk.live[r] = (r * m, 1.0);
+            workspace.live[r] = (r * m, 1.0);
         }
-        sink.row(at + n * m, &desk.live[..rows], deltas, &mut values[n * m..]);
+        sink.row(at + n * m, &workspace.live[..rows], deltas, &mut values[n * m..]);
     }
 }
 
@@ -225,14 +225,14 @@ pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
 }
 
 /// Mean cross-entropy (nat) and accuracy over `rows`.
-pub fn judge(network: &Network, rows: Rows<'_>, desk: &mut Desk) -> (f64, f64) {
+pub fn judge(network: &Network, rows: Rows<'_>, workspace: &mut Workspace) -> (f64, f64) {
     let d = network.sizes[0];
     let (mut loss, mut right) = (0.0, 0);
-    for (x, y) in rows.inputs.chunks(d * desk.batch).zip(rows.class.chunks(desk.batch)) {
-        desk.activations[0][..x.len()].copy_from_slice(x);
+    for (x, y) in rows.inputs.chunks(d * workspace.batch).zip(rows.class.chunks(workspace.batch)) {
+        workspace.activations[0][..x.len()].copy_from_slice(x);
         let (l, r) = wide(|| {
-            network.forward(y.len(), desk);
-            output(network, y, desk)
+            network.forward(y.len(), workspace);
+            output(network, y, workspace)
         });
         loss += l;
         right += r;
@@ -246,7 +246,7 @@ pub fn fit(sizes: &[usize], train: Rows<'_>, validate: Rows<'_>, settings: &FitS
     let mut random = Random::stream(seed, 3);
     let mut network = Network::start(sizes, &mut random);
     let (d, batch) = (sizes[0], settings.batch.max(1));
-    let mut desk = Desk::new(sizes, batch);
+    let mut workspace = Workspace::new(sizes, batch);
     let mut adam = Adam::new(network.parameters(), settings.learning_rate);
     let mut order: Vec<usize> = (0..train.class.len()).collect();
     let mut class = vec![0; batch];
@@ -257,14 +257,14 @@ pub fn fit(sizes: &[usize], train: Rows<'_>, validate: Rows<'_>, settings: &FitS
         let (mut loss, mut right) = (0.0, 0);
         for rows in order.chunks(batch) {
             for (i, &r) in rows.iter().enumerate() {
-                desk.activations[0][i * d..(i + 1) * d].copy_from_slice(&train.inputs[r * d..(r + 1) * d]);
+                workspace.activations[0][i * d..(i + 1) * d].copy_from_slice(&train.inputs[r * d..(r + 1) * d]);
                 class[i] = train.class[r];
             }
             adam.tick();
             let (l, n) = wide(|| {
-                network.forward(rows.len(), &mut desk);
-                let judged = output(&network, &class[..rows.len()], &mut desk);
-                backward(&mut network, rows.len(), &mut desk, &mut adam);
+                network.forward(rows.len(), &mut workspace);
+                let judged = output(&network, &class[..rows.len()], &mut workspace);
+                backward(&mut network, rows.len(), &mut workspace, &mut adam);
                 judged
             });
             loss += l;
@@ -273,7 +273,7 @@ pub fn fit(sizes: &[usize], train: Rows<'_>, validate: Rows<'_>, settings: &FitS
         let n = order.len().max(1) as f64;
         let (loss, accuracy) = (loss / n, right as f64 / n);
         let (validation_loss, validation_accuracy) =
-            if validate.class.is_empty() { (loss, accuracy) } else { judge(&network, validate, &mut desk) };
+            if validate.class.is_empty() { (loss, accuracy) } else { judge(&network, validate, &mut workspace) };
         history.push(Epoch { loss, accuracy, validation_loss, validation_accuracy });
         if validation_loss < best.0 {
             best = (validation_loss, epoch, std::mem::take(&mut best.2));
@@ -329,14 +329,14 @@ mod tests {
         let rows = 7;
         let x: Vec<f32> = (0..rows * 5).map(|_| random.normal() as f32).collect();
         let class: Vec<usize> = (0..rows).map(|i| i % 3).collect();
-        let mut desk = Desk::new(&sizes, rows);
-        desk.activations[0].copy_from_slice(&x);
+        let mut workspace = Workspace::new(&sizes, rows);
+        workspace.activations[0].copy_from_slice(&x);
         let mut moved = network.clone();
         let mut keep = Keep(vec![0.0; network.parameters()]);
         let found = wide(|| {
-            moved.forward(rows, &mut desk);
-            let found = output(&moved, &class, &mut desk);
-            backward(&mut moved, rows, &mut desk, &mut keep);
+            moved.forward(rows, &mut workspace);
+            let found = output(&moved, &class, &mut workspace);
+            backward(&mut moved, rows, &mut workspace, &mut keep);
             found.0 / rows as f64
         });
         let w: Vec<f64> = network.values.iter().map(|v| f64::from(*v)).collect();

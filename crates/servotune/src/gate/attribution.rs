@@ -4,7 +4,7 @@
 //! Integrated gradients (Sundararajan, Taly & Yan 2017, eq. (1)) from the medians to the row; the shares sum to the change of the lead.
 //! Spec: `specs/gate.md`.
 
-use super::network::{Desk, Network};
+use super::network::{Network, Workspace};
 use serde::Serialize;
 
 /// What one feature had to say.
@@ -38,36 +38,43 @@ pub enum Direction {
 pub(super) const STEPS: usize = 32;
 
 /// Share of each input in `logit[class] - logit[other]`, on the straight path from `from` to `to`.
-pub fn shares(network: &Network, from: &[f32], to: &[f32], class: usize, other: usize, desk: &mut Desk) -> Vec<f64> {
+pub fn shares(
+    network: &Network,
+    from: &[f32],
+    to: &[f32],
+    class: usize,
+    other: usize,
+    workspace: &mut Workspace,
+) -> Vec<f64> {
     let (d, last) = (network.sizes[0], network.layers());
     let k = network.sizes[last];
     let mut sum = vec![0.0f64; d];
-    for first in (0..STEPS).step_by(desk.batch) {
-        let rows = desk.batch.min(STEPS - first);
+    for first in (0..STEPS).step_by(workspace.batch) {
+        let rows = workspace.batch.min(STEPS - first);
         for r in 0..rows {
             let at = ((first + r) as f32 + 0.5) / STEPS as f32;
             for j in 0..d {
-                desk.activations[0][r * d + j] = from[j] + at * (to[j] - from[j]);
+                workspace.activations[0][r * d + j] = from[j] + at * (to[j] - from[j]);
             }
         }
-        crate::numeric::wide::wide(|| network.forward(rows, desk));
+        crate::numeric::wide::wide(|| network.forward(rows, workspace));
         for r in 0..rows {
-            let top = &mut desk.deltas[last][r * k..(r + 1) * k];
+            let top = &mut workspace.deltas[last][r * k..(r + 1) * k];
             top.fill(0.0);
             top[class] += 1.0;
             top[other] -= 1.0;
             for l in (0..last).rev() {
                 let (n, m) = (network.sizes[l], network.sizes[l + 1]);
                 let w = &network.values[network.offset(l)..];
-                let (below, above) = desk.deltas.split_at_mut(l + 1);
+                let (below, above) = workspace.deltas.split_at_mut(l + 1);
                 let above = &above[0][r * m..(r + 1) * m];
                 for i in 0..n {
                     // ReLU passes nothing where its value is zero; the inputs themselves have no ReLU.
-                    let passes = l == 0 || desk.activations[l][r * n + i] > 0.0;
+                    let passes = l == 0 || workspace.activations[l][r * n + i] > 0.0;
                     below[l][r * n + i] = if passes { super::adam::dot(above, &w[i * m..(i + 1) * m]) } else { 0.0 };
                 }
             }
-            sum.iter_mut().zip(&desk.deltas[0][r * d..(r + 1) * d]).for_each(|(s, g)| *s += f64::from(*g));
+            sum.iter_mut().zip(&workspace.deltas[0][r * d..(r + 1) * d]).for_each(|(s, g)| *s += f64::from(*g));
         }
     }
     sum.iter().zip(from.iter().zip(to)).map(|(g, (a, b))| g / STEPS as f64 * f64::from(b - a)).collect()
@@ -82,13 +89,13 @@ mod tests {
     fn shares_sum_to_the_change_of_the_lead() {
         let mut random = Random::new(6);
         let network = Network::start(&[6, 40, 30, 3], &mut random);
-        let mut desk = Desk::new(&network.sizes, 10);
+        let mut workspace = Workspace::new(&network.sizes, 10);
         for _ in 0..20 {
             let x: Vec<f32> = (0..6).map(|_| random.normal() as f32).collect();
             let zero = [0.0; 6];
             let lead = |z: Vec<f64>| z[1] - z[2];
-            let change = lead(network.logits(&x, &mut desk)) - lead(network.logits(&zero, &mut desk));
-            let total: f64 = shares(&network, &zero, &x, 1, 2, &mut desk).iter().sum();
+            let change = lead(network.logits(&x, &mut workspace)) - lead(network.logits(&zero, &mut workspace));
+            let total: f64 = shares(&network, &zero, &x, 1, 2, &mut workspace).iter().sum();
             // Completeness (proposition 1 of the source); the midpoint rule meets kinks, each costs at most a step of its slope.
             assert!((total - change).abs() < 0.03 * (1.0 + change.abs()), "{total} {change}");
         }

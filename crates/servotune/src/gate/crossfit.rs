@@ -7,7 +7,7 @@ use super::GateError;
 use super::adam::{Rows, judge};
 use super::calibrate::Logits;
 use super::member::{Member, Said};
-use super::network::Desk;
+use super::network::Workspace;
 use super::parallel::each;
 use super::prepare::{PATIENCE, learn, prepare, reach, seed_of};
 use super::settings::TrainSettings;
@@ -54,12 +54,12 @@ pub(super) fn crossfit(
         let seed = seed_of(settings.seed, 200 + f as u64);
         let fitted = learn(&p, &train, &choose, class, classes, hidden, settings, Some(PATIENCE), seed)?;
         let unit = reach(&p, &fitted, if choose.is_empty() { &train } else { &choose }, classes);
-        let mut desk = Desk::new(&fitted.network.sizes, settings.batch);
+        let mut workspace = Workspace::new(&fitted.network.sizes, settings.batch);
         let inputs = p.scale.inputs(&p.chosen, &held);
         let of_held: Vec<usize> = held.iter().map(|&r| class[r]).collect();
-        let (loss, accuracy) = judge(&fitted.network, Rows { inputs: &inputs, class: &of_held }, &mut desk);
+        let (loss, accuracy) = judge(&fitted.network, Rows { inputs: &inputs, class: &of_held }, &mut workspace);
         let member = Member::of(p.scale, fitted.network, unit, &p.chosen, &others, class, classes)?;
-        let said = member.say(&inputs, &mut desk);
+        let said = member.say(&inputs, &mut workspace);
         Ok((Fold { loss, accuracy, rows: held.len() }, member, said))
     };
     let (mut found, mut members) = (Vec::new(), Vec::new());

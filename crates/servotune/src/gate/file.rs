@@ -12,7 +12,7 @@ use super::discriminant::Discriminant;
 use super::drift::DriftReference;
 use super::evidence::Evidence;
 use super::judge::Gate;
-use super::member::{Member, Mix};
+use super::member::{Ensemble, Member};
 use super::network::{Network, parameter_count};
 use super::novelty::Novelty;
 use super::packed::Packed32;
@@ -110,7 +110,7 @@ struct File {
     classes: Classes,
     main: Judge,
     members: Vec<Judge>,
-    mix: Mix,
+    mix: Ensemble,
     calibration: Calibration,
     conformal: Conformal,
     costs: Costs,

@@ -12,8 +12,8 @@ use super::conformal::{Conformal, top};
 use super::costs::Costs;
 use super::drift::{Drift, DriftReference, drift};
 use super::evidence::Evidence;
-use super::member::{Member, Mix, mean};
-use super::network::Desk;
+use super::member::{Ensemble, Member, mean};
+use super::network::Workspace;
 use super::novelty::Novelty;
 use super::parallel::each;
 use super::table::{Column, Table};
@@ -37,7 +37,7 @@ pub struct Gate {
     /// The judge of each fold; none where there was no cross-validation.
     pub members: Vec<Member>,
     /// How networks and discriminants are mixed.
-    pub mix: Mix,
+    pub mix: Ensemble,
     /// What calibration did.
     pub calibration: Calibration,
     /// The sets.
@@ -65,7 +65,7 @@ pub(super) struct Judged {
     runner_up: usize,
     expected: Vec<f64>,
     plant: PlantEvidence,
-    novelty: super::novelty::Strangeness,
+    novelty: super::novelty::NoveltyScore,
 }
 
 /// The columns that a gate needs, found in a table.
@@ -128,8 +128,8 @@ impl Gate {
     /// Logits by the published training's judge, and by that of each fold.
     fn ask(&self, found: &Found<'_>, row: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
         let one = |m: &Member, columns: &[&Column]| {
-            let mut desk = Desk::new(&m.network.sizes, 1);
-            let said = m.say(&m.scale.inputs(columns, &[row]), &mut desk);
+            let mut workspace = Workspace::new(&m.network.sizes, 1);
+            let said = m.say(&m.scale.inputs(columns, &[row]), &mut workspace);
             said.first().map_or_else(Vec::new, |s| self.mix.logits(s))
         };
         let folds = self.members.iter().zip(&found.members).map(|(m, c)| one(m, c)).collect();
@@ -154,7 +154,7 @@ impl Gate {
             doubts.push(Doubt::Missing { features: missing });
         }
         let looked: Vec<f64> = found.novelty.iter().map(|c| c.map_or(f64::NAN, |c| c.values[row])).collect();
-        let novelty = self.novelty.strangeness(&looked, class);
+        let novelty = self.novelty.novelty_score(&looked, class);
         if novelty.p_value < self.novelty.level {
             let s = novelty.clone();
             doubts.push(Doubt::Unknown { p_value: s.p_value, feature: s.feature, deviations: s.deviations });
@@ -205,11 +205,11 @@ impl Gate {
     /// By the published training's judge: integrated gradients of its network and the terms of its discriminant, each in its share.
     fn decided(&self, found: &Found<'_>, row: usize, judged: &Judged) -> Vec<Decided> {
         let (m, scale) = (&self.main, &self.main.scale);
-        let mut desk = Desk::new(&m.network.sizes, DESK_ROWS);
+        let mut workspace = Workspace::new(&m.network.sizes, DESK_ROWS);
         let x = scale.inputs(&found.chosen, &[row]);
         let from: Vec<f32> = scale.median.iter().enumerate().map(|(j, v)| scale.input(j, *v)).collect();
         let wide = |x: &[f32]| x.iter().copied().map(f64::from).collect::<Vec<f64>>();
-        let network = shares(&m.network, &from, &x, judged.class, judged.runner_up, &mut desk);
+        let network = shares(&m.network, &from, &x, judged.class, judged.runner_up, &mut workspace);
         let linear = m.linear.shares(&wide(&from), &wide(&x), judged.class, judged.runner_up);
         let w = self.mix.network_share;
         let t = self.mix.temperature;

@@ -8,7 +8,7 @@ use super::GateError;
 use super::calibrate::{Calibration, Logits, calibrate, calibration_error, log_loss, probabilities};
 use super::conformal::top;
 use super::discriminant::{Discriminant, steadied};
-use super::network::{Desk, Network};
+use super::network::{Network, Workspace};
 use super::scale::{Scale, median};
 use super::table::Column;
 use serde::{Deserialize, Serialize};
@@ -28,7 +28,7 @@ pub struct Member {
 
 /// How the network's and the discriminant's word are added.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Mix {
+pub struct Ensemble {
     /// Share of the network.
     pub network_share: f64,
     /// How far the discriminant's scores typically reach.
@@ -65,9 +65,9 @@ impl Member {
     }
 
     /// What both say of each row of inputs.
-    pub(super) fn say(&self, inputs: &[f32], desk: &mut Desk) -> Vec<Said> {
+    pub(super) fn say(&self, inputs: &[f32], workspace: &mut Workspace) -> Vec<Said> {
         let classes = self.network.sizes[self.network.layers()];
-        let raw = self.network.logits(inputs, desk);
+        let raw = self.network.logits(inputs, workspace);
         let both = |(z, x): (&[f64], &[f32])| {
             let x: Vec<f64> = x.iter().copied().map(f64::from).collect();
             Said { network: Logits { raw: z.to_vec(), unit: self.unit }, linear: self.linear.scores(&x) }
@@ -79,17 +79,22 @@ impl Member {
 /// Shares tried: 0 to 1 in as many steps.
 const STEPS: usize = 20;
 
-impl Mix {
+impl Ensemble {
     /// Learns shares and temperature from rows that neither had seen.
-    pub(super) fn of(said: &[Said], class: &[usize]) -> (Mix, Calibration) {
+    pub(super) fn of(said: &[Said], class: &[usize]) -> (Ensemble, Calibration) {
         let lead = |s: &Said| {
             let best = top(&s.linear);
             let others = s.linear.iter().enumerate().filter(|(k, _)| *k != best);
             s.linear[best] - others.fold(f64::NEG_INFINITY, |m, (_, v)| m.max(*v))
         };
         let linear_unit = median(said.iter().map(lead)).max(1e-3);
-        let mix =
-            |network_share| Mix { network_share, linear_unit, temperature: 1.0, network_loss: 0.0, linear_loss: 0.0 };
+        let mix = |network_share| Ensemble {
+            network_share,
+            linear_unit,
+            temperature: 1.0,
+            network_loss: 0.0,
+            linear_loss: 0.0,
+        };
         let tried: Vec<Calibration> = (0..=STEPS)
             .map(|i| {
                 let m = mix(i as f64 / STEPS as f64);
@@ -103,7 +108,7 @@ impl Mix {
             tried[*i].loss_after.total_cmp(&tried[*j].loss_after).then(from_even(*i).cmp(&from_even(*j)))
         };
         let best = (0..=STEPS).min_by(order).unwrap_or(STEPS);
-        let found = Mix {
+        let found = Ensemble {
             temperature: tried[best].temperature,
             network_loss: tried[STEPS].loss_after,
             linear_loss: tried[0].loss_after,
@@ -164,7 +169,7 @@ mod tests {
             Said { network: Logits { raw: vec![odd, -odd], unit: 1.0 }, linear: vec![sign, -sign] }
         };
         let said: Vec<Said> = class.iter().enumerate().map(row).collect();
-        let (mix, c) = Mix::of(&said, &class);
+        let (mix, c) = Ensemble::of(&said, &class);
         // The entropy of one in ten is 0.325 nat.
         assert!(mix.network_share < 0.1 && c.loss_after < 0.34, "{mix:?} {c:?}");
     }

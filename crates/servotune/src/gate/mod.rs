@@ -52,9 +52,9 @@ pub use error::GateError;
 pub use evidence::{EVIDENCE, Evidence, Vote};
 pub use file::SCHEMA;
 pub use judge::Gate;
-pub use member::{Member, Mix};
-pub use network::{Desk, Network, parameter_count, softmax};
-pub use novelty::{Novelty, Strangeness};
+pub use member::{Ensemble, Member};
+pub use network::{Network, Workspace, parameter_count, softmax};
+pub use novelty::{Novelty, NoveltyScore};
 pub use prepare::Ranked;
 pub use report::{
     Baseline, CalibrationReport, Candidate, ConformalReport, Counts, Decisions, MissedBroken, NoveltyReport, Published,

@@ -80,46 +80,46 @@ impl Network {
     }
 
     /// Logits of `rows` rows of inputs.
-    pub fn logits(&self, inputs: &[f32], desk: &mut Desk) -> Vec<f64> {
+    pub fn logits(&self, inputs: &[f32], workspace: &mut Workspace) -> Vec<f64> {
         let (d, k) = (self.sizes[0], self.sizes[self.layers()]);
         let mut out = Vec::with_capacity(inputs.len() / d * k);
-        for x in inputs.chunks(d * desk.batch) {
+        for x in inputs.chunks(d * workspace.batch) {
             let rows = x.len() / d;
-            desk.activations[0][..x.len()].copy_from_slice(x);
-            wide(|| self.forward(rows, desk));
-            out.extend(desk.activations[self.layers()][..rows * k].iter().map(|v| f64::from(*v)));
+            workspace.activations[0][..x.len()].copy_from_slice(x);
+            wide(|| self.forward(rows, workspace));
+            out.extend(workspace.activations[self.layers()][..rows * k].iter().map(|v| f64::from(*v)));
         }
         out
     }
 
-    /// Fills the desk's activations from its inputs.
+    /// Fills the workspace's activations from its inputs.
     #[inline(always)]
-    pub(super) fn forward(&self, rows: usize, desk: &mut Desk) {
+    pub(super) fn forward(&self, rows: usize, workspace: &mut Workspace) {
         for l in 0..self.layers() {
             let (n, m) = (self.sizes[l], self.sizes[l + 1]);
             let at = self.offset(l);
             let (w, bias) = self.values[at..at + n * m + m].split_at(n * m);
-            let (before, after) = desk.activations.split_at_mut(l + 1);
+            let (before, after) = workspace.activations.split_at_mut(l + 1);
             let last = l + 1 == self.layers();
             for r in 0..rows {
                 let (x, y) = (&before[l][r * n..(r + 1) * n], &mut after[0][r * m..(r + 1) * m]);
                 let mut live = 0;
                 for (i, v) in x.iter().enumerate().filter(|(_, v)| **v != 0.0) {
-                    desk.live[live] = (i * m, *v);
+                    workspace.live[live] = (i * m, *v);
                     live += 1;
                 }
                 y.copy_from_slice(bias);
                 let mut c = 0;
                 while c + TILE <= m {
-                    accumulate::<TILE>(&desk.live[..live], w, c, &mut y[c..]);
+                    accumulate::<TILE>(&workspace.live[..live], w, c, &mut y[c..]);
                     c += TILE;
                 }
                 while c + 4 <= m {
-                    accumulate::<4>(&desk.live[..live], w, c, &mut y[c..]);
+                    accumulate::<4>(&workspace.live[..live], w, c, &mut y[c..]);
                     c += 4;
                 }
                 while c < m {
-                    accumulate::<1>(&desk.live[..live], w, c, &mut y[c..]);
+                    accumulate::<1>(&workspace.live[..live], w, c, &mut y[c..]);
                     c += 1;
                 }
                 if !last {
@@ -146,7 +146,7 @@ fn accumulate<const N: usize>(live: &[(usize, f32)], w: &[f32], c: usize, y: &mu
 
 /// Room to compute in, made once for a network and a batch.
 #[derive(Clone, Debug)]
-pub struct Desk {
+pub struct Workspace {
     pub(super) batch: usize,
     /// Values of each layer, inputs first, one row after the other.
     pub(super) activations: Vec<Vec<f32>>,
@@ -155,12 +155,12 @@ pub struct Desk {
     pub(super) live: Vec<(usize, f32)>,
 }
 
-impl Desk {
+impl Workspace {
     /// Room for `batch` rows.
-    pub fn new(sizes: &[usize], batch: usize) -> Desk {
+    pub fn new(sizes: &[usize], batch: usize) -> Workspace {
         let batch = batch.max(1);
         let widest = sizes.iter().copied().max().unwrap_or(0).max(batch);
         let room = || sizes.iter().map(|n| vec![0.0; n * batch]).collect::<Vec<Vec<f32>>>();
-        Desk { batch, activations: room(), deltas: room(), live: vec![(0, 0.0); widest] }
+        Workspace { batch, activations: room(), deltas: room(), live: vec![(0, 0.0); widest] }
     }
 }

@@ -41,7 +41,7 @@ pub struct Novelty {
 
 /// How unusual a row is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Strangeness {
+pub struct NoveltyScore {
     /// Share of known machines at least as far out; below the level the row is of no known class.
     pub p_value: f64,
     /// The feature that lies farthest out.
@@ -289,11 +289,11 @@ impl Novelty {
     }
 
     /// How unusual a row (in the order of `features`, NaN where missing) is for a machine of `class`.
-    pub fn strangeness(&self, row: &[f64], class: usize) -> Strangeness {
+    pub fn novelty_score(&self, row: &[f64], class: usize) -> NoveltyScore {
         let (s, which, deviations) = self.reference.distances(row, class);
         let p = (0..LOOKS).map(|i| tail((s[i] - self.levels[class][i][0]) / self.levels[class][i][1], &self.held[i].0));
         let least = p.fold(1.0, f64::min);
-        Strangeness {
+        NoveltyScore {
             // Three looks, so the smallest p-value counts three times (Bonferroni).
             p_value: (LOOKS as f64 * least).min(1.0),
             feature: self.features.get(which).cloned().unwrap_or_default(),

@@ -15,8 +15,8 @@ use super::discriminant::discriminant;
 use super::evidence::Evidence;
 use super::job::Job;
 use super::judge::Gate;
-use super::member::Mix;
-use super::network::Desk;
+use super::member::Ensemble;
+use super::network::Workspace;
 use super::prepare::{Prepared, Ranked};
 use super::split::Split;
 use serde::Serialize;
@@ -141,7 +141,7 @@ pub struct CalibrationReport {
     #[serde(flatten)]
     pub held: Calibration,
     /// How networks and discriminants are mixed.
-    pub mix: Mix,
+    pub mix: Ensemble,
     /// Test part: the network by itself, with temperature 1.
     pub test_error_before: f64,
     /// Test part: the gate.
@@ -270,8 +270,8 @@ impl TrainReport {
         let n = truth.len().max(1) as f64;
         let share = |count: usize| count as f64 / n;
         let after: Vec<Vec<f64>> = judged.iter().map(|j| j.probabilities.clone()).collect();
-        let mut desk = Desk::new(&f.network.sizes, 16);
-        let raw = f.network.logits(&p.scale.inputs(&p.chosen, &split.test), &mut desk);
+        let mut workspace = Workspace::new(&f.network.sizes, 16);
+        let raw = f.network.logits(&p.scale.inputs(&p.chosen, &split.test), &mut workspace);
         let before: Vec<Vec<f64>> = raw.chunks(job.classes).map(|z| super::calibrate::probabilities(z, 1.0)).collect();
         let said: Vec<(usize, Action)> = judged.iter().map(|j| (j.class, j.action)).collect();
         let decisions = decisions(&truth, &said, &gate.classes, &gate.costs);

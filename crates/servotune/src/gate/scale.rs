@@ -4,6 +4,7 @@
 //! also promises zero mean, so the mean is taken off first. Missing values become the training median. Spec: `specs/gate.md`.
 
 use super::table::Column;
+use crate::numeric::statistics;
 use serde::{Deserialize, Serialize};
 
 /// Statistics of the chosen features, from the training rows only.
@@ -26,13 +27,8 @@ const FARTHEST: f64 = 1e4;
 
 /// Middle of the values, the mean of the two middle ones where their number is even; NaN are left out; 0 where there are none.
 pub fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut v: Vec<f64> = values.filter(|x| !x.is_nan()).collect();
-    v.sort_by(f64::total_cmp);
-    match v.len() {
-        0 => 0.0,
-        n if n % 2 == 1 => v[n / 2],
-        n => 0.5 * v[n / 2 - 1] + 0.5 * v[n / 2],
-    }
+    let known: Vec<f64> = values.filter(|x| !x.is_nan()).collect();
+    statistics::median(&known).unwrap_or(0.0)
 }
 
 impl Scale {

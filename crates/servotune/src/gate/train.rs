@@ -15,8 +15,8 @@ use super::drift::DriftReference;
 use super::evidence::Evidence;
 use super::job::Job;
 use super::judge::Gate;
-use super::member::{Member, Mix};
-use super::network::Desk;
+use super::member::{Ensemble, Member};
+use super::network::Workspace;
 use super::novelty::{MOST_FEATURES, MOST_LOOKED_AT, Novelty};
 use super::parallel::each;
 use super::prepare::{PATIENCE, prepare, reach};
@@ -85,13 +85,13 @@ pub fn train(table: &Table, settings: &TrainSettings) -> Result<Trained, GateErr
         // The discriminant may have learned from the training part only: the validation part is to judge it.
         let blind =
             Member::of(p.scale.clone(), fitted.network.clone(), unit, &p.chosen, &split.train, &known.class, k)?;
-        let mut desk = Desk::new(&fitted.network.sizes, settings.batch);
-        let said = blind.say(&p.scale.inputs(&p.chosen, &split.validate), &mut desk);
+        let mut workspace = Workspace::new(&fitted.network.sizes, settings.batch);
+        let said = blind.say(&p.scale.inputs(&p.chosen, &split.validate), &mut workspace);
         (Vec::new(), Vec::new(), split.validate.clone(), said)
     };
     let of_held: Vec<usize> = held.iter().map(|&r| known.class[r]).collect();
     let fold_of_held = if settings.folds > 0 { deal.clone() } else { vec![0; held.len()] };
-    let (mix, calibration) = Mix::of(&said, &of_held);
+    let (mix, calibration) = Ensemble::of(&said, &of_held);
     let held_p: Vec<Vec<f64>> = said.iter().map(|s| mix.probabilities(s)).collect();
 
     // Chosen features are always looked at, then the plant's, then the rest by importance: the most in combination, others one by one.

@@ -4,7 +4,7 @@
 
 use super::attribution::Decided;
 use super::classes::{Action, Label};
-use super::novelty::Strangeness;
+use super::novelty::NoveltyScore;
 use serde::Serialize;
 
 /// A reason not to decide.
@@ -119,7 +119,7 @@ pub struct Verdict {
     /// The second vote.
     pub plant: PlantEvidence,
     /// How unusual the machine is for its class; none where the gate has no such reference.
-    pub novelty: Option<Strangeness>,
+    pub novelty: Option<NoveltyScore>,
     /// Expected cost of each class's own action, in the gate's order.
     pub expected_cost: Vec<f64>,
     /// Features of the network that were missing and became the training median.

@@ -5,10 +5,11 @@
 
 use super::ladder::Ladder;
 use super::shape::{BodyForm, LogFit, LogProblem, Ranges, Shape};
-use super::sweep::{Sweep, median};
+use super::sweep::Sweep;
 use super::{BodyChoice, IdentifySettings};
 use crate::numeric::levenberg::{LevenbergSettings, Residuals, Workspace, minimise};
 use crate::numeric::peaks::find_peaks;
+use crate::numeric::statistics::median;
 use nalgebra::Complex;
 
 /// A start for the growth.
@@ -45,7 +46,7 @@ fn robust(sweep: &Sweep, start: &mut Start, ranges: Ranges, work: &mut Workspace
         for k in 0..n {
             size[k] = residual[k].hypot(residual[n + k]);
         }
-        let scale = (2.0 * median(&size)).max(1e-9);
+        let scale = (2.0 * median(&size).unwrap_or(0.0)).max(1e-9);
         weight.iter_mut().zip(&size).for_each(|(w, s)| *w = (1.0 + (s / scale).powi(2)).powf(-0.5));
     }
     size.iter().map(|s| (1.0 + (s / OUTLIER).powi(2)).ln()).sum::<f64>() / n as f64
@@ -64,7 +65,7 @@ fn starts(sweep: &Sweep, settings: &IdentifySettings, ladder: Option<&Ladder>) -
     let inertia: Vec<f64> = (0..head).map(|k| (sweep.value[k].norm() * sweep.w[k] * sweep.w[k]).ln()).collect();
     let inertia_sign = -mean.re.signum();
     if settings.body != BodyChoice::SecondOrder {
-        all.push(Start { shape: free, x: vec![median(&inertia), 0.0, delay], sign: inertia_sign });
+        all.push(Start { shape: free, x: vec![median(&inertia).unwrap_or(0.0), 0.0, delay], sign: inertia_sign });
     }
     if settings.body == BodyChoice::FreeInertia {
         return all;
@@ -76,14 +77,18 @@ fn starts(sweep: &Sweep, settings: &IdentifySettings, ladder: Option<&Ladder>) -
         all.push(Start { shape, x, sign });
     }
     let below = 0.7 * low;
-    all.push(Start { shape: second, x: vec![median(&inertia), below.ln(), 0.5f64.ln(), delay], sign: inertia_sign });
+    all.push(Start {
+        shape: second,
+        x: vec![median(&inertia).unwrap_or(0.0), below.ln(), 0.5f64.ln(), delay],
+        sign: inertia_sign,
+    });
     let rest: Vec<f64> = sweep.value[..head].iter().map(|v| v.norm().ln()).collect();
     let db: Vec<f64> = sweep.value.iter().map(|v| 20.0 * v.norm().log10()).collect();
     let mut peaks = find_peaks(&db, 3.0);
     peaks.sort_by(|a, b| b.prominence.total_cmp(&a.prominence));
     for p in peaks.iter().take(4) {
         let w0 = sweep.w[p.index].ln();
-        let x = vec![median(&rest) + 2.0 * w0, w0, 0.05f64.ln(), 0.3 * delay];
+        let x = vec![median(&rest).unwrap_or(0.0) + 2.0 * w0, w0, 0.05f64.ln(), 0.3 * delay];
         all.push(Start { shape: second, x, sign: mean.re.signum() });
     }
     all

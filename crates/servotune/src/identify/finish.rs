@@ -8,13 +8,14 @@ use super::noise::local_noise;
 use super::result::{BodyEvidence, HeldOut, Identified, Work};
 use super::shape::{BodyForm, Ranges, Shape};
 use super::spread::{Spread, correlation_inflation};
-use super::sweep::{Sweep, median};
+use super::sweep::Sweep;
 use super::trust;
 use super::{BodyChoice, IdentifyError, IdentifySettings, ZeroSide};
 use crate::frf::{Frf, gathered};
 use crate::lti::FrequencyResponse;
 use crate::numeric::golden::Bound;
 use crate::numeric::levenberg::Workspace;
+use crate::numeric::statistics::median;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
@@ -51,7 +52,7 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
     let weight: Vec<f64> = match &sweep.relative_std {
         // While modes are missing, their absence is the larger error: the deviations are levelled by their median.
         Some(s) => {
-            let middle = median(s);
+            let middle = median(s).unwrap_or(0.0);
             s.iter().map(|s| std::f64::consts::SQRT_2 / s.hypot(middle)).collect()
         }
         None => vec![1.0; n],
@@ -161,7 +162,7 @@ impl Climb {
 /// The last resort: a body at the sweep's middle with its level.
 fn flat(sweep: &Sweep) -> Start {
     let w0 = (sweep.w[0] * sweep.w[sweep.len() - 1]).sqrt();
-    let level = median(&sweep.value.iter().map(|v| v.norm()).collect::<Vec<_>>());
+    let level = median(&sweep.value.iter().map(|v| v.norm()).collect::<Vec<_>>()).unwrap_or(0.0);
     let shape = Shape { body: BodyForm::SecondOrder, delay: true, modes: 0 };
     Start { shape, x: vec![level.ln() + 2.0 * w0.ln(), w0.ln(), 0.0, 0.0], sign: sweep.value[0].re.signum() }
 }
@@ -173,8 +174,10 @@ fn choose(stages: &[Stage], last: usize, weight: f64) -> (usize, Vec<HeldOut>) {
     }
     let errors: Vec<(usize, Vec<f64>)> = stages.iter().map(|s| (s.shape.modes, s.held_out.clone())).collect();
     // The noise of one part from the stage that follows the data best: median of |e|² = 2 ln 2 σ².
-    let deviation =
-        errors.iter().map(|(_, e)| (median(e) / (2.0 * std::f64::consts::LN_2)).sqrt()).fold(f64::INFINITY, f64::min);
+    let deviation = errors
+        .iter()
+        .map(|(_, e)| (median(e).unwrap_or(0.0) / (2.0 * std::f64::consts::LN_2)).sqrt())
+        .fold(f64::INFINITY, f64::min);
     held_out::choose(&errors, last, deviation, 1.0 / weight)
 }
 

@@ -3,7 +3,7 @@
 //! In: [`Frf`](crate::frf::Frf). Out: [`Identified`]: the paper's steps (sections 2.3-2.6) with their ladder of errors, then a joint
 //! refinement of all parameters whose order is chosen at frequencies left out of the fit.
 //! Convention: the measured response is that of the continuous plant with all dead time, P(j w) of
-//! [`Plant`](crate::lti::Plant), unless [`Hold::Included`] says that the controller's hold is part of it. Spec: `specs/identification.md`.
+//! [`Plant`](crate::lti::Plant), unless [`Hold::Included`](crate::frf::Hold::Included) says that the controller's hold is part of it. Spec: `specs/identification.md`.
 
 mod body_start;
 mod candidate;
@@ -27,8 +27,8 @@ mod trust;
 
 pub use error::IdentifyError;
 pub use finish::identify;
-pub use interval::{Interval, Intervals, ModeIntervals};
+pub use interval::{Intervals, ModeIntervals, ParameterEstimate};
 pub use near::{Near, identify_near};
 pub use result::{BodyEvidence, HeldOut, Identified, LadderRung, Work};
-pub use settings::{BodyChoice, Hold, IdentifySettings, OrderChoice, ZeroSide};
+pub use settings::{BodyChoice, IdentifySettings, OrderChoice, ZeroSide};
 pub use trust::{BandEdge, BandReason, TrustedBand};

@@ -2,7 +2,7 @@
 //!
 //! In: a complex ratio near 1. Out: relative standard deviations per real part.
 
-use super::sweep::median;
+use crate::numeric::statistics::median;
 use nalgebra::Complex;
 
 /// Of a normal variable, median of the square root of a mean of two squares: sqrt(2 ln 2) per unit deviation of each part.
@@ -23,7 +23,7 @@ fn differences(ratio: &[Complex<f64>]) -> Vec<f64> {
 
 /// One deviation for all points.
 pub(super) fn difference_noise(ratio: &[Complex<f64>]) -> f64 {
-    median(&differences(ratio))
+    median(&differences(ratio)).unwrap_or(0.0)
 }
 
 /// A deviation for each point, from medians over wide windows, straight lines in between.
@@ -34,7 +34,7 @@ pub(super) fn local_noise(ratio: &[Complex<f64>]) -> Vec<f64> {
     let d = differences(ratio);
     let n = ratio.len();
     let least = 1e-12;
-    let whole = median(&d).max(least);
+    let whole = median(&d).unwrap_or(0.0).max(least);
     let parts = (d.len() / 30).min(8);
     if parts < 2 {
         return vec![whole; n];
@@ -43,7 +43,7 @@ pub(super) fn local_noise(ratio: &[Complex<f64>]) -> Vec<f64> {
     for p in 0..parts {
         let (from, to) = (p * d.len() / parts, (p + 1) * d.len() / parts);
         at.push(0.5 * (from + to) as f64 + 0.5);
-        level.push(median(&d[from..to]).max(0.05 * whole));
+        level.push(median(&d[from..to]).unwrap_or(0.0).max(0.05 * whole));
     }
     let (low, high) = level.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     if high <= 1.6 * low {

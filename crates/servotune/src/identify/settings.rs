@@ -28,20 +28,6 @@ pub enum OrderChoice {
     Fixed(usize),
 }
 
-/// Whether the measured response contains the controller's zero-order hold.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Hold {
-    /// The response is that of the continuous plant, as in the paper.
-    #[default]
-    NotIncluded,
-    /// The response contains a hold over this sample time (s), which is divided out before the fit.
-    Included {
-        /// Sample time (s).
-        sample_time_s: f64,
-    },
-}
-
 /// Where zeros may lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -86,8 +72,6 @@ pub struct IdentifySettings {
     pub folds: usize,
     /// Where zeros may lie.
     pub zeros: ZeroSide,
-    /// Whether a hold is part of the response.
-    pub hold: Hold,
     /// Largest local relative error inside the trusted band (ratio).
     pub trust_limit: f64,
     /// Rounds of re-weighting in each linear fit, eqs. (17)-(18).
@@ -111,7 +95,6 @@ impl Default for IdentifySettings {
             order: OrderChoice::Auto { max: 14 },
             folds: 5,
             zeros: ZeroSide::Either,
-            hold: Hold::NotIncluded,
             trust_limit: 0.1,
             weight_rounds: 20,
         }

@@ -3,7 +3,7 @@
 //! In: the factors of the Jacobian at the solution and the residuals. Out: intervals and plants.
 //! Covariance = factor (JᵀJ)⁻¹, factor = reduced chi square x correlation inflation.
 
-use super::interval::{Interval, Intervals, ModeIntervals};
+use super::interval::{Intervals, ModeIntervals, ParameterEstimate};
 use super::shape::{BodyForm, Shape};
 use crate::lti::Plant;
 use crate::numeric::random::Random;
@@ -51,8 +51,8 @@ impl Spread {
         (i..n).map(|j| self.root[j * n + i].powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Interval of exp(Σ c_i θ_i).
-    fn of_exponential(&self, terms: &[(usize, f64)], sign: f64) -> Interval {
+    /// Estimate of exp(Σ c_i θ_i).
+    fn of_exponential(&self, terms: &[(usize, f64)], sign: f64) -> ParameterEstimate {
         let n = self.x.len();
         let middle: f64 = terms.iter().map(|(i, c)| c * self.x[*i]).sum();
         let variance: f64 = (0..n)
@@ -62,12 +62,12 @@ impl Spread {
             .sum();
         let half = Z95 * variance.sqrt();
         let (a, b) = (sign * (middle - half).exp(), sign * (middle + half).exp());
-        Interval { value: sign * middle.exp(), low: a.min(b), high: a.max(b) }
+        ParameterEstimate { value: sign * middle.exp(), low: a.min(b), high: a.max(b) }
     }
 
-    fn of_plain(&self, i: usize, least: f64) -> Interval {
+    fn of_plain(&self, i: usize, least: f64) -> ParameterEstimate {
         let half = Z95 * self.deviation(i);
-        Interval { value: self.x[i], low: (self.x[i] - half).max(least), high: self.x[i] + half }
+        ParameterEstimate { value: self.x[i], low: (self.x[i] - half).max(least), high: self.x[i] + half }
     }
 
     /// 95 % intervals of everything.

@@ -6,6 +6,7 @@ use super::IdentifySettings;
 use super::sweep::Sweep;
 use crate::lti::Body;
 use crate::numeric::least_squares::Qr;
+use crate::numeric::statistics::median;
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
@@ -96,7 +97,7 @@ fn phase_end(sweep: &Sweep, end: usize, sign: f64) -> usize {
     (0..end)
         .find(|&i| {
             let around = &phase[i.saturating_sub(2)..(i + 3).min(end)];
-            super::sweep::median(around) < -PI
+            median(around).unwrap_or(0.0) < -PI
         })
         .unwrap_or(end)
 }

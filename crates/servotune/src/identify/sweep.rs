@@ -2,8 +2,9 @@
 //!
 //! In: [`Frf`] and settings. Out: [`Sweep`].
 
-use super::{Hold, IdentifyError, IdentifySettings, OrderChoice};
-use crate::frf::Frf;
+use super::{IdentifyError, IdentifySettings, OrderChoice};
+use crate::frf::{Frf, Hold};
+use crate::numeric::statistics::median;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
@@ -36,9 +37,6 @@ fn check(s: &IdentifySettings) -> Result<(), IdentifyError> {
     require(s.group_ratio >= 1.0, "group_ratio", s.group_ratio, "at least 1")?;
     require(s.folds >= 2, "folds", s.folds as f64, "at least 2")?;
     require(s.trust_limit > 0.0, "trust_limit", s.trust_limit, "above 0")?;
-    if let Hold::Included { sample_time_s: t } = s.hold {
-        require(t > 0.0 && t.is_finite(), "hold.sample_time_s", t, "a finite time above 0 s")?;
-    }
     Ok(())
 }
 
@@ -57,6 +55,9 @@ impl Sweep {
     /// Checks the settings and cuts out the band.
     pub fn new(frf: &Frf, settings: &IdentifySettings) -> Result<Sweep, IdentifyError> {
         check(settings)?;
+        if let Hold::Included { sample_time_s: t } = frf.hold() {
+            require(t > 0.0 && t.is_finite(), "hold.sample_time_s", t, "a finite time above 0 s")?;
+        }
         let hz = |w: f64| w / TAU;
         let all = frf.w_rad_s();
         let keep: Vec<usize> =
@@ -81,7 +82,7 @@ impl Sweep {
         }
         let w: Vec<f64> = all[first..=last].to_vec();
         let mut value = frf.value()[first..=last].to_vec();
-        if let Hold::Included { sample_time_s } = settings.hold {
+        if let Hold::Included { sample_time_s } = frf.hold() {
             let nyquist_hz = 0.5 / sample_time_s;
             let found_hz = hz(w[w.len() - 1]);
             if found_hz >= nyquist_hz {
@@ -94,8 +95,9 @@ impl Sweep {
         }
         let relative_std = frf.relative_std().and_then(|s| {
             let s = &s[first..=last];
-            let middle = median(s);
-            let around = |i: usize| median(&s[i.saturating_sub(HALF_WINDOW)..(i + HALF_WINDOW + 1).min(s.len())]);
+            let middle = median(s).unwrap_or(0.0);
+            let around =
+                |i: usize| median(&s[i.saturating_sub(HALF_WINDOW)..(i + HALF_WINDOW + 1).min(s.len())]).unwrap_or(0.0);
             (middle > 0.0).then(|| (0..s.len()).map(|i| around(i).max(LEAST_SHARE * middle)).collect())
         });
         Ok(Sweep { w, value, relative_std })
@@ -104,17 +106,5 @@ impl Sweep {
     /// Number of points.
     pub fn len(&self) -> usize {
         self.w.len()
-    }
-}
-
-/// The middle value; the mean of the two middle ones for an even count; 0 for none.
-pub(super) fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let n = sorted.len();
-    match n {
-        0 => 0.0,
-        _ if n % 2 == 1 => sorted[n / 2],
-        _ => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
     }
 }

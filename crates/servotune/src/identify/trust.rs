@@ -2,7 +2,7 @@
 //!
 //! In: relative errors on the sweep. Out: lowest and highest frequency with the reason for each.
 
-use super::sweep::median;
+use crate::numeric::statistics::median;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
@@ -54,7 +54,8 @@ const HALF_WINDOW: usize = 5;
 /// The longest run, in octaves, of points whose running median error and noise stay below `limit`.
 pub(super) fn band(w: &[f64], error: &[f64], relative_std: Option<&[f64]>, limit: f64) -> TrustedBand {
     let n = w.len();
-    let local = |v: &[f64], i: usize| median(&v[i.saturating_sub(HALF_WINDOW)..(i + HALF_WINDOW + 1).min(n)]);
+    let local =
+        |v: &[f64], i: usize| median(&v[i.saturating_sub(HALF_WINDOW)..(i + HALF_WINDOW + 1).min(n)]).unwrap_or(0.0);
     let state: Vec<BandEdge> = (0..n)
         .map(|i| {
             let (e, s) = (local(error, i), relative_std.map_or(0.0, |s| local(s, i)));

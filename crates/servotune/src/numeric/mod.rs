@@ -5,6 +5,7 @@
 pub mod brent;
 pub mod dense;
 pub mod golden;
+pub mod interval;
 pub mod least_squares;
 pub mod levenberg;
 pub mod peaks;
@@ -14,6 +15,7 @@ pub mod random;
 pub mod root;
 pub mod spectrum;
 pub mod spline;
+pub mod statistics;
 pub mod twofold;
 pub mod unwrap;
 pub mod wide;

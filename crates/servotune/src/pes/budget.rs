@@ -7,6 +7,7 @@ use super::figures::{HIGH_BAND_HZ, LOW_BAND_HZ};
 use super::{Harmonic, Noise, PesError, Profile, Scene, WindowDft};
 use crate::controller::Controller;
 use crate::lti::{DiscretePlant, Plant, Section};
+use crate::numeric::statistics::quantile_of_draws;
 use serde::Serialize;
 
 /// A source of the PES.
@@ -76,7 +77,7 @@ impl Default for PredictSettings {
 
 /// The range of one figure over records.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Range {
+pub struct PredictedRange {
     /// Half of all records lie below.
     pub median: f64,
     /// Lower end.
@@ -89,9 +90,9 @@ pub struct Range {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Prediction {
     /// Norm over 600 to 1500 Hz (position_unit).
-    pub dft_low: Range,
+    pub dft_low: PredictedRange,
     /// Norm over 1500 to 3000 Hz (position_unit).
-    pub dft_high: Range,
+    pub dft_high: PredictedRange,
     /// Share of records inside.
     pub level: f64,
 }
@@ -243,18 +244,15 @@ pub fn predict_each<const N: usize>(
     let range = |mut x: Vec<f64>| {
         x.sort_by(f64::total_cmp);
         let out = 0.5 * (1.0 - settings.level);
-        Range { median: quantile(&x, 0.5), low: quantile(&x, out), high: quantile(&x, 1.0 - out) }
+        PredictedRange {
+            median: quantile_of_draws(&x, 0.5),
+            low: quantile_of_draws(&x, out),
+            high: quantile_of_draws(&x, 1.0 - out),
+        }
     };
     Ok(model_errors.map(|error| Prediction {
         dft_low: range(drawn.iter().map(|(low, _, n)| low * (error * n).exp()).collect()),
         dft_high: range(drawn.iter().map(|(_, high, n)| high * (error * n).exp()).collect()),
         level: settings.level,
     }))
-}
-
-/// Quantile of ascending values; place p (n + 1), as unbiased ranges of future draws need it.
-fn quantile(x: &[f64], p: f64) -> f64 {
-    let place = (p * (x.len() + 1) as f64 - 1.0).clamp(0.0, (x.len() - 1) as f64);
-    let (i, share) = (place.floor() as usize, place.fract());
-    x[i] + share * (x[(i + 1).min(x.len() - 1)] - x[i])
 }

@@ -24,7 +24,9 @@ mod spectral_slopes;
 mod step;
 mod window_frame;
 
-pub use budget::{Budget, PredictSettings, Prediction, Range, Source, SourceShare, budget, predict, predict_each};
+pub use budget::{
+    Budget, PredictSettings, PredictedRange, Prediction, Source, SourceShare, budget, predict, predict_each,
+};
 pub use dft::{Harmonic, WindowDft};
 pub use expected::{ExpectedNoise, NoiseWork};
 pub use figures::{HIGH_BAND_HZ, LOW_BAND_HZ, PesFigures, figures};

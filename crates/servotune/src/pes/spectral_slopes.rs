@@ -1,12 +1,12 @@
 //! How the write read off the spectrum changes with the gains: one backward pass for each figure, whatever the number of parameters.
 //!
-//! In: after [`SpectralPes::write`], how a figure changes with the power of each bin, and the pulls d ln C of each parameter. Out: the figure's slope
+//! In: after [`SpectralPes::write`], how a figure changes with the power of each bin, and the gradients d ln C of each parameter. Out: the figure's slope
 //! in each parameter, exact. With dS = -S T d ln C a line z = S E moves by -z T d ln C and the noise on it by 2 Re(|S|² e |L|² d ln C - T n d ln C),
 //! e the encoder's density and n all noise; so every slope is a sum of Re(W d ln C) over lines, and W does not depend on the parameter.
 
 use super::window_frame::LANES;
 use super::{SpectralPes, SpectralWork};
-use crate::feedback::Pulls;
+use crate::feedback::SectionGradients;
 use crate::numeric::wide::wide;
 use nalgebra::Complex;
 
@@ -31,7 +31,7 @@ impl SpectralPes {
     pub fn slopes(
         &self,
         shares: impl Iterator<Item = (usize, f64)>,
-        pulls: &Pulls,
+        gradients: &SectionGradients,
         work: &mut SpectralWork,
         out: &mut Vec<f64>,
     ) {
@@ -58,7 +58,7 @@ impl SpectralPes {
             a.w_im[t.line] += w.im;
         }
         out.clear();
-        out.extend(pulls.of.iter().map(|[re, im]| wide(|| pulled([&a.w_re, &a.w_im], [re, im]))));
+        out.extend(gradients.of.iter().map(|[re, im]| wide(|| pulled([&a.w_re, &a.w_im], [re, im]))));
         work.adjoint = a;
     }
 

@@ -8,7 +8,7 @@ use super::judge::judged;
 use super::outcome::{AtBound, Infeasible, Reached, RelaxedLimit, Work};
 use super::polish::refine;
 use super::requirements::{Found, MET, Requirement};
-use super::{Judged, JudgedLimit, Machine, Minimise, Proof, Side, Spec, TuneError, TuningProblem};
+use super::{Judged, JudgedLimit, Judgement, Machine, Minimise, Side, Spec, TuneError, TuningProblem};
 use std::f64::consts::TAU;
 
 /// Rounds of back-off: each removes the whole difference between quick and exact figures, to second order.
@@ -162,7 +162,7 @@ impl<'a> Ending<'a> {
 
     /// The limits in conflict around the compromise, and the relaxation that tuning again confirms; without its objective and start.
     pub fn infeasible(&mut self, problem: &mut TuningProblem, best: Settled) -> Result<Infeasible, TuneError> {
-        let mut reached: Option<(Vec<f64>, Vec<Proof>, Vec<RelaxedLimit>)> = None;
+        let mut reached: Option<(Vec<f64>, Vec<Judgement>, Vec<RelaxedLimit>)> = None;
         let mut confirmed = false;
         let controller = problem.parameters.controller(&best.x);
         let after = judged(self.machines, &controller, self.spec)?;
@@ -216,7 +216,12 @@ impl<'a> Ending<'a> {
 }
 
 /// The limits, those missed by at least `part` of the share moved so far that the compromise meets them.
-fn relaxed(after: &[Proof], wanted: &[Requirement], share: f64, part: f64) -> Vec<(Requirement, Option<RelaxedLimit>)> {
+fn relaxed(
+    after: &[Judgement],
+    wanted: &[Requirement],
+    share: f64,
+    part: f64,
+) -> Vec<(Requirement, Option<RelaxedLimit>)> {
     let relax = |(i, w): (usize, &Requirement)| {
         let worst = after.iter().map(|p| p.judged.limits[i]).max_by(|a, b| a.violation.total_cmp(&b.violation));
         let missed = |l: &JudgedLimit| !l.met() && l.violation >= part * share;

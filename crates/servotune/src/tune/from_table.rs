@@ -22,7 +22,7 @@ pub fn polish_table(
 
 /// The table near `start` that keeps the largest share of its nearest limit as room, on the worst machine of the problem, whatever its objective;
 /// none where the start's loop is unstable. Such a table stands machines that lie between those of the problem.
-pub fn roomiest_table(
+pub fn table_with_most_room(
     problem: &TuningProblem,
     start: &Controller,
     steps: usize,

@@ -3,7 +3,7 @@
 //! In: an outcome and the digests of its inputs. Out: a document of the same bytes for the same inputs, and a reader that
 //! refuses a table whose sections are not those of its gains.
 
-use super::judge::Proof;
+use super::judge::Judgement;
 use super::{Outcome, PhysicalTuning, Route};
 use crate::controller::{Controller, ControllerError, Feedforward, Lowpass, Notch, Pid};
 use crate::document::{DocumentError, parse_toml, read_text, write_text};
@@ -164,7 +164,7 @@ impl Summary {
     }
 
     /// The figures of a judgement.
-    pub fn of(proof: &Proof) -> Summary {
+    pub fn of(proof: &Judgement) -> Summary {
         let (m, f) = (&proof.margins, &proof.judged.found);
         let rows = |c: &[Crossing]| c.iter().map(|c| CrossingRow { hz: c.hz, value: c.value }).collect();
         Summary {

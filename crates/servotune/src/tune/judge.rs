@@ -1,19 +1,19 @@
 //! The exact judgement of one controller on one machine, independent of the search's shortcuts.
 
 use super::exact_loop::exact_loop;
-use super::machine::{curve, measured_loop};
+use super::machine::curve;
 use super::requirements::{Found, Judged, Requirement};
 use super::step_figures::{MoveEnd, overshoot, settling_s};
 use super::{Machine, Spec, TuneError};
 use crate::controller::Controller;
-use crate::feedback::{Margins, ModelLoop, OpenLoop, confirmed_margins, margins};
+use crate::feedback::{Margins, MeasuredLoop, ModelLoop, OpenLoop, confirmed_margins, margins};
 use crate::lti::{DiscretePlant, FrequencyResponse, Plant};
 use crate::pes::{Profile, SpectralPes, SpectralWork, StepScene, StepWork, WindowDft, simulate};
 use serde::Serialize;
 
 /// One controller on one machine: all margins, and every requirement judged.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Proof {
+pub struct Judgement {
     /// Margins, refined on the function itself.
     pub margins: Margins,
     /// Requirements with what was found.
@@ -22,16 +22,16 @@ pub struct Proof {
 
 /// Judges a controller: margins, curves and bandwidth refined on the loop; the whole write and a step simulated, or the write read off the
 /// spectrum of a response.
-pub fn judge(machine: &Machine<'_>, controller: &Controller, spec: &Spec) -> Result<Proof, TuneError> {
+pub fn judge(machine: &Machine<'_>, controller: &Controller, spec: &Spec) -> Result<Judgement, TuneError> {
     let wanted = Requirement::list(&spec.margins, &spec.limits);
     let (margins, mut found) = judge_loop(machine, controller, spec)?;
     if let Some(profile) = &spec.profile {
         match machine {
             Machine::Model(plant) => simulated(plant, controller, spec, profile, &mut found)?,
-            Machine::Response { frf, hold, continuation } => {
+            Machine::Response { frf, continuation } => {
                 let harmonics: Vec<usize> = spec.limits.harmonics.iter().map(|h| h.k).collect();
                 let bins = bins(spec, profile, &harmonics);
-                let plant = curve(frf, *hold, *continuation, controller.sample_time_s)?;
+                let plant = curve(frf, *continuation, controller.sample_time_s)?;
                 let s = SpectralPes::new(profile, &plant, controller, bins, true)?;
                 let mut amplitude = Vec::new();
                 let chain = controller.sections()?.chain;
@@ -50,7 +50,7 @@ pub fn judge(machine: &Machine<'_>, controller: &Controller, spec: &Spec) -> Res
     if let (Some(d), None, Some(_)) = (&spec.disturbance, &spec.profile, spec.limits.command_rms) {
         found.command_rms = Some(super::machine::command_rms(machine, controller, d)?);
     }
-    Ok(Proof { margins, judged: Judged::of(&wanted, found) })
+    Ok(Judgement { margins, judged: Judged::of(&wanted, found) })
 }
 
 /// The figures of the loop alone.
@@ -63,9 +63,9 @@ pub(super) fn judge_loop(m: &Machine<'_>, controller: &Controller, spec: &Spec) 
             let l = ModelLoop::new(&sampled, &sections)?;
             exact_loop(&l, confirmed_margins(&l)?, &|w| sampled.at(w), limits, curves)
         }
-        Machine::Response { frf, hold, continuation } => {
-            let plant = curve(frf, *hold, *continuation, controller.sample_time_s)?;
-            let l = measured_loop(frf, *hold, &sections)?;
+        Machine::Response { frf, continuation } => {
+            let plant = curve(frf, *continuation, controller.sample_time_s)?;
+            let l = MeasuredLoop::new(frf, &sections)?;
             let (margins, mut found) = exact_loop(&l, margins(&l), &|w| plant.at(w), limits, curves);
             // A sweep that ends before L turns negative has its last point to speak of; beyond it |L| is taken to stay below that.
             found.within_sweep = true;
@@ -156,11 +156,11 @@ pub(super) fn lasting_objective(
     controller: &Controller,
     spec: &Spec,
 ) -> Result<Option<f64>, TuneError> {
-    let Machine::Response { frf, hold, continuation } = m else { return Ok(None) };
+    let Machine::Response { frf, continuation } = m else { return Ok(None) };
     let Some(profile) = spec.profile.as_ref().filter(|_| spec.objective.minimise == super::Minimise::Dft) else {
         return Ok(None);
     };
-    let plant = curve(frf, *hold, *continuation, controller.sample_time_s)?;
+    let plant = curve(frf, *continuation, controller.sample_time_s)?;
     let s = SpectralPes::lasting(profile, &plant, controller, bins(spec, profile, &[]), false, LASTING)?;
     let mut amplitude = Vec::new();
     s.write(&controller.sections()?.chain, &mut SpectralWork::default(), &mut amplitude);
@@ -168,6 +168,6 @@ pub(super) fn lasting_objective(
     Ok(Some(spec.objective.bands_hz.iter().zip(weights).map(|(b, w)| w * s.dft().band(&amplitude, *b)).sum()))
 }
 
-pub(super) fn judged(machines: &[Machine<'_>], c: &Controller, spec: &Spec) -> Result<Vec<Proof>, TuneError> {
+pub(super) fn judged(machines: &[Machine<'_>], c: &Controller, spec: &Spec) -> Result<Vec<Judgement>, TuneError> {
     machines.iter().map(|m| judge(m, c, spec)).collect()
 }

@@ -166,7 +166,7 @@ mod tests {
     use crate::controller::Controller;
     use crate::frf::Frf;
     use crate::lti::{FrequencyResponse, Plant, PlantFile};
-    use crate::tune::{Hold, Machine, Spec};
+    use crate::tune::{Machine, Spec};
     use std::f64::consts::TAU;
     use std::path::Path;
 
@@ -269,7 +269,7 @@ mod tests {
         let (plant, start) = (plant(), toml::from_str::<Controller>(&file("controllers/nominal.toml")).unwrap());
         let w: Vec<f64> = (0..400).map(|i| TAU * 20.0 * 1.0155f64.powi(i)).collect();
         let frf = Frf::new(w.clone(), w.iter().map(|w| plant.at(*w)).collect(), None).unwrap();
-        let machine = Machine::Response { frf: &frf, hold: Hold::NotIncluded, continuation: Some(&plant) };
+        let machine = Machine::Response { frf: &frf, continuation: Some(&plant) };
         for objective in ["pes_rms", "dft", "disturbance"] {
             let mut spec = spec(objective, objective != "disturbance");
             spec.limits.command_rms = None;

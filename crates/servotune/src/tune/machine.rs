@@ -9,22 +9,13 @@ use super::step_figures::{MoveEnd, envelope_from, overshoot, worst_outside};
 use super::write_figures::{WriteBuffers, WriteSource};
 use super::{Spec, TuneError};
 use crate::controller::Controller;
-use crate::feedback::{LoopOnGrid, LoopPower, Magnitude, MeasuredLoop, PowerWork, ResponseCurve, SampledPlant, hold};
+use crate::feedback::{LoopOnGrid, LoopPower, Magnitude, PowerWork, ResponseCurve, SampledPlant};
 use crate::frf::{Frf, gathered};
-use crate::lti::{DiscretePlant, FrequencyResponse, Plant, Section, Sections};
+use crate::lti::{DiscretePlant, FrequencyResponse, Plant, Section};
 use crate::pes::{Slopes, StepScene, StepWork};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
-
-/// Whether a measured response already contains the zero-order hold of the command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hold {
-    /// Measured from the held command: nothing is to be added.
-    Included,
-    /// Measured from a continuous excitation: (1 - e^{-jwT})/(jwT) is multiplied in.
-    NotIncluded,
-}
 
 /// A machine to be tuned.
 #[derive(Clone, Copy, Debug)]
@@ -35,8 +26,6 @@ pub enum Machine<'a> {
     Response {
         /// The sweep, position over command.
         frf: &'a Frf,
-        /// What it contains.
-        hold: Hold,
         /// How the plant goes on outside the sweep, for the PES only; without it, along the slope of the first points.
         continuation: Option<&'a Plant>,
     },
@@ -79,14 +68,10 @@ impl Machine<'_> {
 const POINTS: usize = 20;
 
 /// The plant of a sweep with its hold.
-pub(super) fn curve(frf: &Frf, taken: Hold, continuation: Option<&Plant>, t: f64) -> Result<ResponseCurve, TuneError> {
-    let held = |w: f64| match taken {
-        Hold::Included => Complex::new(1.0, 0.0),
-        Hold::NotIncluded => hold(w * t),
-    };
+pub(super) fn curve(frf: &Frf, continuation: Option<&Plant>, t: f64) -> Result<ResponseCurve, TuneError> {
     // A search reads the curve some hundred thousand times: of a long sweep the means of neighbours that lie on one line. Margins are judged over every point.
     let long = gathered(frf);
-    let mut curve = ResponseCurve::of(long.as_ref().map_or(frf, |g| &g.frf), t, held)?;
+    let mut curve = ResponseCurve::of(long.as_ref().map_or(frf, |g| &g.frf), t)?;
     if let Some(plant) = continuation {
         curve = curve.continued(DiscretePlant::of(plant, t)?);
     }
@@ -95,11 +80,6 @@ pub(super) fn curve(frf: &Frf, taken: Hold, continuation: Option<&Plant>, t: f64
         return Err(TuneError::Sweep { points, half_rate_hz: 0.5 / t, needed: POINTS });
     }
     Ok(curve)
-}
-
-/// The loop of a sweep and the firmware's sections.
-pub(super) fn measured_loop<'a>(frf: &Frf, taken: Hold, sections: &'a Sections) -> Result<MeasuredLoop<'a>, TuneError> {
-    Ok(MeasuredLoop::new(frf, sections, taken == Hold::Included)?)
 }
 
 /// A machine made ready: its response on the grid, its records, its sums over frequency.
@@ -150,8 +130,8 @@ impl Prepared {
                 let plant = DiscretePlant::of(plant, t)?;
                 (SampledPlant::of_model(&plant), PlantAt::Model(Box::new(plant.clone())), Some(plant))
             }
-            Machine::Response { frf, hold, continuation } => {
-                let curve = curve(frf, *hold, *continuation, t)?;
+            Machine::Response { frf, continuation } => {
+                let curve = curve(frf, *continuation, t)?;
                 let model = continuation.map(|p| DiscretePlant::of(p, t)).transpose()?;
                 (curve.sampled(), PlantAt::Curve(Box::new(curve)), model)
             }
@@ -351,7 +331,7 @@ pub(super) fn command_rms(m: &Machine<'_>, c: &Controller, d: &super::Disturbanc
     let t = c.sample_time_s;
     let sampled = match m {
         Machine::Model(plant) => SampledPlant::of_model(&DiscretePlant::of(plant, t)?),
-        Machine::Response { frf, hold, continuation } => curve(frf, *hold, *continuation, t)?.sampled(),
+        Machine::Response { frf, continuation } => curve(frf, *continuation, t)?.sampled(),
     };
     let mut on = LoopOnGrid::default();
     sampled.close(&c.sections()?.chain, &mut on);

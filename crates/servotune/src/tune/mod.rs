@@ -47,12 +47,12 @@ mod write_figures;
 
 pub use bounds::{Bounds, Ranges};
 pub use confidence::margin_intervals;
-pub use from_table::{polish_table, roomiest_table};
+pub use from_table::{polish_table, table_with_most_room};
 pub use gain_table::{CrossingRow, GainTable, GainTableError, InputDigest, Provenance, Summary};
-pub use judge::{Proof, judge};
+pub use judge::{Judgement, judge};
 pub use limits::{HarmonicLimit, Limits, MarginLimits, MoveLimits};
 pub use linear::{CandidateSlopes, LimitSlope};
-pub use machine::{Hold, Machine, Route};
+pub use machine::{Machine, Route};
 pub use objective::{Disturbance, Minimise, Objective};
 pub use outcome::{AtBound, Infeasible, Outcome, Reached, RelaxedLimit, Tuned, Work};
 pub use parameters::{DERIVATIVE_FILTER, Parameter, Parameters};

@@ -1,6 +1,6 @@
 //! What tuning says: a controller that meets every limit, or the limits in conflict and what would have to give.
 
-use super::judge::Proof;
+use super::judge::Judgement;
 use super::{Minimise, Parameter, Ranges, Route, Side, What};
 use crate::controller::Controller;
 use serde::Serialize;
@@ -23,9 +23,9 @@ pub struct Tuned {
     /// The controller.
     pub controller: Controller,
     /// The start controller, machine by machine; none without one.
-    pub before: Option<Vec<Proof>>,
+    pub before: Option<Vec<Judgement>>,
     /// The tuned controller, machine by machine.
-    pub after: Vec<Proof>,
+    pub after: Vec<Judgement>,
     /// What was made smallest, on the worst machine.
     #[serde(rename = "minimised")]
     pub objective: Reached,
@@ -43,9 +43,9 @@ pub struct Infeasible {
     /// The best compromise: the one whose largest miss, as a share of its limit, is smallest.
     pub controller: Controller,
     /// The start controller, machine by machine; none without one.
-    pub before: Option<Vec<Proof>>,
+    pub before: Option<Vec<Judgement>>,
     /// The compromise, machine by machine.
-    pub after: Vec<Proof>,
+    pub after: Vec<Judgement>,
     /// What was made smallest, under the compromise.
     #[serde(rename = "minimised")]
     pub objective: Reached,
@@ -139,7 +139,7 @@ impl Outcome {
     }
 
     /// The exact judgement of that controller, machine by machine.
-    pub fn after(&self) -> &[Proof] {
+    pub fn after(&self) -> &[Judgement] {
         match self {
             Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => &t.after,
             Outcome::Infeasible(i) => &i.after,
@@ -147,14 +147,14 @@ impl Outcome {
     }
 
     /// The start controller's judgement, machine by machine.
-    pub fn before(&self) -> Option<&[Proof]> {
+    pub fn before(&self) -> Option<&[Judgement]> {
         match self {
             Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => t.before.as_deref(),
             Outcome::Infeasible(i) => i.before.as_deref(),
         }
     }
 
-    pub(super) fn set_before(&mut self, before: Option<Vec<Proof>>) {
+    pub(super) fn set_before(&mut self, before: Option<Vec<Judgement>>) {
         match self {
             Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => t.before = before,
             Outcome::Infeasible(i) => i.before = before,

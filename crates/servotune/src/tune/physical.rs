@@ -4,13 +4,13 @@
 //! worst of them; and the proof of a controller: margins over the amplitude, the write simulated with every effect.
 
 use super::{
-    Found, Hold, Judged, Machine, Outcome, Proof, Requirement, Side, Spec, TuneError, TuneSettings, What, tune_jointly,
+    Found, Judged, Judgement, Machine, Outcome, Requirement, Side, Spec, TuneError, TuneSettings, What, tune_jointly,
 };
 use crate::controller::Controller;
 use crate::feedback::{
     Amplitudes, DescribedMargins, DescribedPlant, Margins, ModelLoop, described_margins, linear_crossover_hz, margins,
 };
-use crate::frf::Frf;
+use crate::frf::{Frf, Hold};
 use crate::lti::{DiscretePlant, FrequencyResponse, Sections};
 use crate::pes::{figures, simulate_physical};
 use crate::physics::Restored;
@@ -50,7 +50,8 @@ pub fn equivalent_responses(
     let list = if plant.bends() { amplitudes.list() } else { vec![amplitudes.high] };
     let response = |a: f64| {
         let at = plant.at_amplitude(a);
-        Ok(Frf::new(grid.clone(), grid.iter().map(|&w| at.at(w)).collect(), None)?)
+        let frf = Frf::new(grid.clone(), grid.iter().map(|&w| at.at(w)).collect(), None)?;
+        Ok(frf.with_hold(Hold::Included { sample_time_s }))
     };
     list.into_iter().map(response).collect()
 }
@@ -117,8 +118,8 @@ fn beyond(spec: &Spec) -> Option<What> {
 
 impl PhysicalProof {
     /// The same as a proof of one machine, for tables and pages.
-    pub fn proof(&self) -> Proof {
-        Proof { margins: self.margins.worst.clone(), judged: self.judged.clone() }
+    pub fn proof(&self) -> Judgement {
+        Judgement { margins: self.margins.worst.clone(), judged: self.judged.clone() }
     }
 }
 
@@ -170,7 +171,7 @@ pub fn tune_physical(
 ) -> Result<PhysicalTuning, TuneError> {
     let carried = Amplitudes { count: TUNED_AMPLITUDES, ..*amplitudes };
     let responses = equivalent_responses(physics, &carried, wanted_crossover_hz(physics, spec, start)?)?;
-    let machine = |frf| Machine::Response { frf, hold: Hold::Included, continuation: None };
+    let machine = |frf| Machine::Response { frf, continuation: None };
     let machines: Vec<Machine<'_>> = responses.iter().map(machine).collect();
     let outcome = tune_jointly(&machines, spec, start, settings)?;
     let before = start.map(|c| judge_physical(physics, c, spec, amplitudes)).transpose()?;

@@ -13,7 +13,7 @@ use super::polish::{Goal, polish};
 use super::score::UNSTABLE;
 use super::search::search;
 use super::structure::{Kind, Setting};
-use super::{Machine, Minimise, Parameters, Proof, SearchWatch, Spec, TuneError, TuningProblem, unwatched};
+use super::{Judgement, Machine, Minimise, Parameters, SearchWatch, Spec, TuneError, TuningProblem, unwatched};
 use crate::controller::Controller;
 
 /// How the search is run; what it looks for stands in the spec.
@@ -227,7 +227,7 @@ fn tune_as_said(job: Job<'_>, spec: &Spec, start: Option<&Controller>) -> Result
         back_offs: ending.back_offs,
         filter_searched: false,
     };
-    let reached = |problem: &TuningProblem, x: &[f64], after: &[Proof]| {
+    let reached = |problem: &TuningProblem, x: &[f64], after: &[Judgement]| {
         let score = problem.score(x, &mut problem.work());
         let value = match problem.minimise {
             Minimise::Room => after.iter().map(|p| p.judged.worst()).fold(f64::NEG_INFINITY, f64::max),

@@ -9,7 +9,7 @@ use super::record_figures::{Asked, RecordFigure};
 use super::section_slope::in_parameters;
 use super::section_slope::{SECTION_STEP, SectionSlope};
 use crate::controller::Controller;
-use crate::feedback::{LoopOnGrid, Pulls, ResponseCurve, SampledPlant};
+use crate::feedback::{LoopOnGrid, ResponseCurve, SampledPlant, SectionGradients};
 use crate::lti::{DiscretePlant, Section};
 use crate::pes::{
     self, Figure, NoisePower, NoisePowerWork, PesError, Profile, QuickScene, QuickWork, Record, Slopes, SpectralPes,
@@ -47,7 +47,7 @@ pub(super) struct WriteBuffers {
     shares: Vec<f64>,
     weights: Vec<f64>,
     slopes: Vec<Slopes>,
-    pulls: Pulls,
+    gradients: SectionGradients,
 }
 
 impl WriteSource {
@@ -139,7 +139,7 @@ impl WriteSource {
             WriteSource::Model(m) => m.slopes(c, chain, sections, asked, sampled, on, wanted, figures, b, out),
             WriteSource::Response(s) => {
                 let around: Vec<[Section; 2]> = sections.iter().map(|s| s.around).collect();
-                s.lines().pull(&around, SECTION_STEP, &mut b.pulls);
+                s.lines().section_gradients(&around, SECTION_STEP, &mut b.gradients);
                 for (at, figure) in asked.figures.iter().enumerate().filter(|(at, _)| wanted[*at]) {
                     match figure {
                         RecordFigure::CommandPeak => {
@@ -150,7 +150,7 @@ impl WriteSource {
                         _ => {
                             shares(*figure, asked, s.dft(), &b.expected, figures[at], &mut b.shares);
                             let of = b.shares.iter().copied().enumerate().filter(|(_, q)| *q != 0.0);
-                            s.slopes(of, &b.pulls, &mut b.spectral, &mut out[at]);
+                            s.slopes(of, &b.gradients, &mut b.spectral, &mut out[at]);
                         }
                     }
                 }

@@ -5,8 +5,8 @@
 //! Spec: `specs/certificate.md`.
 
 use super::{
-    BoxWatch, Certificate, Inputs, LEAST_DAMPING, Source, Stability, SweepAssumption, Uncertainty, Verdict,
-    VerifyError, VerifySettings, Word, certify_watched,
+    BoxWatch, Certificate, Inputs, LEAST_DAMPING, Source, Stability, Uncertainty, Verdict, VerifyError, VerifySettings,
+    Word, certify_watched,
 };
 use crate::controller::Controller;
 use crate::frf::Sweep;
@@ -33,8 +33,6 @@ pub enum Ground<'a> {
         sweep: &'a Sweep,
         /// As it is tuned on.
         machine: Machine<'a>,
-        /// How it was taken.
-        assumption: SweepAssumption,
     },
 }
 
@@ -171,20 +169,16 @@ fn assured(job: &Assurance<'_>, outcome: Outcome, table: GainTable, rounds: usiz
 /// The certificate of a table that lies in no file yet.
 fn prove(job: &Assurance<'_>, table: &GainTable, watch: &Watched<'_>) -> Result<Certificate, VerifyError> {
     let gains = Source { file: job.gains.to_owned(), text: table.text()? };
-    let (mut plants, mut sweeps, mut assumption) =
-        (Vec::new(), Vec::new(), SweepAssumption { least_damping: LEAST_DAMPING, hold_included: false });
+    let (mut plants, mut sweeps) = (Vec::new(), Vec::new());
     match &job.ground {
         Ground::Plant { source, .. } => plants.push((*source).clone()),
-        Ground::Sweep { sweep, assumption: how, .. } => {
-            sweeps.push((*sweep).clone());
-            assumption = *how;
-        }
+        Ground::Sweep { sweep, .. } => sweeps.push((*sweep).clone()),
     }
     let inputs = Inputs {
         gains: &gains,
         plants: &plants,
         sweeps: &sweeps,
-        assumption,
+        least_damping: LEAST_DAMPING,
         spec: job.spec_source,
         profile: job.profile,
         word: Word::Double,

@@ -1,6 +1,6 @@
 //! What is proved of one loop: every margin between two bounds, and where.
 
-use super::Range;
+use super::Interval;
 use serde::{Deserialize, Serialize};
 
 /// Stability, as far as it is proved.
@@ -35,9 +35,9 @@ pub struct Bounded {
 #[serde(deny_unknown_fields)]
 pub struct ProvenCrossing {
     /// Where (Hz).
-    pub hz: Range,
+    pub hz: Interval,
     /// |phase margin| (deg) or |gain margin| (dB).
-    pub value: Range,
+    pub value: Interval,
     /// Whether there is one, or only may be.
     pub certain: bool,
 }

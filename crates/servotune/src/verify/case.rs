@@ -10,7 +10,7 @@ use super::step_box::Members;
 use super::table::{self, Finding};
 use super::write::{Bands, write};
 use super::write_box::{BoxSettings, BoxWatch, BoxedLoop, bound_write};
-use super::{SweepAssumption, Uncertainty, VerifyError, VerifySettings, modelled, step, taken};
+use super::{Uncertainty, VerifyError, VerifySettings, modelled, step, taken};
 use crate::controller::Controller;
 use crate::frf::Sweep;
 use crate::lti::{Plant, Section};
@@ -27,7 +27,7 @@ pub(super) struct Job<'a> {
     pub held: &'a [Section],
     pub spec: &'a Spec,
     pub wanted: &'a [Requirement],
-    pub assumption: SweepAssumption,
+    pub least_damping: f64,
     pub uncertainty: &'a Uncertainty,
     /// The firmware holds the table's own numbers, and nothing is uncertain.
     pub plain: bool,
@@ -84,7 +84,7 @@ impl Job<'_> {
     /// The case of a sweep.
     pub fn of_sweep(&self, sweep: &Sweep) -> Result<(CaseProof, Vec<Finding>), VerifyError> {
         let t = self.controller.sample_time_s;
-        let swept = |sections, u| taken(&sweep.frf, sections, t, self.assumption, u);
+        let swept = |sections, u| taken(&sweep.frf, sections, t, self.least_damping, u);
         let l = swept(self.held, self.uncertainty)?;
         let bounds = prove(&l, self.settings)?;
         let of_table = if self.plain {

@@ -8,7 +8,7 @@ use super::table::{self, Finding};
 use super::write_box::BoxWatch;
 use super::{SweepAssumption, Uncertainty, VerifyError, VerifySettings, Word};
 use crate::document::{parse_toml, read_text, sha256_hex};
-use crate::frf::Sweep;
+use crate::frf::{Hold, Sweep};
 use crate::lti::{Plant, PlantFile};
 use crate::tune::{GainTable, Requirement, Spec, SpecError};
 use serde::{Deserialize, Serialize};
@@ -79,8 +79,8 @@ pub struct Inputs<'a> {
     pub plants: &'a [Source],
     /// Sweeps, each a case like a plant.
     pub sweeps: &'a [Sweep],
-    /// How the sweeps are taken.
-    pub assumption: SweepAssumption,
+    /// No mode that hides between the points of a sweep has less damping.
+    pub least_damping: f64,
     /// The spec, and the profile that it names.
     pub spec: &'a Source,
     /// See above.
@@ -112,8 +112,7 @@ pub fn certify_watched(
             return Err(VerifyError::Uncertainty { key, found });
         }
     }
-    // The table's own reader would refuse what is to be reported here.
-    let table: GainTable = parse_toml(&i.gains.file, &i.gains.text).map_err(|e| e.expecting(GainTable::EXPECTED))?;
+    let table = table_of(i.gains)?;
     let c = table.controller();
     let in_table = |source: VerifyError| source.of(&i.gains.file);
     c.check().map_err(|e| in_table(crate::tune::GainTableError::from(e).into()))?;
@@ -132,7 +131,7 @@ pub fn certify_watched(
         held: &held,
         spec: &spec,
         wanted: &wanted,
-        assumption: i.assumption,
+        least_damping: i.least_damping,
         uncertainty: &i.uncertainty,
         plain: i.word == Word::Double && !i.uncertainty.any(),
         settings,
@@ -174,12 +173,28 @@ pub fn certify_watched(
         profile_sha256: i.profile.map(Source::sha256),
         word: i.word,
         uncertainty: i.uncertainty,
-        sweep: (!i.sweeps.is_empty()).then_some(i.assumption),
+        sweep: (!i.sweeps.is_empty()).then(|| taken(i)),
         assumptions: assumptions(i),
         proved: all && findings.is_empty(),
         cases,
         findings,
     })
+}
+
+/// The table in a file. Its own reader would refuse what a certificate is to report.
+fn table_of(gains: &Source) -> Result<GainTable, VerifyError> {
+    Ok(parse_toml(&gains.file, &gains.text).map_err(|e| e.expecting(GainTable::EXPECTED))?)
+}
+
+/// Clock of the controller in a gain table (s).
+pub fn table_clock_s(gains: &Source) -> Result<f64, VerifyError> {
+    Ok(table_of(gains)?.controller().sample_time_s)
+}
+
+/// How the sweeps were taken.
+fn taken(i: &Inputs<'_>) -> SweepAssumption {
+    let held = |s: &Sweep| s.frf.hold() != Hold::NotIncluded;
+    SweepAssumption { least_damping: i.least_damping, hold_included: i.sweeps.iter().any(held) }
 }
 
 fn assumptions(i: &Inputs<'_>) -> Vec<String> {
@@ -200,7 +215,7 @@ fn assumptions(i: &Inputs<'_>) -> Vec<String> {
         };
         all.push(format!(
             "each sweep is of {of}: around every interval a cubic in ln w and at most one mode, of damping at least {}; |L| > 1 below the sweep and < 1 above it, no crossing there",
-            i.assumption.least_damping
+            i.least_damping
         ));
     }
     if i.uncertainty.any() {

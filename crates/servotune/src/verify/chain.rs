@@ -1,7 +1,7 @@
 //! The sections as the firmware holds them: value, slope and bend on the unit circle, and where their poles lie.
 
 use super::expansion::{Expansion, Jet};
-use super::{Patch, Range, VerifyError};
+use super::{Interval, Patch, VerifyError};
 use crate::lti::Section;
 use nalgebra::Complex;
 
@@ -104,7 +104,7 @@ impl Chain {
         let half = 0.5 * (b - a);
         let c = self.expand(0.5 * (a + b), half).term(half);
         let radius = if c.remainder.is_nan() { f64::INFINITY } else { c.remainder };
-        let (gain, turn) = (Range::ZERO, Range::ZERO);
+        let (gain, turn) = (Interval::ZERO, Interval::ZERO);
         Patch { centre: c.value, half: c.first * half, radius, floor: 0.0, gain, turn, stuck: 0.0 }
     }
 

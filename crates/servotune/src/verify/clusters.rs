@@ -1,6 +1,6 @@
 //! Neighbouring cells that may hold a crossing, as one crossing each.
 
-use super::Range;
+use super::Interval;
 use super::bounds::ProvenCrossing;
 
 /// Crossings met from low to high angles.
@@ -14,7 +14,7 @@ pub(super) struct Clusters {
 
 impl Clusters {
     /// A cell that may hold a crossing.
-    pub fn inside(&mut self, angle: Range, value: Range, certain: bool) {
+    pub fn inside(&mut self, angle: Interval, value: Interval, certain: bool) {
         self.now = Some(match self.now {
             None => ProvenCrossing { hz: angle, value, certain },
             Some(c) => {
@@ -34,10 +34,10 @@ impl Clusters {
     }
 
     /// All of them, angles and values turned into other units.
-    pub fn list(&mut self, hz: impl Fn(f64) -> f64, unit: impl Fn(Range) -> Range) -> Vec<ProvenCrossing> {
+    pub fn list(&mut self, hz: impl Fn(f64) -> f64, unit: impl Fn(Interval) -> Interval) -> Vec<ProvenCrossing> {
         self.done.extend(self.now.take());
         let turned = |c: &ProvenCrossing| ProvenCrossing {
-            hz: Range { low: hz(c.hz.low), high: hz(c.hz.high) },
+            hz: Interval { low: hz(c.hz.low), high: hz(c.hz.high) },
             value: unit(c.value),
             certain: c.certain,
         };

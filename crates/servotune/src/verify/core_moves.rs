@@ -3,7 +3,7 @@
 //! They move the loop at low frequencies, where the write is largest, so that a rest of the second order in absolute values would be far from what
 //! happens; theirs is of the third.
 
-use super::Range;
+use super::Interval;
 use super::cut::Cut;
 use super::family::{DELAY, Family, GAIN, PAIRS, share};
 use super::moves::Pair;
@@ -67,7 +67,7 @@ impl Sum {
 }
 
 impl Core {
-    pub fn of(family: &Family, ranges: &[Range], cuts: &[Cut]) -> Core {
+    pub fn of(family: &Family, ranges: &[Interval], cuts: &[Cut]) -> Core {
         let last = family.pairs.len().wrapping_sub(1);
         let body = family.pairs.last().filter(|p| p.zero.is_none() && cuts.iter().all(|c| c.pair != last));
         Core {

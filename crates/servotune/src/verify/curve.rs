@@ -7,7 +7,7 @@
 use super::bounds::Bounded;
 use super::model::Enclosed;
 use super::patch::{Patch, SPREAD_SHARE, largest_turn, least_turn};
-use super::{Range, VerifySettings};
+use super::{Interval, VerifySettings};
 use crate::feedback::{CurveLimit, CurveSide, Magnitude};
 use nalgebra::Complex;
 use std::cmp::Ordering;
@@ -23,7 +23,7 @@ const LEVEL: f64 = 0.707_945_784_384_137_9;
 
 impl Patch {
     /// The range of |1 + L|.
-    fn beside(&self) -> Range {
+    fn beside(&self) -> Interval {
         let size = self.size();
         let turn = self.angle().map_or(PI, |a| if a.width() < PI { largest_turn(a) } else { PI });
         // |1 + L|² is convex in |L|: largest at an end, at the largest turn away from -1.
@@ -34,32 +34,33 @@ impl Patch {
         } else {
             f64::INFINITY
         };
-        Range { low: self.distance(), high: far(size.low).max(far(size.high)).min(plain) }.sound()
+        Interval { low: self.distance(), high: far(size.low).max(far(size.high)).min(plain) }.sound()
     }
 
     /// The range of |T| = 1/|1 + 1/L|: 1/L lies in a box of sizes and angles too.
-    fn complementary(&self) -> Range {
+    fn complementary(&self) -> Interval {
         let (size, beside) = (self.size(), self.beside());
-        let plain = Range { low: size.low / beside.high, high: size.high / beside.low };
+        let plain = Interval { low: size.low / beside.high, high: size.high / beside.low };
         let Some(angle) = self.angle() else { return plain.sound() };
         let (least, most) = (least_turn(angle).min(PI), if angle.width() < PI { largest_turn(angle) } else { PI });
-        let inverse = Range { low: 1.0 / size.high, high: 1.0 / size.low };
+        let inverse = Interval { low: 1.0 / size.high, high: 1.0 / size.low };
         let from = |s: f64, turn: f64| (Complex::from_polar(s, turn) - 1.0).norm();
         let nearest = from(least.cos().clamp(inverse.low, inverse.high), least);
         let farthest = from(inverse.low, most).max(from(inverse.high, most));
-        Range { low: plain.low.max(1.0 / farthest), high: plain.high.min(1.0 / nearest) }.sound()
+        Interval { low: plain.low.max(1.0 / farthest), high: plain.high.min(1.0 / nearest) }.sound()
     }
 
     /// The nominal value at the middle of the cell.
     fn middle(&self) -> Patch {
-        Patch { half: Complex::new(0.0, 0.0), gain: Range::ZERO, turn: Range::ZERO, ..*self }
+        Patch { half: Complex::new(0.0, 0.0), gain: Interval::ZERO, turn: Interval::ZERO, ..*self }
     }
 }
 
 /// The range of a magnitude, L in `l` and |C| in `law`.
-fn magnitude(of: Magnitude, l: &Patch, law: Range) -> Range {
-    let over = |top: Range, below: Range| Range { low: top.low / below.high, high: top.high / below.low }.sound();
-    let one = Range { low: 1.0, high: 1.0 };
+fn magnitude(of: Magnitude, l: &Patch, law: Interval) -> Interval {
+    let over =
+        |top: Interval, below: Interval| Interval { low: top.low / below.high, high: top.high / below.low }.sound();
+    let one = Interval { low: 1.0, high: 1.0 };
     let r = match of {
         Magnitude::L => l.size(),
         Magnitude::S => over(one, l.beside()),
@@ -67,7 +68,7 @@ fn magnitude(of: Magnitude, l: &Patch, law: Range) -> Range {
         Magnitude::PS => over(l.complementary(), law),
         Magnitude::CS => over(law, l.beside()),
     };
-    Range { low: r.low.max(0.0), ..r }
+    Interval { low: r.low.max(0.0), ..r }
 }
 
 /// A cell with the ratio that no loop of the set exceeds in it.
@@ -117,26 +118,26 @@ impl<E: Enclosed> Question<'_, E> {
     fn cell(&mut self, from: f64, to: f64) -> Cell {
         self.l.patches(from, to, &mut self.buffer);
         let law = self.l.law(from, to);
-        let ends = Range::between(self.limit(from), self.limit(to));
+        let ends = Interval::between(self.limit(from), self.limit(to));
         let at_most = self.curve.side == CurveSide::AtMost;
-        let ratio = |r: Range, limit: Range| {
+        let ratio = |r: Interval, limit: Interval| {
             if at_most {
-                Range { low: r.low / limit.high, high: r.high / limit.low }
+                Interval { low: r.low / limit.high, high: r.high / limit.low }
             } else {
-                Range { low: limit.low / r.high, high: limit.high / r.low }
+                Interval { low: limit.low / r.high, high: limit.high / r.low }
             }
             .sound()
         };
         let most = |m: f64, p: &Patch| m.max(ratio(magnitude(self.curve.of, p, law.size()), ends).high);
         let most = self.buffer.iter().fold(0.0, most);
         // Where L is uncertain, a cell is still too wide while limit or law run along it by more than a part of that.
-        let run = |r: Range| if r.low > 0.0 { (r.high / r.low).ln() } else { f64::INFINITY };
+        let run = |r: Interval| if r.low > 0.0 { (r.high / r.low).ln() } else { f64::INFINITY };
         let by_law = matches!(self.curve.of, Magnitude::PS | Magnitude::CS);
         let run = run(ends).max(if by_law { run(law.size()) } else { 0.0 });
         let coarse = self.buffer.iter().any(|p| p.coarse() || run > SPREAD_SHARE * p.stuck);
         let here = self.limit(0.5 * (from + to));
         let middle = magnitude(self.curve.of, &self.buffer[0].middle(), law.middle().size());
-        self.sure = self.sure.max(ratio(middle, Range { low: here, high: here }).low);
+        self.sure = self.sure.max(ratio(middle, Interval { low: here, high: here }).low);
         Cell { from, to, most, coarse }
     }
 }
@@ -225,7 +226,7 @@ pub(super) fn bound_bandwidth(l: &impl Enclosed, settings: &VerifySettings) -> B
         if buffer.iter().all(|p| p.complementary().low >= LEVEL) {
             continue;
         }
-        let nominal = Patch { gain: Range::ZERO, turn: Range::ZERO, ..buffer[0] };
+        let nominal = Patch { gain: Interval::ZERO, turn: Interval::ZERO, ..buffer[0] };
         let fallen = nominal.complementary().high < LEVEL;
         let wide = b - a > settings.relative * a && cells + stack.len() < settings.cells;
         // Once a member may have fallen, the nominal loop alone is looked for.

@@ -18,6 +18,11 @@ pub enum VerifyError {
     Spec(#[from] SpecError),
     #[error(transparent)]
     Tune(#[from] TuneError),
+    /// A sweep was taken through a hold of another clock.
+    #[error(
+        "the sweep was taken through a hold of {found_s} s and the table runs at {expected_s} s: take the table of that clock, or a sweep without the hold"
+    )]
+    Hold { found_s: f64, expected_s: f64 },
     /// No tuning was run.
     #[error("no tuning was run")]
     NoRound,

@@ -4,7 +4,7 @@
 //! pair. A body's pairs of poles, which keep their value at rest, are the last ones. Its other roots stay where they are.
 
 use super::moves::{Pair, Shares};
-use super::{Range, Uncertainty};
+use super::{Interval, Uncertainty};
 use crate::lti::{Body, Plant};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
@@ -23,7 +23,7 @@ pub(super) struct Family {
 }
 
 /// A box: ranges of the factors.
-pub(super) type Ranges = Vec<Range>;
+pub(super) type Ranges = Vec<Interval>;
 
 /// Coordinates before those of the pairs.
 pub(super) const GAIN: usize = 0;
@@ -66,7 +66,7 @@ impl Family {
 
     /// The whole box.
     pub fn ranges(&self, u: &Uncertainty) -> Ranges {
-        let around = |share: f64| Range { low: 1.0 - share, high: 1.0 + share };
+        let around = |share: f64| Interval { low: 1.0 - share, high: 1.0 + share };
         let mut all = vec![around(u.gain), around(u.delay)];
         for p in &self.pairs {
             all.push(around(u.frequency));
@@ -115,7 +115,7 @@ impl Family {
     }
 
     /// Half widths of pair `i`, as shares of the middle.
-    pub fn shares(ranges: &[Range], i: usize) -> Shares {
+    pub fn shares(ranges: &[Interval], i: usize) -> Shares {
         [0, 1, 2].map(|j| share(&ranges[PAIRS + 3 * i + j]))
     }
 
@@ -150,7 +150,7 @@ impl Family {
     }
 
     /// Bound over the box of |P| s² T² from the `n`-th alias on, which must lie above every root. Powers of s beyond the second are taken at the alias.
-    fn asymptote(&self, n: f64, ranges: &[Range]) -> f64 {
+    fn asymptote(&self, n: f64, ranges: &[Interval]) -> f64 {
         let w = TAU * n / self.t;
         // |s - p| is no less than |s| for a real pole left of the axis, nor than |s| - p for one right of it.
         let zeros: f64 = self.zeros.iter().map(|z| 1.0 + z.norm() / w).product();
@@ -170,20 +170,20 @@ impl Family {
     }
 
     /// Bound over the box of one alias `k` on one side, the hold's 1 - 1/z aside.
-    pub fn alias(&self, k: i64, ranges: &[Range]) -> f64 {
+    pub fn alias(&self, k: i64, ranges: &[Interval]) -> f64 {
         let k = k as f64 - 0.5;
         self.asymptote(k, ranges) / (TAU * k).powi(3)
     }
 
     /// Bound over the box of the aliases beyond the `n`-th on either side, the hold's 1 - 1/z aside.
-    pub fn far(&self, n: i64, ranges: &[Range]) -> f64 {
+    pub fn far(&self, n: i64, ranges: &[Interval]) -> f64 {
         // Σ 1/|a + 2 pi k|³ over |k| > n is below its integral; 1/s twice from the body and once from the hold.
         let n = n as f64;
         self.asymptote(n + 0.5, ranges) * (0.5 / (n + 0.5).powi(2) + 0.5 / (n * n)) / TAU.powi(3)
     }
 
     /// Bound over the box of all aliases together on the line Re s = `right` > 0: rough, and only ever used with a factor near 0.
-    pub fn roughly(&self, right: f64, ranges: &[Range]) -> f64 {
+    pub fn roughly(&self, right: f64, ranges: &[Interval]) -> f64 {
         // |s - z| <= |s| (1 + |z|/Re s); |s - p| >= |s| for a real pole left of the axis, and |s| <= |s - p| (1 + p/|Re s - p|) right of it.
         let zeros: f64 = self.zeros.iter().map(|z| 1.0 + z.norm() / right).product();
         let poles = self.poles.iter().map(|p| p.re).filter(|p| *p > 0.0).map(|p| 1.0 + p / (right - p).abs());
@@ -216,6 +216,6 @@ impl Family {
 }
 
 /// Half width of a range as a share of its middle.
-pub(super) fn share(r: &Range) -> f64 {
+pub(super) fn share(r: &Interval) -> f64 {
     r.width() / (r.high + r.low)
 }

@@ -29,7 +29,6 @@ mod plant;
 mod prove;
 mod proven_limits;
 mod quadratic;
-mod range;
 mod roots;
 mod rounding;
 mod settings;
@@ -46,12 +45,12 @@ mod write_box;
 mod write_piece;
 mod write_record;
 
+pub use crate::numeric::interval::Interval;
 pub use assured::{Assurance, Assured, Ground, Watched, tune_assured};
 pub use bounds::{Bounded, Bounds, ProvenCrossing, Stability};
 pub use case_proof::{CaseProof, ProvenLimit, Verdict};
-pub use certificate::{Certificate, Inputs, SCHEMA, Source, certify, certify_watched, choices};
+pub use certificate::{Certificate, Inputs, SCHEMA, Source, certify, certify_watched, choices, table_clock_s};
 pub use error::VerifyError;
-pub use range::Range;
 pub use settings::VerifySettings;
 pub use swept::{LEAST_DAMPING, SweepAgain, SweepAssumption};
 pub use table::Finding;
@@ -90,27 +89,26 @@ pub fn prove_sweep(
     frf: &Frf,
     sections: &[Section],
     sample_time_s: f64,
-    assumption: SweepAssumption,
+    least_damping: f64,
     uncertainty: &Uncertainty,
     away: f64,
     settings: &VerifySettings,
 ) -> Result<(Bounds, Vec<SweepAgain>), VerifyError> {
-    let swept = taken(frf, sections, sample_time_s, assumption, uncertainty)?;
+    let swept = taken(frf, sections, sample_time_s, least_damping, uncertainty)?;
     let bounds = prove::prove(&swept, settings)?;
     Ok((bounds, swept.again(away)))
 }
 
-/// The loop of a sweep under these assumptions.
+/// The loop of a sweep whose modes have at least this damping.
 fn taken(
     frf: &Frf,
     sections: &[Section],
     t: f64,
-    assumption: SweepAssumption,
+    least_damping: f64,
     uncertainty: &Uncertainty,
 ) -> Result<Swept, VerifyError> {
-    let found = assumption.least_damping;
-    if !(found > 0.0 && found < 1.0) {
-        return Err(VerifyError::LeastDamping { found });
+    if !(least_damping > 0.0 && least_damping < 1.0) {
+        return Err(VerifyError::LeastDamping { found: least_damping });
     }
     for (key, x) in
         [("frequency", uncertainty.frequency), ("damping", uncertainty.damping), ("delay", uncertainty.delay)]
@@ -119,5 +117,5 @@ fn taken(
             return Err(VerifyError::SweepBox { key });
         }
     }
-    Swept::new(frf, sections, t, assumption, uncertainty)
+    Swept::new(frf, sections, t, least_damping, uncertainty)
 }

@@ -3,7 +3,7 @@
 use super::chain::Chain;
 use super::plant::{END, Product, RigidBody};
 use super::uncertain::{Others, Spread};
-use super::{Patch, Range, Uncertainty, VerifyError};
+use super::{Interval, Patch, Uncertainty, VerifyError};
 use crate::lti::{Plant, Section};
 use nalgebra::Complex;
 
@@ -92,7 +92,7 @@ impl Sampled {
         centre += far.value;
         slope += far.first;
         radius += far.remainder + error;
-        let (gain, turn) = (Range::ZERO, Range::ZERO);
+        let (gain, turn) = (Interval::ZERO, Interval::ZERO);
         let radius = if radius.is_nan() { f64::INFINITY } else { radius };
         let patch = Patch { centre, half: slope * half, radius, floor: error, gain, turn, stuck: 0.0 };
         others.far = far.most + error;

@@ -4,7 +4,7 @@
 //! zeros. With e = the numerator's relative move less the denominator's, over one plus the denominator's, everything below is algebra
 //! (`specs/certificate.md`).
 
-use super::Range;
+use super::Interval;
 use nalgebra::Complex;
 
 /// One pair of roots at given parameters.
@@ -150,13 +150,13 @@ impl Pair {
 
     /// Lower bound of |s² + 2 d w s + w²| of the poles over the box: the product of the distances of the places where the roots may lie.
     pub fn reach(&self, s: Complex<f64>, [f, _, dp]: Shares) -> f64 {
-        let w = Range { low: self.pole[0] * (1.0 - f), high: self.pole[0] * (1.0 + f) };
-        let d = Range { low: self.pole[1] * (1.0 - dp), high: self.pole[1] * (1.0 + dp) };
+        let w = Interval { low: self.pole[0] * (1.0 - f), high: self.pole[0] * (1.0 + f) };
+        let d = Interval { low: self.pole[1] * (1.0 - dp), high: self.pole[1] * (1.0 + dp) };
         if !(d.low >= 0.0 && d.high < 1.0) {
             return 0.0;
         }
         let part = |d: f64| (1.0 - d * d).sqrt();
-        let im = Range { low: w.low * part(d.high), high: w.high * part(d.low) };
+        let im = Interval { low: w.low * part(d.high), high: w.high * part(d.low) };
         let back = s.re + d.low * w.low;
         let to = |y: f64| {
             let off = (im.low - y).max(y - im.high).max(0.0);

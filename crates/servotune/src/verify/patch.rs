@@ -3,7 +3,7 @@
 //! In: value, slope and remainder of a Taylor step, and what uncertainty may do. Out: ranges of |L| and of the angle from
 //! -180 deg, and distances from -1, each of the whole set.
 
-use super::Range;
+use super::Interval;
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
@@ -19,9 +19,9 @@ pub(super) struct Patch {
     /// The part of the radius that no smaller cell takes away.
     pub floor: f64,
     /// Natural logarithm of what uncertainty may multiply by.
-    pub gain: Range,
+    pub gain: Interval,
     /// Angle (rad) by which uncertainty may turn.
-    pub turn: Range,
+    pub turn: Interval,
     /// The wider of both at one frequency: what of them no smaller cell takes away.
     pub stuck: f64,
 }
@@ -67,15 +67,15 @@ impl Patch {
     }
 
     /// |L|.
-    pub fn size(&self) -> Range {
+    pub fn size(&self) -> Interval {
         let low = (self.to_segment(Complex::new(0.0, 0.0)) - self.radius).max(0.0);
         let high = (self.centre - self.half).norm().max((self.centre + self.half).norm()) + self.radius;
-        let r = Range { low: low * self.gain.low.exp(), high: high * self.gain.high.exp() }.sound();
-        Range { low: r.low.max(0.0), ..r }
+        let r = Interval { low: low * self.gain.low.exp(), high: high * self.gain.high.exp() }.sound();
+        Interval { low: r.low.max(0.0), ..r }
     }
 
     /// Angle from -180 deg to L (rad), on the branch of the centre in (-pi, pi]; none where L may be 0.
-    pub fn angle(&self) -> Option<Range> {
+    pub fn angle(&self) -> Option<Interval> {
         let nearest = self.to_segment(Complex::new(0.0, 0.0));
         if self.radius >= nearest {
             return None;
@@ -83,8 +83,8 @@ impl Patch {
         let base = (-self.centre).arg();
         let ends = [1.0, -1.0].map(|s| (1.0 + s * self.half / self.centre).arg());
         let rim = (self.radius / nearest).asin();
-        let r = Range { low: ends[0].min(ends[1]).min(0.0), high: ends[0].max(ends[1]).max(0.0) };
-        Some(Range { low: base + r.low, high: base + r.high }.widened(rim).plus(self.turn))
+        let r = Interval { low: ends[0].min(ends[1]).min(0.0), high: ends[0].max(ends[1]).max(0.0) };
+        Some(Interval { low: base + r.low, high: base + r.high }.widened(rim).plus(self.turn))
     }
 
     /// Distance from -1 of the certain part; at most 0 where it may touch -1.
@@ -151,7 +151,7 @@ impl Patch {
 }
 
 /// The least |angle| modulo a turn over a range of angles.
-pub(super) fn least_turn(a: Range) -> f64 {
+pub(super) fn least_turn(a: Interval) -> f64 {
     if a.width() >= TAU {
         return 0.0;
     }
@@ -164,13 +164,13 @@ pub(super) fn least_turn(a: Range) -> f64 {
 }
 
 /// The largest |angle| modulo a turn over a range of angles narrower than half a turn.
-pub(super) fn largest_turn(a: Range) -> f64 {
-    let shifted = Range { low: a.low - PI, high: a.high - PI };
+pub(super) fn largest_turn(a: Interval) -> f64 {
+    let shifted = Interval { low: a.low - PI, high: a.high - PI };
     PI - least_turn(shifted)
 }
 
 /// The least angle modulo a turn, in [0, 2 pi).
-pub(super) fn least_lag(a: Range) -> f64 {
+pub(super) fn least_lag(a: Interval) -> f64 {
     if a.width() >= TAU {
         return 0.0;
     }
@@ -187,7 +187,7 @@ mod tests {
     fn patch(r: &mut Random, spread: f64) -> Patch {
         let mut c = |s: f64| Complex::new(r.between(-s, s), r.between(-s, s));
         let (centre, half) = (c(3.0), c(0.4));
-        let (gain, turn) = (Range::between(-spread, 0.5 * spread), Range::between(-0.3 * spread, spread));
+        let (gain, turn) = (Interval::between(-spread, 0.5 * spread), Interval::between(-0.3 * spread, spread));
         Patch { centre, half, radius: r.between(0.0, 0.2), floor: 0.0, gain, turn, stuck: 0.0 }
     }
 
@@ -225,8 +225,8 @@ mod tests {
             half: Complex::new(0.0, 0.0),
             radius: 0.0,
             floor: 0.0,
-            gain: Range::ZERO,
-            turn: Range::ZERO,
+            gain: Interval::ZERO,
+            turn: Interval::ZERO,
             stuck: 0.0,
         };
         assert!((p.balance() - ((1.0 + l) / (1.0 - l)).norm()).abs() < 1e-12);

@@ -7,7 +7,7 @@ use super::bounds::{Bounded, Bounds, ProvenCrossing, Stability};
 use super::clusters::Clusters;
 use super::model::{Enclosed, Start};
 use super::patch::{Patch, largest_turn, least_lag, least_turn};
-use super::{Range, VerifyError, VerifySettings};
+use super::{Interval, VerifyError, VerifySettings};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
@@ -57,8 +57,8 @@ struct Seen {
     /// Split for the figures alone: with the cells used up the bounds still hold, only less tightly.
     distance: f64,
     balance: f64,
-    one: Option<(Range, bool)>,
-    axis: Option<(Range, bool)>,
+    one: Option<(Interval, bool)>,
+    axis: Option<(Interval, bool)>,
 }
 
 /// Proves what can be proved of a loop.
@@ -143,16 +143,17 @@ impl Tally {
     /// A loop without integrators below the first cell: a crossing may hide there.
     fn below(&mut self, still: &Patch, angle: f64) {
         let size = still.size();
-        let turn = still.angle().unwrap_or(Range { low: -PI, high: PI });
+        let turn = still.angle().unwrap_or(Interval { low: -PI, high: PI });
         if size.holds(1.0) {
-            let value = Range { low: least_turn(turn), high: if turn.width() < PI { largest_turn(turn) } else { PI } };
+            let value =
+                Interval { low: least_turn(turn), high: if turn.width() < PI { largest_turn(turn) } else { PI } };
             self.phase.take(value.low, angle);
             self.delay.take(least_lag(turn) / angle, angle);
-            self.gain_crossings.inside(Range { low: 0.0, high: angle }, value, false);
+            self.gain_crossings.inside(Interval { low: 0.0, high: angle }, value, false);
         }
         // At rest L is real: a negative one limits the gain there.
         if least_turn(turn) == 0.0 {
-            let ln = Range { low: size.low.max(f64::MIN_POSITIVE).ln(), high: size.high.ln() };
+            let ln = Interval { low: size.low.max(f64::MIN_POSITIVE).ln(), high: size.high.ln() };
             self.gain.take(if ln.holds(0.0) { 0.0 } else { ln.low.abs().min(ln.high.abs()) }, angle);
         }
         self.touched |= still.distance() <= 0.0;
@@ -195,12 +196,12 @@ impl Tally {
                 if size.high >= 1.0 {
                     seen.split |= p.shrinks();
                     if holds {
-                        merge(&mut seen.one, Range { low: -PI, high: PI }, false);
+                        merge(&mut seen.one, Interval { low: -PI, high: PI }, false);
                     }
                 }
                 let largest = size.high.max(f64::MIN_POSITIVE).ln();
                 seen.split |= -largest < self.gain.high && coarse;
-                merge(&mut seen.axis, Range { low: f64::NEG_INFINITY, high: largest }, false);
+                merge(&mut seen.axis, Interval { low: f64::NEG_INFINITY, high: largest }, false);
                 continue;
             };
             if holds {
@@ -216,7 +217,7 @@ impl Tally {
                 merge(&mut seen.one, angle, sure);
             }
             if least_turn(angle) == 0.0 {
-                let ln = Range { low: size.low.max(f64::MIN_POSITIVE).ln(), high: size.high.ln() };
+                let ln = Interval { low: size.low.max(f64::MIN_POSITIVE).ln(), high: size.high.ln() };
                 let least = if ln.holds(0.0) { 0.0 } else { ln.low.abs().min(ln.high.abs()) };
                 seen.split |= coarse && ln.width() > s.ln_size && least < self.gain.high;
                 let sure = p.surely_crosses_axis();
@@ -246,20 +247,22 @@ impl Tally {
         }
         match seen.one {
             Some((angle, sure)) => {
-                let value =
-                    Range { low: least_turn(angle), high: if angle.width() < PI { largest_turn(angle) } else { PI } };
+                let value = Interval {
+                    low: least_turn(angle),
+                    high: if angle.width() < PI { largest_turn(angle) } else { PI },
+                };
                 self.phase.take(value.low, middle);
                 self.delay.take(least_lag(angle) / b, middle);
-                self.gain_crossings.inside(Range { low: a, high: b }, value, sure);
+                self.gain_crossings.inside(Interval { low: a, high: b }, value, sure);
             }
             None => self.gain_crossings.outside(nominal.centre.norm() > 1.0),
         }
         match seen.axis {
             Some((ln, sure)) => {
                 let least = if ln.holds(0.0) { 0.0 } else { ln.low.abs().min(ln.high.abs()) };
-                let value = Range { low: least, high: ln.low.abs().max(ln.high.abs()) };
+                let value = Interval { low: least, high: ln.low.abs().max(ln.high.abs()) };
                 self.gain.take(least, middle);
-                self.phase_crossings.inside(Range { low: a, high: b }, value, sure);
+                self.phase_crossings.inside(Interval { low: a, high: b }, value, sure);
             }
             None => self.phase_crossings.outside(nominal.centre.im > 0.0),
         }
@@ -284,10 +287,10 @@ impl Tally {
             (false, 0) => Stability::Stable,
             _ => Stability::Unstable,
         };
-        let degrees = |r: Range| Range { low: r.low.to_degrees(), high: r.high.to_degrees() };
-        let decibels = |r: Range| {
+        let degrees = |r: Interval| Interval { low: r.low.to_degrees(), high: r.high.to_degrees() };
+        let decibels = |r: Interval| {
             let db = 20.0 * std::f64::consts::LOG10_E;
-            Range { low: db * r.low, high: db * r.high }
+            Interval { low: db * r.low, high: db * r.high }
         };
         let gain_crossings = self.gain_crossings.list(hz, degrees);
         let phase_crossings = self.phase_crossings.list(hz, decibels);
@@ -341,12 +344,12 @@ impl Tally {
 }
 
 /// The crossover named: every crossing whose margin may be the smallest.
-fn named(all: &[ProvenCrossing]) -> Option<Range> {
+fn named(all: &[ProvenCrossing]) -> Option<Interval> {
     let most = all.iter().filter(|c| c.certain).map(|c| c.value.high).min_by(f64::total_cmp)?;
-    all.iter().filter(|c| c.value.low <= most).map(|c| c.hz).reduce(Range::hull)
+    all.iter().filter(|c| c.value.low <= most).map(|c| c.hz).reduce(Interval::hull)
 }
 
-fn merge(into: &mut Option<(Range, bool)>, range: Range, sure: bool) {
+fn merge(into: &mut Option<(Interval, bool)>, range: Interval, sure: bool) {
     *into = Some(into.map_or((range, sure), |(r, s)| (r.hull(range), s || sure)));
 }
 

@@ -3,7 +3,7 @@
 //! In: a box about its middle, the circle. Out: for each point the series that the linear parts are summed with and the weight of everything that is not
 //! linear. The mathematics stands in `specs/certificate.md`.
 
-use super::Range;
+use super::Interval;
 use super::contour::{Contour, Window};
 use super::core_moves::{Core, Sum};
 use super::cut::{Cut, cut};
@@ -38,7 +38,7 @@ fn hold(x: &Contour, i: usize, k: i64) -> (Complex<f64>, Complex<f64>) {
 }
 
 impl Beside {
-    pub fn of(x: &Contour, window: &Window, bins: &[usize], family: &Family, ranges: &[Range]) -> Beside {
+    pub fn of(x: &Contour, window: &Window, bins: &[usize], family: &Family, ranges: &[Interval]) -> Beside {
         let whole = family.whole() + NEARBY;
         // Linear part of an alias's move along each coordinate, and the sizes of all of it.
         let moved = |s: Complex<f64>, linear: &mut [Complex<f64>]| {
@@ -134,7 +134,7 @@ pub(super) struct OnCircle {
 
 impl OnCircle {
     /// `family` is the one about the middle of `ranges`; no member's |S| is above `ms` anywhere outside the unit circle.
-    pub fn of(x: &Contour, beside: &Beside, family: &Family, ranges: &[Range], ms: f64) -> OnCircle {
+    pub fn of(x: &Contour, beside: &Beside, family: &Family, ranges: &[Interval], ms: f64) -> OnCircle {
         let n = x.s.len();
         let zero = Complex::new(0.0, 0.0);
         let shares: Vec<Shares> = (0..family.pairs.len()).map(|i| Family::shares(ranges, i)).collect();

@@ -3,7 +3,7 @@
 //! In: plant as it stands, sections, law. Out: overshoot, settling time and the command's rms, each between two bounds. No partial fractions, no sum
 //! over frequency. A step's record goes on until the loop has come to rest, a move's to the end of the write. Spec: `specs/certificate.md`.
 
-use super::Range;
+use super::Interval;
 use super::bounds::Bounded;
 use super::cascade::Loop;
 use super::path::{Path, run};
@@ -65,8 +65,8 @@ pub(super) fn move_end(
     let path = Path::of(c, [0, (s.duration_s / t) as i64], &wanted);
     let y = run(plant, sections, c, &path).position;
     let end_s = s.start_s + ramps(profile)[1];
-    let figures = |tube: &[Range]| {
-        let forward = |r: &Range| if s.velocity > 0.0 { r.high } else { -r.low };
+    let figures = |tube: &[Interval]| {
+        let forward = |r: &Interval| if s.velocity > 0.0 { r.high } else { -r.low };
         let over = tube.iter().fold(0.0f64, |m, r| m.max(forward(r) - s.distance));
         [Some(over), settled(tube, &|k| wanted(k as i64), band, t).map(|x| (x - end_s).max(0.0))]
     };
@@ -77,18 +77,18 @@ pub(super) fn move_end(
 }
 
 /// A record with its rounding; a negative one takes it away from what is judged.
-fn thin(y: &[f64], rounding: f64) -> Vec<Range> {
-    y.iter().map(|y| Range { low: y - rounding, high: y + rounding }).collect()
+fn thin(y: &[f64], rounding: f64) -> Vec<Interval> {
+    y.iter().map(|y| Interval { low: y - rounding, high: y + rounding }).collect()
 }
 
 /// Overshoot (%) and settling time (s) of a unit step.
-fn step_figures(tube: &[Range], t: f64) -> [Option<f64>; 2] {
+fn step_figures(tube: &[Interval], t: f64) -> [Option<f64>; 2] {
     let over = tube.iter().fold(0.0f64, |m, r| m.max(r.high - 1.0));
     [Some(100.0 * over), settled(tube, &|_| 1.0, SETTLED, t)]
 }
 
 /// The first instant (s) from which on the position stays within the band about what is wanted; none where it ends outside.
-fn settled(tube: &[Range], wanted: &dyn Fn(usize) -> f64, band: f64, t: f64) -> Option<f64> {
+fn settled(tube: &[Interval], wanted: &dyn Fn(usize) -> f64, band: f64, t: f64) -> Option<f64> {
     let off = |k: &usize| (tube[*k].high - wanted(*k)).max(wanted(*k) - tube[*k].low);
     match (0..tube.len()).rev().find(|k| off(k) > band) {
         None => Some(0.0),

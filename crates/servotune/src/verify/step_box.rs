@@ -9,7 +9,7 @@ use super::moves::size;
 use super::path::{Path, run};
 use super::spectrum_box::{Beside, OnCircle};
 use super::write_piece::{middle, widest};
-use super::{Range, Uncertainty};
+use super::{Interval, Uncertainty};
 use crate::controller::Controller;
 use crate::lti::{Plant, Section};
 use nalgebra::Complex;
@@ -46,14 +46,14 @@ struct Question<'a> {
 /// One box.
 struct Leaf {
     ranges: Ranges,
-    tube: Vec<Range>,
+    tube: Vec<Interval>,
     /// Largest part of the tube that is not linear in the box.
     rest: f64,
     widest: usize,
 }
 
 /// Where the position may be at each sample of the path from time 0 on; none where a member may clip its command or nothing is proved.
-pub(super) fn tube(m: &Members<'_>, path: &Path) -> Option<Vec<Range>> {
+pub(super) fn tube(m: &Members<'_>, path: &Path) -> Option<Vec<Interval>> {
     let ms = m.max_sensitivity?;
     let t = m.controller.sample_time_s;
     let family = Family::of(&m.plant.paired(), t);
@@ -90,28 +90,28 @@ pub(super) fn tube(m: &Members<'_>, path: &Path) -> Option<Vec<Range>> {
         let parent = leaves.swap_remove(worst);
         let r = parent.ranges[parent.widest];
         let cut = 0.5 * (r.low + r.high);
-        let half = |r: Range| {
+        let half = |r: Interval| {
             let mut ranges = parent.ranges.clone();
             ranges[parent.widest] = r;
             Leaf::of(&q, ranges)
         };
-        let (low, high) = rayon::join(|| half(Range { high: cut, ..r }), || half(Range { low: cut, ..r }));
+        let (low, high) = rayon::join(|| half(Interval { high: cut, ..r }), || half(Interval { low: cut, ..r }));
         leaves.extend([low?, high?]);
         boxes += 2;
     }
     let all = leaves.iter().map(|l| &l.tube);
-    let hull = all.fold(None, |hull: Option<Vec<Range>>, tube| {
+    let hull = all.fold(None, |hull: Option<Vec<Interval>>, tube| {
         Some(hull.map_or_else(|| tube.clone(), |h| h.iter().zip(tube).map(|(a, b)| a.hull(*b)).collect()))
     })?;
     hull.iter().all(|r| r.low.is_finite() && r.high.is_finite()).then_some(hull)
 }
 
-fn both(x: f64) -> Range {
-    Range { low: -x.abs(), high: x.abs() }
+fn both(x: f64) -> Interval {
+    Interval { low: -x.abs(), high: x.abs() }
 }
 
-fn above(x: f64) -> Range {
-    Range { low: x.min(0.0), high: x.max(0.0) }
+fn above(x: f64) -> Interval {
+    Interval { low: x.min(0.0), high: x.max(0.0) }
 }
 
 impl Leaf {
@@ -128,12 +128,12 @@ impl Leaf {
         let whole = !on.cuts.is_empty();
         let weights = if whole { &on.command_rest } else { &on.command_third };
         // Where it may be at each sample: linear parts, the second order where no pair is cut, and what is left.
-        let around = |own: &[f64], by: &dyn Fn(usize) -> Complex<f64>, rest: f64, turned: f64| -> Vec<Range> {
-            let mut all: Vec<Range> = (own.iter().enumerate())
+        let around = |own: &[f64], by: &dyn Fn(usize) -> Complex<f64>, rest: f64, turned: f64| -> Vec<Interval> {
+            let mut all: Vec<Interval> = (own.iter().enumerate())
                 .map(|(k, x)| (x, rest * swell(k) + turned))
-                .map(|(x, h)| Range { low: x - h, high: x + h })
+                .map(|(x, h)| Interval { low: x - h, high: x + h })
                 .collect();
-            let mut add = |series: &dyn Fn(usize) -> Complex<f64>, part: &dyn Fn(f64) -> Range| {
+            let mut add = |series: &dyn Fn(usize) -> Complex<f64>, part: &dyn Fn(f64) -> Interval| {
                 let half: Vec<_> = (0..on.command.len()).map(|i| series(i) * by(i)).collect();
                 if half.iter().any(|x| x.norm_sqr() > 0.0) {
                     for (r, x) in all.iter_mut().zip(circle.samples(&half, n)) {

@@ -5,7 +5,7 @@ use super::expansion::{Expansion, Jet};
 use super::hidden::{Gap, gap};
 use super::model::{Enclosed, Start};
 use super::plant::Product;
-use super::{Patch, Range, Uncertainty, VerifyError};
+use super::{Interval, Patch, Uncertainty, VerifyError};
 use crate::frf::Frf;
 use crate::lti::Section;
 use nalgebra::Complex;
@@ -15,7 +15,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// Least damping of a mode where nobody says another.
 pub const LEAST_DAMPING: f64 = 0.005;
 
-/// How a sweep is to be taken.
+/// How the sweeps of a certificate were taken.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SweepAssumption {
@@ -46,7 +46,7 @@ pub(super) struct Swept {
     gaps: Vec<Gap>,
     hold: bool,
     t: f64,
-    gain: Range,
+    gain: Interval,
     least_damping: f64,
     /// L at the first point and its phase from rest.
     first: Complex<f64>,
@@ -65,7 +65,7 @@ impl Swept {
         frf: &Frf,
         sections: &[Section],
         t: f64,
-        a: SweepAssumption,
+        least_damping: f64,
         u: &Uncertainty,
     ) -> Result<Swept, VerifyError> {
         let chain = Chain::of(sections)?;
@@ -78,9 +78,9 @@ impl Swept {
             let one = |k: usize| frf.relative_std().map_or(0.0, |s| s[k]) * p[k].norm();
             one(i).max(one(i + 1))
         };
-        let gaps: Vec<Gap> = (0..points - 1).map(|i| gap(w, p, i, a.least_damping, std(i))).collect();
+        let gaps: Vec<Gap> = (0..points - 1).map(|i| gap(w, p, i, least_damping, std(i))).collect();
         let angle: Vec<f64> = w.iter().map(|w| w * t).collect();
-        let hold = !a.hold_included;
+        let hold = !frf.holds(t).map_err(|found_s| VerifyError::Hold { found_s, expected_s: t })?;
         let at = |i: usize| {
             let c = chain.expand(angle[i], 0.0).term(0.0).value;
             p[i] * c * if hold { Product::hold(angle[i]).value } else { 1.0.into() }
@@ -100,8 +100,8 @@ impl Swept {
         let turned = p[0].arg() + PI * (unstable % 2) as f64;
         let plant = if turned > FRAC_PI_2 { turned - TAU } else { turned };
         let phase = plant + chain.phase_from_rest(angle[0]) - if hold { 0.5 * angle[0] } else { 0.0 };
-        let gain = Range { low: (1.0 - u.gain).max(1e-9).ln(), high: (1.0 + u.gain).ln() };
-        Ok(Swept { chain, angle, gaps, hold, t, gain, least_damping: a.least_damping, first, phase, unstable })
+        let gain = Interval { low: (1.0 - u.gain).max(1e-9).ln(), high: (1.0 + u.gain).ln() };
+        Ok(Swept { chain, angle, gaps, hold, t, gain, least_damping, first, phase, unstable })
     }
 
     /// Bands in which what may be hidden keeps L from staying `away` from -1, though the cubic does.
@@ -148,7 +148,7 @@ impl Swept {
             radius: radius + floor,
             floor,
             gain: self.gain,
-            turn: Range::ZERO,
+            turn: Interval::ZERO,
             stuck: self.gain.width(),
         }
     }

@@ -5,7 +5,7 @@
 
 use super::plant::{Product, RigidBody};
 use super::quadratic::Quadratic;
-use super::{Patch, Range};
+use super::{Interval, Patch};
 use crate::lti::{Body, Plant};
 use crate::numeric::random::Random;
 use nalgebra::Complex;
@@ -82,7 +82,7 @@ type Factor = (Option<Quadratic>, Quadratic);
 #[derive(Clone, Debug)]
 pub(super) struct Spread {
     factors: Vec<Factor>,
-    gain: Range,
+    gain: Interval,
     delay_s: f64,
     t: f64,
     frequency: f64,
@@ -108,8 +108,8 @@ const PIECE: f64 = 0.05;
 const PIECES: usize = 400;
 
 /// What a piece does: ln of size, and angle.
-type Move = (Range, Range);
-const STAYS: Move = (Range::ZERO, Range::ZERO);
+type Move = (Interval, Interval);
+const STAYS: Move = (Interval::ZERO, Interval::ZERO);
 
 /// One piece of a factor's range over a cell, and how wide its moves are at a single frequency: what no smaller cell takes away.
 #[derive(Clone, Copy)]
@@ -129,7 +129,7 @@ impl Spread {
         let mut spread = Spread {
             factors,
             alias_ratio: 0.0,
-            gain: Range { low: (1.0 - u.gain).max(1e-9).ln(), high: (1.0 + u.gain).ln() },
+            gain: Interval { low: (1.0 - u.gain).max(1e-9).ln(), high: (1.0 + u.gain).ln() },
             delay_s: u.delay * p.delay_s,
             t: p.t,
             frequency: u.frequency,
@@ -141,9 +141,9 @@ impl Spread {
 
     /// Patches of the whole box over the cell, from the aliases beside the first.
     pub fn patches(&self, nominal: &Patch, others: &Others, [a, b]: [f64; 2], into: &mut Vec<Patch>) {
-        let w = Range { low: a / self.t, high: b / self.t };
+        let w = Interval { low: a / self.t, high: b / self.t };
         let delay = self.delay_s * w.high;
-        let (mut gain, mut turn) = (Range::ZERO, Range { low: -delay, high: delay });
+        let (mut gain, mut turn) = (Interval::ZERO, Interval { low: -delay, high: delay });
         let mut active = vec![Piece { moves: STAYS, still: 0.0 }];
         let mut stuck = self.gain.width() + 2.0 * delay;
         for f in &self.factors {
@@ -178,29 +178,29 @@ impl Spread {
     }
 
     /// What one factor may do over the cell, piece by piece of its frequency range.
-    fn pieces(&self, f: &Factor, w: Range) -> Vec<Piece> {
+    fn pieces(&self, f: &Factor, w: Interval) -> Vec<Piece> {
         if self.frequency == 0.0 && self.damping == 0.0 {
             return vec![Piece { moves: STAYS, still: 0.0 }];
         }
         // The set over the piece is m(w/f), which is the factor itself over a moved range of w.
         let (low, high) = ((1.0 - self.frequency).max(1e-3), 1.0 + self.frequency);
-        let full = Range { low: w.low / high, high: w.high / low };
+        let full = Interval { low: w.low / high, high: w.high / low };
         let ratio = self.ratio(f, full);
         if ratio < PIECE {
-            let moves = Range { low: -ratio, high: ratio };
+            let moves = Interval { low: -ratio, high: ratio };
             return vec![Piece { moves: (moves, moves), still: 2.0 * ratio }];
         }
         let nearest = f.1.reach(full).min(f.0.map_or(f64::INFINITY, |z| z.reach(full)));
         let count = ((full.width() / (PIECE * nearest)).ceil() as usize).clamp(1, PIECES);
         let nominal = self.over(f, w, 0.0);
         let middle = 0.5 * (w.low + w.high);
-        let point = Range { low: middle / high, high: middle / low };
-        let part = |r: Range, i: usize| {
+        let point = Interval { low: middle / high, high: middle / low };
+        let part = |r: Interval, i: usize| {
             let at = |i: usize| r.low + r.width() * i as f64 / count as f64;
-            self.over(f, Range { low: at(i), high: at(i + 1) }, self.damping)
+            self.over(f, Interval { low: at(i), high: at(i + 1) }, self.damping)
         };
         // The nominal value over the cell is taken out again.
-        let out = |m: Range, n: Range| Range { low: m.low - n.high, high: m.high - n.low }.sound();
+        let out = |m: Interval, n: Interval| Interval { low: m.low - n.high, high: m.high - n.low }.sound();
         (0..count)
             .map(|i| {
                 let (moved, still) = (part(full, i), part(point, i));
@@ -213,7 +213,7 @@ impl Spread {
     /// Bound of |ln(m moved / m)| at any frequency of a range that holds the moves: the logarithm's slopes times the moves.
     ///
     /// d ln q/d ln u = 2 - 2 (1 + j d u)/q = -2 u (u - j d)/q for q = 1 - u² + 2 j d u; in a mode the 2 of zero and pole cancel.
-    fn ratio(&self, (zero, pole): &Factor, full: Range) -> f64 {
+    fn ratio(&self, (zero, pole): &Factor, full: Interval) -> f64 {
         let one = |q: &Quadratic| {
             let (u, d) = (full.high / q.w0, q.damping.abs() * (1.0 + self.damping));
             let least = q.over(full, self.damping).0.low.exp();
@@ -248,10 +248,10 @@ impl Spread {
     }
 
     /// ln of size and angle of the factor, 1 at rest, over a range of frequencies and a range of damping.
-    fn over(&self, (zero, pole): &Factor, w: Range, damping: f64) -> Move {
+    fn over(&self, (zero, pole): &Factor, w: Interval, damping: f64) -> Move {
         let p = pole.over(w, damping);
         let z = zero.map_or(STAYS, |z| z.over(w, damping));
-        let less = |a: Range, b: Range| Range { low: a.low - b.high, high: a.high - b.low };
+        let less = |a: Interval, b: Interval| Interval { low: a.low - b.high, high: a.high - b.low };
         (less(z.0, p.0), less(z.1, p.1))
     }
 }
@@ -263,7 +263,7 @@ fn hull(all: &[Piece]) -> Move {
 
 impl Quadratic {
     /// Distance of the nearest root from a range of frequencies (rad/s).
-    fn reach(&self, w: Range) -> f64 {
+    fn reach(&self, w: Interval) -> f64 {
         let (re, im) = self.root();
         let off = (w.low - im).max(im - w.high).max(0.0);
         (re * re + off * off).sqrt()
@@ -273,9 +273,9 @@ impl Quadratic {
     ///
     /// |q|² has its only inner minimum at u² = 1 - 2 d², and grows with |d|; the angle of one sign of d grows with u, and with
     /// |d| it moves towards a quarter turn.
-    fn over(&self, w: Range, damping: f64) -> Move {
-        let u = Range { low: w.low / self.w0, high: w.high / self.w0 };
-        let d = Range::between(self.damping * (1.0 - damping), self.damping * (1.0 + damping));
+    fn over(&self, w: Interval, damping: f64) -> Move {
+        let u = Interval { low: w.low / self.w0, high: w.high / self.w0 };
+        let d = Interval::between(self.damping * (1.0 - damping), self.damping * (1.0 + damping));
         let square = |u: f64, d: f64| (1.0 - u * u) * (1.0 - u * u) + 4.0 * d * d * u * u;
         let small = d.low.abs().min(d.high.abs());
         let large = d.low.abs().max(d.high.abs());
@@ -288,10 +288,10 @@ impl Quadratic {
             if q.im == 0.0 && q.re < 0.0 { PI.copysign(d) } else { q.arg() }
         };
         let corners = [angle(u.low, d.low), angle(u.low, d.high), angle(u.high, d.low), angle(u.high, d.high)];
-        let turn = corners.iter().fold(Range { low: f64::INFINITY, high: f64::NEG_INFINITY }, |r, a| Range {
+        let turn = corners.iter().fold(Interval { low: f64::INFINITY, high: f64::NEG_INFINITY }, |r, a| Interval {
             low: r.low.min(*a),
             high: r.high.max(*a),
         });
-        (Range { low: 0.5 * lowest.ln(), high: 0.5 * highest.ln() }, turn)
+        (Interval { low: 0.5 * lowest.ln(), high: 0.5 * highest.ln() }, turn)
     }
 }

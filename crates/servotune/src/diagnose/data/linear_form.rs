@@ -32,7 +32,7 @@ pub struct LinearForm {
     /// The plant of the case.
     pub given: Plant,
     /// Free parameters, in order.
-    pub knobs: Vec<FreeParameter>,
+    pub free_parameters: Vec<FreeParameter>,
     pub(in crate::diagnose) sample_time_s: f64,
 }
 
@@ -69,15 +69,15 @@ impl NominalModel {
 impl LinearForm {
     /// All parameters that records at this sample time can tell.
     pub fn new(given: &Plant, sample_time_s: f64) -> LinearForm {
-        let mut knobs = vec![FreeParameter::Gain];
+        let mut free_parameters = vec![FreeParameter::Gain];
         if matches!(given.body, Body::SecondOrder { .. }) {
-            knobs.push(FreeParameter::Stiffness);
+            free_parameters.push(FreeParameter::Stiffness);
         }
-        knobs.extend([FreeParameter::Viscous, FreeParameter::Delay]);
+        free_parameters.extend([FreeParameter::Viscous, FreeParameter::Delay]);
         let highest = HIGHEST_MODE * std::f64::consts::PI / sample_time_s;
         for (i, m) in given.modes.iter().enumerate() {
             if m.pole_rad_s < highest {
-                knobs.extend([
+                free_parameters.extend([
                     FreeParameter::Pole(i),
                     FreeParameter::PoleDamping(i),
                     FreeParameter::Zero(i),
@@ -85,7 +85,7 @@ impl LinearForm {
                 ]);
             }
         }
-        LinearForm { given: given.clone(), knobs, sample_time_s }
+        LinearForm { given: given.clone(), free_parameters, sample_time_s }
     }
 
     /// The parameters of a plant that differs from the given one in body and delay; none where its gain is of the other sign.
@@ -93,25 +93,25 @@ impl LinearForm {
         let (b0, k0, c0) = body_numbers(&self.given.body);
         let (b, k, c) = body_numbers(&plant.body);
         let ratio = b * plant.resonance_gain / (b0 * self.given.resonance_gain);
-        let number = |knob: &FreeParameter| match knob {
+        let number = |free_parameter: &FreeParameter| match free_parameter {
             FreeParameter::Gain => ratio.ln(),
             FreeParameter::Stiffness => k / k0 - 1.0,
             FreeParameter::Viscous => (c - c0) / rate_of(&self.given.body),
             FreeParameter::Delay => (plant.delay_s - self.given.delay_s) / self.sample_time_s,
             _ => 0.0,
         };
-        let all: Vec<f64> = self.knobs.iter().map(number).collect();
+        let all: Vec<f64> = self.free_parameters.iter().map(number).collect();
         (ratio > 0.0 && all.iter().all(|v| v.is_finite())).then_some(all)
     }
 
     /// The plant that carries a simulation at these parameters.
-    pub fn carrier(&self, p: &[f64]) -> NominalModel {
+    pub fn nominal(&self, p: &[f64]) -> NominalModel {
         let mut held = p.to_vec();
         let (mut spring, mut damper) = (0.0, 0.0);
         let (b, k, _) = body_numbers(&self.given.body);
         let mut gain = b * self.given.resonance_gain;
-        for (knob, value) in self.knobs.iter().zip(held.iter_mut()) {
-            match knob {
+        for (free_parameter, value) in self.free_parameters.iter().zip(held.iter_mut()) {
+            match free_parameter {
                 FreeParameter::Gain => gain *= value.exp(),
                 FreeParameter::Stiffness => spring = -k * std::mem::take(value),
                 FreeParameter::Viscous => damper = -rate_of(&self.given.body) * std::mem::take(value),
@@ -126,8 +126,8 @@ impl LinearForm {
         let mut plant = self.given.clone();
         let (mut gain, mut stiffness, mut viscous) = body_numbers(&plant.body);
         let (k0, rate) = (stiffness, rate_of(&plant.body));
-        for (knob, &value) in self.knobs.iter().zip(p) {
-            match *knob {
+        for (free_parameter, &value) in self.free_parameters.iter().zip(p) {
+            match *free_parameter {
                 FreeParameter::Gain => gain *= value.exp(),
                 FreeParameter::Stiffness => stiffness = k0 * (1.0 + value),
                 FreeParameter::Viscous => viscous += rate * value,

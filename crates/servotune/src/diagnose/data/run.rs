@@ -1,6 +1,7 @@
 //! A record made ready: what acted on the plant, what it answered, and whose repeat it is.
 
 use crate::diagnose::rules::LAP_DIGITS;
+use crate::numeric::statistics::mean;
 use crate::recording::{Case, Record, Role};
 
 /// One record of a case.
@@ -119,10 +120,6 @@ const AT_REST: usize = 16;
 /// Samples for which a series stands still at the start, up to [`AT_REST`].
 fn still(series: &[f64]) -> usize {
     series.iter().take(AT_REST).take_while(|v| **v == series[0]).count()
-}
-
-fn mean(series: &[f64]) -> f64 {
-    series.iter().sum::<f64>() / series.len() as f64
 }
 
 /// Position and command before a record began.

@@ -33,11 +33,11 @@ pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[SelectedEffect], scene:
         entries.push(named(&c.setting));
         effects.push(c.setting.clone());
     }
-    let carrier = form.carrier(p);
-    let (b, k0, c0) = body_numbers(&carrier.plant.body);
-    let stiffness = k0 - carrier.spring * b * form.given.resonance_gain;
+    let nominal = form.nominal(p);
+    let (b, k0, c0) = body_numbers(&nominal.plant.body);
+    let stiffness = k0 - nominal.spring * b * form.given.resonance_gain;
     if k0 > 0.0 && stiffness < FREE_BODY * k0 {
-        let viscous = c0 - carrier.damper * b * form.given.resonance_gain;
+        let viscous = c0 - nominal.damper * b * form.given.resonance_gain;
         plant.body = Body::FreeInertia { acceleration_gain: b, viscous_rate_per_s: viscous.max(0.0) };
         let strength = stiffness / (b * form.given.resonance_gain);
         let spring = Setting::new(CableSpring { creep_time_s: None, centre: 0.0 }, vec![strength, 0.0]);

@@ -11,13 +11,13 @@ use crate::diagnose::data::linear_form::{LinearForm, NominalModel, Sampled, body
 use crate::diagnose::data::run::{Run, mean_run};
 use crate::diagnose::data::stacked_records::{NuisanceBasis, StackedRecords};
 use crate::diagnose::noise::lines::{Line, take_lines};
+use crate::diagnose::noise::repeats::{in_laps, noise_of, noise_series, values, weigh, without_start};
 use crate::diagnose::noise::whitening::{NoiseLevels, Whitener};
 use crate::diagnose::rules::ROUNDING_ALIKE;
-use crate::lti::{Body, LtiError, Plant};
+use crate::lti::{LtiError, Plant};
 use crate::numeric::least_squares::Qr;
 use crate::physics::{Entry, Port, Scene};
 use crate::recording::Role;
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// The ground of a diagnosis.
@@ -47,6 +47,8 @@ pub struct DiagnosisData {
     pub repeats: Vec<(usize, Vec<f64>)>,
     /// The encoder's count, where every fitted position lies on one.
     pub grid: Option<Grid>,
+    /// Whether the noise is known apart from what the linear plant leaves: from repeats, or from what the cleared plant and its law leave.
+    pub noise_known: bool,
     /// The law that the plant was cleared of before the search, where it was.
     pub foretold: Option<SelectedEffect>,
 }
@@ -55,101 +57,6 @@ pub struct DiagnosisData {
 fn count(runs: &[Run], which: &[usize]) -> Option<Grid> {
     let grids: Vec<Grid> = which.iter().map_while(|&r| quantum(&runs[r].position)).collect();
     grids.iter().copied().min_by(|a, b| a.step.total_cmp(&b.step)).filter(|_| grids.len() == which.len())
-}
-
-/// Series that hold noise only: each repeat less the mean of its group, scaled back to the noise of one record.
-pub(super) fn noise_series(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<(usize, Vec<f64>)> {
-    let mut out = Vec::new();
-    let mut groups: Vec<Vec<usize>> = Vec::new();
-    for (i, (r, e)) in errors.iter().enumerate() {
-        let same = |g: &Vec<usize>| {
-            let (other, o) = &errors[g[0]];
-            runs[*other].group == runs[*r].group && o.len() == e.len()
-        };
-        match groups.iter_mut().find(|g| same(g)) {
-            Some(g) => g.push(i),
-            None => groups.push(vec![i]),
-        }
-    }
-    for g in groups.iter().filter(|g| g.len() > 1) {
-        let n = g.len() as f64;
-        let len = errors[g[0]].1.len();
-        let mean: Vec<f64> = (0..len).map(|k| g.iter().map(|&i| errors[i].1[k]).sum::<f64>() / n).collect();
-        let scale = (n / (n - 1.0)).sqrt();
-        out.extend(g.iter().map(|&i| {
-            let (run, error) = &errors[i];
-            (*run, error.iter().zip(&mean).map(|(e, m)| scale * (e - m)).collect::<Vec<f64>>())
-        }));
-    }
-    out
-}
-
-pub(in crate::diagnose) fn values(series: &[(usize, Vec<f64>)]) -> Vec<Vec<f64>> {
-    series.iter().map(|s| s.1.clone()).collect()
-}
-
-/// Series with each record's own start and constant torque taken out, all of it seen through a filter.
-pub(super) fn without_start(
-    series: &[(usize, Vec<f64>)],
-    free: &dyn Fn(usize) -> Vec<Vec<f64>>,
-    filter: &dyn Fn(&mut Vec<f64>),
-) -> Vec<(usize, Vec<f64>)> {
-    let mut out = series.to_vec();
-    // Records of one length start in the same motions.
-    let mut starts: BTreeMap<usize, NuisanceBasis> = BTreeMap::new();
-    for (_, e) in &mut out {
-        let basis = starts.entry(e.len()).or_insert_with(|| {
-            let mut basis = NuisanceBasis::default();
-            for mut c in free(e.len()) {
-                filter(&mut c);
-                basis.add_local(0, c);
-            }
-            basis
-        });
-        filter(e);
-        basis.project(e);
-    }
-    out
-}
-
-/// Errors of records that were not repeated but whose drive repeats inside, lap by lap, as if the laps were repeats.
-fn in_laps(errors: &[(usize, Vec<f64>)], runs: &[Run]) -> Vec<(usize, Vec<f64>)> {
-    let mut out = Vec::new();
-    for (r, e) in errors {
-        let alone = errors.iter().filter(|(o, _)| runs[*o].group == runs[*r].group).count() == 1;
-        match runs[*r].period().filter(|_| alone) {
-            Some(n) => out.extend(e.chunks_exact(n).map(|lap| (*r, lap.to_vec()))),
-            None => out.push((*r, e.clone())),
-        }
-    }
-    out
-}
-
-/// Levels and filter of series that hold noise only, but for each record's own start; and the series, filtered.
-fn noise_of(
-    series: &[(usize, Vec<f64>)],
-    free: &dyn Fn(usize) -> Vec<Vec<f64>>,
-    body: &Body,
-    sample_time_s: f64,
-    from_repeats: bool,
-) -> (NoiseLevels, Whitener, Vec<(usize, Vec<f64>)>) {
-    let levels = NoiseLevels::fit(&values(&without_start(series, free, &|_| {})), body, sample_time_s, from_repeats);
-    let mut whitener = Whitener::new(&levels, body, sample_time_s);
-    let filtered = without_start(series, free, &|x| whitener.apply(x));
-    whitener.refine(&values(&filtered));
-    let filtered = without_start(series, free, &|x| whitener.apply(x));
-    (levels, whitener, filtered)
-}
-
-/// Weights for the noise of each segment as its own repeats show it: a fast move may be noisier than a slow one.
-fn weigh(stack: &mut StackedRecords, repeats: &[(usize, Vec<f64>)]) {
-    for s in &mut stack.segments {
-        let own = repeats.iter().filter(|(r, _)| s.runs.contains(r));
-        let (sum, n) = own.fold((0.0, 0), |(sum, n), (_, e)| (sum + e.iter().map(|v| v * v).sum::<f64>(), n + e.len()));
-        if n > 0 && sum > 0.0 {
-            s.weight /= (sum / n as f64).sqrt();
-        }
-    }
 }
 
 /// Machine and size of its motion in the fit records; speed and noise come later.
@@ -191,16 +98,16 @@ impl DiagnosisData {
         let fit_runs: Vec<usize> = (0..runs.len()).filter(|&i| runs[i].role == Role::Fit && !runs[i].shocked).collect();
         let mut stack = StackedRecords::grouped(&runs, &fit_runs);
         let scene = scene(given, &runs, sample_time_s, spindle_hz);
-        let p = vec![0.0; form.knobs.len()];
-        let carrier = form.carrier(&p);
-        let sampled = Sampled::of(&carrier.plant, sample_time_s)?;
+        let p = vec![0.0; form.free_parameters.len()];
+        let nominal = form.nominal(&p);
+        let sampled = Sampled::of(&nominal.plant, sample_time_s)?;
         // Repeats differ by noise only, so that the linear answer to the difference of their commands is all that counts.
-        let plain = NominalModel { spring: 0.0, damper: 0.0, ..carrier.clone() };
+        let plain = NominalModel { spring: 0.0, damper: 0.0, ..nominal.clone() };
         let still = Trajectory { samples: Vec::new(), unexplained: Vec::new(), repeats: Vec::new() };
         let free = |n: usize| free_motions(&given.body, sample_time_s, n).to_vec();
         let mut errors: Vec<(usize, Vec<f64>)> =
             (fit_runs.iter()).map(|&r| (r, simulation_error(&sampled, &plain, &[], &runs[r], &still, 0))).collect();
-        let body = &carrier.plant.body;
+        let body = &nominal.plant.body;
         let white = |errors: &[(usize, Vec<f64>)]| {
             let series = noise_series(&in_laps(errors, &runs), &runs);
             let levels = NoiseLevels::fit(&values(&without_start(&series, &free, &|_| {})), body, sample_time_s, true);
@@ -233,7 +140,7 @@ impl DiagnosisData {
                 }
                 None => (levels, whitener),
             };
-        let mut bench = DiagnosisData {
+        let mut data = DiagnosisData {
             form,
             runs,
             fit_runs,
@@ -246,30 +153,43 @@ impl DiagnosisData {
             scene,
             repeats,
             grid,
+            noise_known: from_repeats,
             foretold: None,
         };
-        bench.scene.noise = bench.levels.sensor_rms;
-        bench.smooth(&carrier, &sampled, &bench.means.clone(), &vec![Vec::new(); bench.means.len()]);
-        let speeds = bench.trajectories.iter().flat_map(|t| t.samples.iter().map(|s| s.v.abs()));
-        bench.scene.speed = speeds.fold(0.0f64, f64::max).max(1e-12);
-        Ok(bench)
+        data.scene.noise = data.levels.sensor_rms;
+        data.smooth(&nominal, &sampled, &data.means.clone(), &vec![Vec::new(); data.means.len()]);
+        let speeds = data.trajectories.iter().flat_map(|t| t.samples.iter().map(|s| s.v.abs()));
+        data.scene.speed = speeds.fold(0.0f64, f64::max).max(1e-12);
+        Ok(data)
     }
 
     /// Without repeats there is only what a model leaves: noise and filter anew from the errors of the best one so far.
     /// Verdicts are weaker for it.
-    pub fn renew(&mut self, p: &[f64], chosen: &[SelectedEffect]) {
+    pub fn renewed(mut self, p: &[f64], chosen: &[SelectedEffect]) -> DiagnosisData {
         let t = self.scene.sample_time_s;
         let left: Vec<(usize, Vec<f64>)> = self.fit(chosen.to_vec()).errors(p).into_iter().enumerate().collect();
-        let body = self.form.carrier(p).plant.body;
+        let body = self.form.nominal(p).plant.body;
         (self.levels, self.whitener, _) = noise_of(&left, &|n| free_motions(&body, t, n).to_vec(), &body, t, false);
         self.scene.noise = self.levels.sensor_rms;
+        self
     }
 
-    /// The motion behind each mean run, with a known torque beside the carrier.
-    fn smooth(&mut self, carrier: &NominalModel, sampled: &Sampled, means: &[Run], known: &[Vec<f64>]) {
+    /// Without repeats, the noise of what a plant and a law leave together in plain simulation, run by run: no error of the linear plant holds it
+    /// alone where a law acts.
+    pub fn with_noise(mut self, left: Vec<Vec<f64>>) -> DiagnosisData {
+        let (t, body) = (self.scene.sample_time_s, self.form.given.body.clone());
+        let left: Vec<(usize, Vec<f64>)> = left.into_iter().enumerate().collect();
+        (self.levels, self.whitener, _) = noise_of(&left, &|n| free_motions(&body, t, n).to_vec(), &body, t, false);
+        self.scene.noise = self.levels.sensor_rms;
+        self.noise_known = true;
+        self
+    }
+
+    /// The motion behind each mean run, with a known torque beside the nominal.
+    fn smooth(&mut self, nominal: &NominalModel, sampled: &Sampled, means: &[Run], known: &[Vec<f64>]) {
         let spindle_hz = self.scene.spindle_hz.unwrap_or(0.0);
         let noise = self.levels.sensor_rms;
-        let smoother = Smoother::of(&carrier.plant, &sampled.delayed, noise, means, known);
+        let smoother = Smoother::of(&nominal.plant, &sampled.delayed, noise, means, known);
         self.trajectories =
             means.iter().zip(known).map(|(r, w)| smoother.smooth(r, w, &sampled.delayed, spindle_hz)).collect();
         for (t, s) in self.trajectories.iter_mut().zip(&self.stack.segments).filter(|(_, s)| s.runs.len() > 1) {
@@ -279,16 +199,16 @@ impl DiagnosisData {
 
     /// The motion anew for a model that was found: what the sensor adds is taken out of the position, because laws act on where
     /// the arm is and not on what the encoder says; and the torques of the model help the smoother.
-    pub fn correct(&mut self, p: &[f64], chosen: &[SelectedEffect]) {
-        let carrier = self.form.carrier(p);
-        let Ok(sampled) = Sampled::of(&carrier.plant, self.scene.sample_time_s) else { return };
-        let arm = carrier.arm_over_record();
+    pub fn corrected(mut self, p: &[f64], chosen: &[SelectedEffect]) -> DiagnosisData {
+        let nominal = self.form.nominal(p);
+        let Ok(sampled) = Sampled::of(&nominal.plant, self.scene.sample_time_s) else { return self };
+        let arm = nominal.arm_over_record();
         let mut means = self.means.clone();
         let mut known: Vec<Vec<f64>> = Vec::with_capacity(means.len());
         for (i, run) in means.iter_mut().enumerate() {
             let motion = &self.trajectories[i];
             let mut torque: Vec<f64> =
-                motion.samples.iter().map(|s| arm * (carrier.spring * s.x + carrier.damper * s.v)).collect();
+                motion.samples.iter().map(|s| arm * (nominal.spring * s.x + nominal.damper * s.v)).collect();
             for c in chosen {
                 let facts = c.setting.facts();
                 let sensed = facts.entry == Entry::Position && matches!(facts.port, Port::Sensor | Port::Disk);
@@ -309,7 +229,8 @@ impl DiagnosisData {
             }
             known.push(torque);
         }
-        self.smooth(&carrier, &sampled, &means, &known);
+        self.smooth(&nominal, &sampled, &means, &known);
+        self
     }
 
     /// Errors of the mean runs with each one's own start taken out.
@@ -320,17 +241,17 @@ impl DiagnosisData {
 
     /// The error of a model on any run along its recorded motion, effects of each record's own left out.
     fn raw_along(&self, run: &Run, model: &Model) -> Result<(NominalModel, Vec<f64>), LtiError> {
-        let carrier = self.form.carrier(&model.refitted.p);
-        let sampled = Sampled::of(&carrier.plant, self.scene.sample_time_s)?;
+        let nominal = self.form.nominal(&model.refitted.p);
+        let sampled = Sampled::of(&nominal.plant, self.scene.sample_time_s)?;
         let alone = std::slice::from_ref(run);
-        let smoother = Smoother::of(&carrier.plant, &sampled.delayed, self.levels.sensor_rms, alone, &[Vec::new()]);
+        let smoother = Smoother::of(&nominal.plant, &sampled.delayed, self.levels.sensor_rms, alone, &[Vec::new()]);
         let motion = [smoother.smooth(run, &[], &sampled.delayed, self.scene.spindle_hz.unwrap_or(0.0))];
         let lasting: Vec<&SelectedEffect> = model.chosen.iter().filter(|c| !c.setting.facts().per_record).collect();
         let drives: Vec<Drive> = lasting.iter().map(|c| drive(&c.setting.law, &self.scene, &motion)).collect();
         let parts: Vec<(&Drive, &[f64])> =
             drives.iter().zip(lasting.iter().map(|c| &c.setting.strengths[..])).collect();
-        let e = simulation_error(&sampled, &carrier, &parts, run, &motion[0], 0);
-        Ok((carrier, e))
+        let e = simulation_error(&sampled, &nominal, &parts, run, &motion[0], 0);
+        Ok((nominal, e))
     }
 
     /// The whitened error of a model on any run along its recorded motion, with `own` columns of the record taken out.
@@ -348,7 +269,7 @@ impl DiagnosisData {
 
     /// The constant torque on a run beside command and laws (command_unit): what the error along the recorded motion asks for.
     pub fn constant_torque(&self, run: &Run, model: &Model) -> Result<f64, LtiError> {
-        let (carrier, mut e) = self.raw_along(run, model)?;
+        let (nominal, mut e) = self.raw_along(run, model)?;
         let (t, n, body) = (self.scene.sample_time_s, run.len(), &self.form.given.body);
         self.whitener.apply(&mut e);
         let mut free = free_motions(body, t, n);
@@ -356,8 +277,8 @@ impl DiagnosisData {
         let mut qr = Qr::default();
         qr.factor(n, 3, |a| a.chunks_exact_mut(n).zip(&free).for_each(|(a, c)| a.copy_from_slice(c)));
         let acceleration = qr.solve(&mut e)[2] * free_scales(body, t, n)[2];
-        let gain = body_numbers(&carrier.plant.body).0 * carrier.plant.resonance_gain;
-        Ok(acceleration * carrier.arm_over_record() / gain - run.before)
+        let gain = body_numbers(&nominal.plant.body).0 * nominal.plant.resonance_gain;
+        Ok(acceleration * nominal.arm_over_record() / gain - run.before)
     }
 
     /// Power of the noise near a frequency (Hz) over that of noise that the filter has made white, at least 1; as repeats show it,

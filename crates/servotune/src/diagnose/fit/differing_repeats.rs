@@ -3,11 +3,12 @@
 //!
 //! The mean over repeats and what they differ by are independent under white noise, so that gains of both add up.
 
-use super::diagnosis_data::{DiagnosisData, noise_series, without_start};
+use super::diagnosis_data::DiagnosisData;
 use super::regressors::columns_along;
 use super::selected_effect::SelectedEffect;
 use crate::diagnose::data::linear_form::{Sampled, free_motions};
 use crate::diagnose::data::repeat_difference::Difference;
+use crate::diagnose::noise::repeats::{noise_series, without_start};
 use crate::numeric::least_squares::dot;
 use crate::physics::{AnyLaw, Entry, Sample};
 
@@ -18,16 +19,16 @@ impl Difference {
     }
 
     /// The differences of a law among the repeats; zero where it answers in proportion to the command.
-    pub fn of(bench: &DiagnosisData, sampled: &Sampled, law: &AnyLaw) -> Difference {
+    pub fn of(data: &DiagnosisData, sampled: &Sampled, law: &AnyLaw) -> Difference {
         let mut sum = Difference::default();
         if !law.effect().is_hard_nonlinearity() || law.facts().entry != Entry::Command {
             return sum;
         }
-        let t = bench.scene.sample_time_s;
-        let free = |n: usize| free_motions(&bench.form.given.body, t, n).to_vec();
-        for (s, motion) in bench.stack.segments.iter().zip(&bench.trajectories).filter(|(s, _)| s.runs.len() > 1) {
+        let t = data.scene.sample_time_s;
+        let free = |n: usize| free_motions(&data.form.given.body, t, n).to_vec();
+        for (s, motion) in data.stack.segments.iter().zip(&data.trajectories).filter(|(s, _)| s.runs.len() > 1) {
             let answer = |(&run, own): (&usize, &Vec<Sample>)| {
-                let column = columns_along(law, &bench.scene, own).swap_remove(0);
+                let column = columns_along(law, &data.scene, own).swap_remove(0);
                 let mut y = vec![0.0; s.len];
                 sampled.delayed.add_response(&column, &mut y);
                 (run, y)
@@ -37,12 +38,12 @@ impl Difference {
                 continue;
             }
             // Scaled like the records' own differences, of which one in so many is no information.
-            let apart = noise_series(&answers, &bench.runs);
-            let apart = without_start(&apart, &free, &|x| bench.whitener.apply(x));
+            let apart = noise_series(&answers, &data.runs);
+            let apart = without_start(&apart, &free, &|x| data.whitener.apply(x));
             let repeats = s.runs.len() as f64;
             let by = (repeats - 1.0) / repeats * s.weight * s.weight / repeats;
             for (run, law) in &apart {
-                let Some((_, recorded)) = bench.repeats.iter().find(|(r, e)| r == run && e.len() == law.len()) else {
+                let Some((_, recorded)) = data.repeats.iter().find(|(r, e)| r == run && e.len() == law.len()) else {
                     continue;
                 };
                 sum.along += by * dot(law, recorded);
@@ -54,10 +55,10 @@ impl Difference {
 }
 
 /// What all effects of a model take of what repeats differ by.
-pub fn differing(bench: &DiagnosisData, chosen: &[SelectedEffect], p: &[f64]) -> f64 {
+pub fn differing(data: &DiagnosisData, chosen: &[SelectedEffect], p: &[f64]) -> f64 {
     if !chosen.iter().any(|c| c.effect().is_hard_nonlinearity()) {
         return 0.0;
     }
-    let Ok(sampled) = Sampled::of(&bench.form.carrier(p).plant, bench.scene.sample_time_s) else { return 0.0 };
-    chosen.iter().map(|c| Difference::of(bench, &sampled, &c.setting.law).gain()).sum()
+    let Ok(sampled) = Sampled::of(&data.form.nominal(p).plant, data.scene.sample_time_s) else { return 0.0 };
+    chosen.iter().map(|c| Difference::of(data, &sampled, &c.setting.law).gain()).sum()
 }

@@ -63,7 +63,7 @@ struct Problem<'a, 'f> {
 impl Problem<'_, '_> {
     fn settings(&self, x: &[f64]) -> Vec<Setting> {
         let mut all: Vec<Setting> = self.fit.chosen.iter().map(|c| c.setting.clone()).collect();
-        let p = self.fit.form.knobs.len();
+        let p = self.fit.form.free_parameters.len();
         for (v, &(e, i)) in x[p..].iter().zip(&self.strengths) {
             all[e].strengths[i] = *v;
         }
@@ -90,8 +90,8 @@ impl Problem<'_, '_> {
     /// Error of every mean run, or of those given instead.
     fn raw(&self, x: &[f64], runs: &[Run]) -> Vec<Vec<f64>> {
         let fit = self.fit;
-        let carrier = fit.form.carrier(&x[..fit.form.knobs.len()]);
-        let Ok(sampled) = Sampled::of(&carrier.plant, fit.scene.sample_time_s) else {
+        let nominal = fit.form.nominal(&x[..fit.form.free_parameters.len()]);
+        let Ok(sampled) = Sampled::of(&nominal.plant, fit.scene.sample_time_s) else {
             return runs.iter().map(|r| vec![f64::INFINITY; r.len()]).collect();
         };
         let settings = self.settings(x);
@@ -104,7 +104,7 @@ impl Problem<'_, '_> {
         let parts: Vec<(&Drive, &[f64])> =
             drives.iter().map(|d| &**d).zip(settings.iter().map(|s| &s.strengths[..])).collect();
         let error =
-            |(i, run): (usize, &Run)| simulation_error(&sampled, &carrier, &parts, run, &fit.trajectories[i], i);
+            |(i, run): (usize, &Run)| simulation_error(&sampled, &nominal, &parts, run, &fit.trajectories[i], i);
         runs.iter().enumerate().map(error).collect()
     }
 
@@ -131,19 +131,19 @@ impl Problem<'_, '_> {
     }
 }
 
-/// Recorded position less the carrier's answer to the recorded command, with changes of the body and all effects driven by
+/// Recorded position less the nominal's answer to the recorded command, with changes of the body and all effects driven by
 /// the recorded motion; `segment` picks the columns of the effects, and the strengths of those that differ from record to
 /// record.
 pub fn simulation_error(
     sampled: &Sampled,
-    carrier: &NominalModel,
+    nominal: &NominalModel,
     effects: &[(&Drive, &[f64])],
     run: &Run,
     trajectory: &Trajectory,
     segment: usize,
 ) -> Vec<f64> {
-    let sprung = carrier.spring != 0.0 || carrier.damper != 0.0;
-    let torque = sprung.then(|| carrier.torque(&trajectory.samples));
+    let sprung = nominal.spring != 0.0 || nominal.damper != 0.0;
+    let torque = sprung.then(|| nominal.torque(&trajectory.samples));
     let Entering { command, torque, position: mut y } = entering(effects, run, segment, torque);
     sampled.delayed.add_response(&command, &mut y);
     if let Some(w) = torque {
@@ -158,7 +158,7 @@ impl Residuals for Problem<'_, '_> {
     }
 
     fn cols(&self) -> usize {
-        self.fit.form.knobs.len() + self.strengths.len() + self.numbers.len()
+        self.fit.form.free_parameters.len() + self.strengths.len() + self.numbers.len()
     }
 
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) {
@@ -168,7 +168,7 @@ impl Residuals for Problem<'_, '_> {
 
     fn jacobian(&mut self, x: &[f64], j: &mut [f64]) {
         self.keep(x);
-        let (p, strengths) = (self.fit.form.knobs.len(), self.strengths.len());
+        let (p, strengths) = (self.fit.form.free_parameters.len(), self.strengths.len());
         let this = &*self;
         let settings = this.settings(x);
         let drives: Vec<(&Drive, &[f64])> =
@@ -178,7 +178,7 @@ impl Residuals for Problem<'_, '_> {
         let base = if this.numbers.is_empty() { Vec::new() } else { this.error(x) };
         j.par_chunks_exact_mut(this.rows()).enumerate().for_each(|(i, column)| {
             let raw = match (i.checked_sub(p), &slopes) {
-                (None, Some(slopes)) => slopes.knob(i, STEP),
+                (None, Some(slopes)) => slopes.free_parameter(i, STEP),
                 (Some(k), Some(slopes)) if k < strengths => slopes.strength(this.strengths[k]),
                 (_, None) => return,
                 (Some(_), _) => {
@@ -199,7 +199,7 @@ impl Residuals for Problem<'_, '_> {
     }
 
     fn limit(&self, i: usize) -> Limit {
-        let p = self.fit.form.knobs.len();
+        let p = self.fit.form.free_parameters.len();
         if i >= p + self.strengths.len() {
             let (e, k) = self.numbers[i - p - self.strengths.len()];
             // A law far outside its range is another law.
@@ -210,7 +210,7 @@ impl Residuals for Problem<'_, '_> {
             return Limit { low: f64::NEG_INFINITY, high: f64::INFINITY, step: f64::INFINITY };
         }
         use crate::diagnose::data::linear_form::FreeParameter;
-        let (low, high, step) = match self.fit.form.knobs[i] {
+        let (low, high, step) = match self.fit.form.free_parameters[i] {
             FreeParameter::Gain => (-6.0, 6.0, 0.5),
             FreeParameter::Stiffness => (-50.0, 50.0, 5.0),
             FreeParameter::Viscous => (-50.0, 50.0, 5.0),
@@ -315,13 +315,13 @@ impl Fit<'_> {
         // The covariance of the last factorised Jacobian, one step before the end: the same to first order.
         let root = work.qr.inverse_root();
         let directions = root.chunks_exact(work.qr.cols().max(1)).map(<[f64]>::to_vec).collect();
-        let knobs = self.form.knobs.len();
+        let free_parameters = self.form.free_parameters.len();
         for (c, s) in self.chosen.iter_mut().zip(moved) {
             c.setting = s;
         }
         Refitted {
-            plant: self.form.plant(&x[..knobs]),
-            p: x[..knobs].to_vec(),
+            plant: self.form.plant(&x[..free_parameters]),
+            p: x[..free_parameters].to_vec(),
             cost: outcome.cost,
             directions,
             converged: outcome.converged,

@@ -27,8 +27,8 @@ pub struct Model {
 impl Model {
     /// Whether a machine can be so in every one of its effects.
     pub(in crate::diagnose) fn possible(&self) -> bool {
-        let knobs = self.refitted.p.len();
-        let mut from = knobs;
+        let free_parameters = self.refitted.p.len();
+        let mut from = free_parameters;
         self.chosen.iter().all(|c| {
             let count = if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
             let errors: Vec<f64> = (from..from + count).map(|i| self.refitted.spread(i)).collect();

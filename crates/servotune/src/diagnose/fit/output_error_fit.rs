@@ -28,8 +28,8 @@ const FURTHER: f64 = 3e-4;
 const UNSETTLED: f64 = 5.0;
 
 /// The whitened simulation error of a model, stacked, each segment's own directions taken out.
-pub(in crate::diagnose) fn simulation_error(bench: &DiagnosisData, model: &Model) -> Vec<f64> {
-    let mut problem = Problem::whitened_error(bench, model);
+pub(in crate::diagnose) fn simulation_error(data: &DiagnosisData, model: &Model) -> Vec<f64> {
+    let mut problem = Problem::whitened_error(data, model);
     let x = problem.start();
     problem.settle(&x)
 }
@@ -37,15 +37,15 @@ pub(in crate::diagnose) fn simulation_error(bench: &DiagnosisData, model: &Model
 /// The least simulation error of the model with only some of its body and delay free, all else of the linear plant as given: sum of
 /// squares and linear parameters.
 pub(in crate::diagnose) fn simulated_with(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     model: &Model,
     keep: impl Fn(FreeParameter) -> bool,
 ) -> (f64, Vec<f64>) {
     let mut start = model.clone();
-    let kept = |i: usize| keep(bench.form.knobs[i]);
+    let kept = |i: usize| keep(data.form.free_parameters[i]);
     start.refitted.p.iter_mut().enumerate().filter(|(i, _)| !kept(*i)).for_each(|(_, v)| *v = 0.0);
-    let mut problem = Problem::whitened_error(bench, &start);
-    problem.free.knobs.retain(|&i| kept(i));
+    let mut problem = Problem::whitened_error(data, &start);
+    problem.free.free_parameters.retain(|&i| kept(i));
     let (mut x, mut work) = (problem.start(), Workspace::default());
     let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
     let outcome = minimise(&mut problem, &mut x, &settings, &mut work);
@@ -57,24 +57,24 @@ pub(in crate::diagnose) fn simulated_with(
 ///
 /// Modes stay where the search left them, and along a noisy motion they may have taken what a drag owes. Where the fit does not come down
 /// to the noise, one from the linear parameters as given is made beside it: the better counts.
-pub(in crate::diagnose) fn simulated(bench: &DiagnosisData, model: &Model) -> Option<Model> {
-    let found = descended(bench, model);
+pub(in crate::diagnose) fn simulated(data: &DiagnosisData, model: &Model) -> Option<Model> {
+    let found = descended(data, model);
     if found.as_ref().unwrap_or(model).excess_sigma() < UNSETTLED {
         return found;
     }
     let mut given = model.clone();
     given.refitted.p.fill(0.0);
-    let other = descended(bench, &given).filter(|o| o.cost < found.as_ref().map_or(model.cost, |f| f.cost));
+    let other = descended(data, &given).filter(|o| o.cost < found.as_ref().map_or(model.cost, |f| f.cost));
     other.or(found)
 }
 
 /// The fit by simulation from where a model stands.
-fn descended(bench: &DiagnosisData, model: &Model) -> Option<Model> {
+fn descended(data: &DiagnosisData, model: &Model) -> Option<Model> {
     if model.chosen.is_empty() {
         return None;
     }
     let model = &with_late_numbers(model);
-    let mut problem = Problem::whitened_error(bench, model);
+    let mut problem = Problem::whitened_error(data, model);
     let mut x = problem.start();
     let before = size(&problem.settle(&x));
     if !(before.is_finite() && before < RUNS_AWAY * model.cost) {
@@ -112,7 +112,7 @@ fn descended(bench: &DiagnosisData, model: &Model) -> Option<Model> {
         at.iter().zip(own).for_each(|(&i, v)| d[i] = *v);
         directions.push(d);
     }
-    let plant = bench.form.plant(&p);
+    let plant = data.form.plant(&p);
     let refitted = Refitted { p, plant, cost, directions, converged };
     Some(Model { chosen, refitted, cost, ..model.clone() })
 }

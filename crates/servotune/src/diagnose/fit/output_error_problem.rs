@@ -27,7 +27,7 @@ const NUMBER_STEP: f64 = 5e-3;
 
 /// What is moved: places in the linear parameters, then strengths and numbers by effect and place.
 pub(in crate::diagnose) struct Free {
-    pub knobs: Vec<usize>,
+    pub free_parameters: Vec<usize>,
     pub strengths: Vec<[usize; 2]>,
     pub numbers: Vec<[usize; 2]>,
 }
@@ -43,7 +43,7 @@ pub(in crate::diagnose) enum Error<'a> {
 
 /// A fit by simulation.
 pub(in crate::diagnose) struct Problem<'a> {
-    bench: &'a DiagnosisData,
+    data: &'a DiagnosisData,
     model: &'a Model,
     error: Error<'a>,
     pub free: Free,
@@ -72,22 +72,22 @@ impl Problem<'_> {
     /// The model's own numbers.
     pub fn start(&self) -> Vec<f64> {
         let m = self.model;
-        let knobs = self.free.knobs.iter().map(|&i| m.refitted.p[i]);
+        let free_parameters = self.free.free_parameters.iter().map(|&i| m.refitted.p[i]);
         let strengths = self.free.strengths.iter().map(|&[e, i]| m.chosen[e].setting.strengths[i]);
         let numbers = self
             .free
             .numbers
             .iter()
             .map(|&[e, i]| m.chosen[e].setting.law.number(i).map_or(f64::NAN, |n| n.abs().ln()));
-        knobs.chain(strengths).chain(numbers).collect()
+        free_parameters.chain(strengths).chain(numbers).collect()
     }
 
     /// Linear parameters and effects of these numbers.
     pub fn unpack(&self, x: &[f64]) -> (Vec<f64>, Vec<SelectedEffect>) {
         let (mut p, mut chosen) = (self.model.refitted.p.clone(), self.model.chosen.clone());
-        let (knobs, rest) = x.split_at(self.free.knobs.len());
+        let (free_parameters, rest) = x.split_at(self.free.free_parameters.len());
         let (strengths, numbers) = rest.split_at(self.free.strengths.len());
-        self.free.knobs.iter().zip(knobs).for_each(|(&i, v)| p[i] = *v);
+        self.free.free_parameters.iter().zip(free_parameters).for_each(|(&i, v)| p[i] = *v);
         self.free.strengths.iter().zip(strengths).for_each(|(&[e, i], v)| chosen[e].setting.strengths[i] = *v);
         for (&[e, i], v) in self.free.numbers.iter().zip(numbers) {
             let law = &mut chosen[e].setting.law;
@@ -107,7 +107,7 @@ impl Problem<'_> {
     fn lines(&self) -> &[Line] {
         match self.error {
             Error::Whitened => &[],
-            Error::Plain(_) => &self.bench.lines,
+            Error::Plain(_) => &self.data.lines,
         }
     }
 
@@ -117,9 +117,9 @@ impl Problem<'_> {
 
     /// Does something with every record under the model at `x`, in parallel.
     fn each<T: Send>(&self, x: &[f64], of: impl Fn(&Record, &SimulatedModel) -> T + Sync) -> Vec<T> {
-        let bench = self.bench;
+        let data = self.data;
         let (p, chosen) = self.unpack(x);
-        let made = corrected(&bench.form, &p, &chosen, &bench.scene);
+        let made = corrected(&data.form, &p, &chosen, &data.scene);
         let own = chosen.iter().filter(|c| c.setting.facts().per_record);
         let judged = SimulatedModel {
             plant: &made.plant,
@@ -127,7 +127,7 @@ impl Problem<'_> {
             own: own.map(|c| &c.setting.law).collect(),
             lines: self.lines(),
             fit: None,
-            scene: &bench.scene,
+            scene: &data.scene,
         };
         self.records.par_iter().map(|r| of(r, &judged)).collect()
     }
@@ -157,7 +157,7 @@ impl Problem<'_> {
         for s in &self.layout {
             let part = &mut out[s.start..s.start + s.len];
             if let Error::Whitened = self.error {
-                self.bench.whitener.apply(part);
+                self.data.whitener.apply(part);
             }
             part.iter_mut().for_each(|v| *v *= s.weight);
         }
@@ -193,10 +193,10 @@ impl Problem<'_> {
     }
 
     fn step(&self, i: usize, x: f64) -> f64 {
-        let (knobs, strengths) = (self.free.knobs.len(), self.free.strengths.len());
+        let (free_parameters, strengths) = (self.free.free_parameters.len(), self.free.strengths.len());
         match i {
-            i if i < knobs => STEP,
-            i if i < knobs + strengths => STRENGTH_STEP * x.abs().max(1e-12),
+            i if i < free_parameters => STEP,
+            i if i < free_parameters + strengths => STRENGTH_STEP * x.abs().max(1e-12),
             _ => NUMBER_STEP,
         }
     }
@@ -208,7 +208,7 @@ impl Residuals for Problem<'_> {
     }
 
     fn cols(&self) -> usize {
-        self.free.knobs.len() + self.free.strengths.len() + self.free.numbers.len()
+        self.free.free_parameters.len() + self.free.strengths.len() + self.free.numbers.len()
     }
 
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) {
@@ -233,12 +233,12 @@ impl Residuals for Problem<'_> {
     }
 
     fn limit(&self, i: usize) -> Limit {
-        let (knobs, strengths) = (self.free.knobs.len(), self.free.strengths.len());
-        if i < knobs + strengths {
-            let step = if i < knobs { 0.3 } else { f64::INFINITY };
+        let (free_parameters, strengths) = (self.free.free_parameters.len(), self.free.strengths.len());
+        if i < free_parameters + strengths {
+            let step = if i < free_parameters { 0.3 } else { f64::INFINITY };
             return Limit { low: f64::NEG_INFINITY, high: f64::INFINITY, step };
         }
-        let [e, k] = self.free.numbers[i - knobs - strengths];
+        let [e, k] = self.free.numbers[i - free_parameters - strengths];
         let c = &self.model.chosen[e];
         let [low, high] = c.range[k];
         // Along a noisy motion a dry drag needs a length that the noise does not cover; simulated it may be as dry as it is.
@@ -249,28 +249,28 @@ impl Residuals for Problem<'_> {
 
 impl<'a> Problem<'a> {
     /// The whitened error in open loop; modes stay.
-    pub fn whitened_error(bench: &'a DiagnosisData, model: &'a Model) -> Problem<'a> {
+    pub fn whitened_error(data: &'a DiagnosisData, model: &'a Model) -> Problem<'a> {
         let body = |k: &FreeParameter| {
             matches!(k, FreeParameter::Gain | FreeParameter::Stiffness | FreeParameter::Viscous | FreeParameter::Delay)
         };
-        let segments = &bench.stack.segments;
+        let segments = &data.stack.segments;
         let all = segments.iter().enumerate().flat_map(|(i, s)| s.runs.iter().map(move |&r| (i, r)));
         let record =
-            |(i, r): (usize, usize)| Record::of(bench, model, &bench.runs[r], i, 1.0 / segments[i].runs.len() as f64);
+            |(i, r): (usize, usize)| Record::of(data, model, &data.runs[r], i, 1.0 / segments[i].runs.len() as f64);
         Problem {
-            bench,
+            data,
             model,
             error: Error::Whitened,
-            free: Free::of(bench, model, body),
+            free: Free::of(data, model, body),
             layout: segments.clone(),
-            local: bench.fit(model.chosen.clone()).local_basis(),
+            local: data.fit(model.chosen.clone()).local_basis(),
             records: all.map(record).collect(),
         }
     }
 
     /// The plain error on these runs, each with the number of records that it stands for; everything is free.
     pub fn plain_error(
-        bench: &'a DiagnosisData,
+        data: &'a DiagnosisData,
         model: &'a Model,
         law: Option<&'a Law<'a>>,
         runs: &[(&'a Run, usize)],
@@ -278,32 +278,33 @@ impl<'a> Problem<'a> {
         let mut layout: Vec<Segment> = Vec::with_capacity(runs.len());
         for (run, count) in runs {
             let start = layout.last().map_or(0, |s| s.start + s.len);
-            let weight = (*count as f64).sqrt() / bench.levels.sensor_rms.max(f64::MIN_POSITIVE);
+            let weight = (*count as f64).sqrt() / data.levels.sensor_rms.max(f64::MIN_POSITIVE);
             layout.push(Segment { runs: Vec::new(), start, len: run.len(), weight });
         }
         Problem {
-            bench,
+            data,
             model,
             error: Error::Plain(law),
-            free: Free::of(bench, model, |_| true),
+            free: Free::of(data, model, |_| true),
             layout,
             local: NuisanceBasis::default(),
-            records: runs.iter().enumerate().map(|(i, (run, _))| Record::of(bench, model, run, i, 1.0)).collect(),
+            records: runs.iter().enumerate().map(|(i, (run, _))| Record::of(data, model, run, i, 1.0)).collect(),
         }
     }
 }
 
 impl<'a> Record<'a> {
-    fn of(bench: &DiagnosisData, model: &Model, run: &'a Run, segment: usize, share: f64) -> Record<'a> {
+    fn of(data: &DiagnosisData, model: &Model, run: &'a Run, segment: usize, share: f64) -> Record<'a> {
         let asked = !run.rested && !model.chosen.is_empty();
-        let constant = asked.then(|| bench.constant_torque(run, model).ok()).flatten();
+        let constant = asked.then(|| data.constant_torque(run, model).ok()).flatten();
         Record { run, segment, share, start: vec![0.0; run.len()], felt: None, constant }
     }
 }
 
 impl Free {
-    fn of(bench: &DiagnosisData, model: &Model, moves: impl Fn(&FreeParameter) -> bool) -> Free {
-        let knobs: Vec<usize> = (0..bench.form.knobs.len()).filter(|&i| moves(&bench.form.knobs[i])).collect();
+    fn of(data: &DiagnosisData, model: &Model, moves: impl Fn(&FreeParameter) -> bool) -> Free {
+        let free_parameters: Vec<usize> =
+            (0..data.form.free_parameters.len()).filter(|&i| moves(&data.form.free_parameters[i])).collect();
         let (mut strengths, mut numbers) = (Vec::new(), Vec::new());
         for (e, c) in model.chosen.iter().enumerate() {
             let facts = c.setting.facts();
@@ -316,7 +317,7 @@ impl Free {
                 numbers.extend((0..c.continuous.len()).filter(|&i| c.continuous[i]).map(|i| [e, i]));
             }
         }
-        Free { knobs, strengths, numbers }
+        Free { free_parameters, strengths, numbers }
     }
 }
 
@@ -326,15 +327,15 @@ pub(in crate::diagnose) fn places(free: &Free, model: &Model) -> Vec<usize> {
         let c = &model.chosen[e];
         if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() }
     };
-    let knobs = model.refitted.p.len();
+    let free_parameters = model.refitted.p.len();
     let all: usize = (0..model.chosen.len()).map(strengths).sum();
-    let strength = |&[e, i]: &[usize; 2]| knobs + (0..e).map(strengths).sum::<usize>() + i;
+    let strength = |&[e, i]: &[usize; 2]| free_parameters + (0..e).map(strengths).sum::<usize>() + i;
     let moving = |e: usize, to: usize| model.chosen[e].continuous[..to].iter().filter(|c| **c).count();
     let numbers = |&[e, i]: &[usize; 2]| {
         let before: usize = (0..e).map(|e| moving(e, model.chosen[e].continuous.len())).sum();
-        knobs + all + before + moving(e, i)
+        free_parameters + all + before + moving(e, i)
     };
-    free.knobs
+    free.free_parameters
         .iter()
         .copied()
         .chain(free.strengths.iter().map(strength))
@@ -348,12 +349,12 @@ const TOLERANCE: f64 = 1e-5;
 
 /// The model fitted by the plain error from where it stands, on these runs, each with the number of records that it stands for.
 pub(in crate::diagnose) fn descended(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     model: &Model,
     law: Option<&Law>,
     runs: &[(&Run, usize)],
 ) -> Option<Model> {
-    let mut problem = Problem::plain_error(bench, model, law, runs);
+    let mut problem = Problem::plain_error(data, model, law, runs);
     let mut x = problem.start();
     let before = size(&problem.settle(&x));
     if !before.is_finite() {
@@ -366,7 +367,7 @@ pub(in crate::diagnose) fn descended(
     let possible = after < before && chosen.iter().all(|c| c.setting.is_possible(&[]));
     let mut moved = model.clone();
     if possible {
-        (moved.refitted.plant, moved.refitted.p, moved.chosen) = (bench.form.plant(&p), p, chosen);
+        (moved.refitted.plant, moved.refitted.p, moved.chosen) = (data.form.plant(&p), p, chosen);
     }
     Some(moved)
 }

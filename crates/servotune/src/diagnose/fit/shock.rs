@@ -3,7 +3,7 @@
 //! In: what repeats differ by, whitened. Out: the record, the time and the strength of the push. The mean over repeats would carry
 //! it into every fit and their spread would count it as noise, so such a record is kept out of both.
 
-use super::diagnosis_data::{DiagnosisData, without_start};
+use super::diagnosis_data::DiagnosisData;
 use super::fitted_model::refit;
 use super::regressors::raw_columns;
 use super::simulation::{SimulatedModel, error};
@@ -13,6 +13,7 @@ use crate::diagnose::data::repeat_difference::Difference;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::Segment;
 use crate::diagnose::noise::chance::log_tail;
+use crate::diagnose::noise::repeats::without_start;
 use crate::diagnose::rules::{PUSH_BY_AMPLIFIER, PUSH_CHANCE, PUSH_STAYS, PUSH_SUSPECTED, PUSH_WHOLE, PUSHED_RECORDS};
 use crate::lti::{LtiError, Plant};
 use crate::numeric::least_squares::dot;
@@ -55,14 +56,14 @@ struct Answer {
 }
 
 /// The answer to one push, over `n` samples.
-fn answer(bench: &DiagnosisData, sampled: &Sampled, n: usize, width_s: f64) -> Option<Answer> {
-    let t = bench.scene.sample_time_s;
+fn answer(data: &DiagnosisData, sampled: &Sampled, n: usize, width_s: f64) -> Option<Answer> {
+    let t = data.scene.sample_time_s;
     let samples = (0..n).map(|k| Sample { t: k as f64 * t, ..Sample::default() }).collect();
     let motion = Trajectory { samples, unexplained: Vec::new(), repeats: Vec::new() };
-    let raw = raw_columns(&Shock { time_s: 0.0, width_s }.into(), &bench.scene, &motion);
+    let raw = raw_columns(&Shock { time_s: 0.0, width_s }.into(), &data.scene, &motion);
     let mut y = vec![0.0; n];
     sampled.direct.add_response(&raw[0], &mut y);
-    bench.whitener.apply(&mut y);
+    data.whitener.apply(&mut y);
     let mut sum = 0.0;
     let energy = y.iter().map(|v| {
         sum += v * v;
@@ -72,13 +73,13 @@ fn answer(bench: &DiagnosisData, sampled: &Sampled, n: usize, width_s: f64) -> O
 }
 
 /// Answers to pushes of several lengths.
-fn answers(bench: &DiagnosisData, sampled: &Sampled, n: usize) -> Vec<Answer> {
+fn answers(data: &DiagnosisData, sampled: &Sampled, n: usize) -> Vec<Answer> {
     let (low, high) = ((SHORTEST * n as f64).max(FEWEST), LONGEST * n as f64);
     let width = |i: usize| low * (high / low).powf(i as f64 / (WIDTHS - 1) as f64);
     if high <= low {
         return Vec::new();
     }
-    (0..WIDTHS).filter_map(|i| answer(bench, sampled, n, width(i) * bench.scene.sample_time_s)).collect()
+    (0..WIDTHS).filter_map(|i| answer(data, sampled, n, width(i) * data.scene.sample_time_s)).collect()
 }
 
 /// The best push in a whitened series of noise level `sigma`: gain, start (samples), which answer, strength.
@@ -98,14 +99,14 @@ fn best(answers: &[Answer], x: &[f64], sigma: f64) -> Option<(f64, usize, usize,
 }
 
 /// The clearest push among the repeats that is at least suspected, if there is one.
-fn strongest(bench: &DiagnosisData) -> Option<DetectedShock> {
-    let sampled = Sampled::of(&bench.form.given, bench.scene.sample_time_s).ok()?;
-    let longest = bench.repeats.iter().map(|r| r.1.len()).max()?;
-    let answers = answers(bench, &sampled, longest);
-    let points: usize = answers.iter().map(|a| 4 * longest / a.samples.max(4)).sum::<usize>() * bench.repeats.len();
+fn strongest(data: &DiagnosisData) -> Option<DetectedShock> {
+    let sampled = Sampled::of(&data.form.given, data.scene.sample_time_s).ok()?;
+    let longest = data.repeats.iter().map(|r| r.1.len()).max()?;
+    let answers = answers(data, &sampled, longest);
+    let points: usize = answers.iter().map(|a| 4 * longest / a.samples.max(4)).sum::<usize>() * data.repeats.len();
     let mut found: Option<(f64, DetectedShock)> = None;
-    for (run, x) in &bench.repeats {
-        let mates = bench.stack.segments.iter().find(|s| s.runs.contains(run)).map_or(0, |s| s.runs.len());
+    for (run, x) in &data.repeats {
+        let mates = data.stack.segments.iter().find(|s| s.runs.contains(run)).map_or(0, |s| s.runs.len());
         if mates < 2 {
             // Laps of one record: which lap is no business of a record.
             continue;
@@ -122,7 +123,7 @@ fn strongest(bench: &DiagnosisData) -> Option<DetectedShock> {
         if log_p < PUSH_SUSPECTED.ln() && gain > PUSH_WHOLE * excess && found.as_ref().is_none_or(|f| gain > f.0) {
             // A repeat less the mean holds this part of what is its own.
             let part = ((mates - 1) as f64 / mates as f64).sqrt();
-            let t = bench.scene.sample_time_s;
+            let t = data.scene.sample_time_s;
             let answer = &answers[which];
             let error = sigma / (answer.energy[x.len() - from - 1].sqrt() * part);
             let shock = DetectedShock {
@@ -137,24 +138,24 @@ fn strongest(bench: &DiagnosisData) -> Option<DetectedShock> {
         }
     }
     let shock = found?.1;
-    Some(of_two(bench, &answers, shock))
+    Some(of_two(data, &answers, shock))
 }
 
 /// Of two repeats each differs from the mean as much as the other: the bumped one is where the push shows beside the model.
-fn of_two(bench: &DiagnosisData, answers: &[Answer], shock: DetectedShock) -> DetectedShock {
-    let Some(at) = bench.stack.segments.iter().position(|s| s.runs.contains(&shock.run)) else { return shock };
-    let [a, b] = bench.stack.segments[at].runs[..] else { return shock };
-    let t = bench.scene.sample_time_s;
+fn of_two(data: &DiagnosisData, answers: &[Answer], shock: DetectedShock) -> DetectedShock {
+    let Some(at) = data.stack.segments.iter().position(|s| s.runs.contains(&shock.run)) else { return shock };
+    let [a, b] = data.stack.segments[at].runs[..] else { return shock };
+    let t = data.scene.sample_time_s;
     let from = (shock.time_s / t).round() as usize;
     let Some(answer) = answers.iter().min_by_key(|x| x.samples.abs_diff((shock.width_s / t).round() as usize)) else {
         return shock;
     };
-    let fit = bench.fit(vec![]);
+    let fit = data.fit(vec![]);
     let along = |run: usize| -> f64 {
-        let mut stand: Vec<Run> = bench.means.clone();
-        stand[at] = bench.runs[run].clone();
-        let mut e = fit.errors_of(&vec![0.0; bench.form.knobs.len()], &stand).swap_remove(at);
-        bench.whitener.apply(&mut e);
+        let mut stand: Vec<Run> = data.means.clone();
+        stand[at] = data.runs[run].clone();
+        let mut e = fit.errors_of(&vec![0.0; data.form.free_parameters.len()], &stand).swap_remove(at);
+        data.whitener.apply(&mut e);
         // The push alone: the slow answer of a wrong model changes little over its length.
         let n = e.len() - from;
         dot(&answer.whitened[..n], &e[from..]).abs()
@@ -165,20 +166,20 @@ fn of_two(bench: &DiagnosisData, answers: &[Answer], shock: DetectedShock) -> De
 }
 
 /// The clearest push, if it is clear as it stands or once the noise is taken from the other records.
-fn clear(bench: &DiagnosisData, plant: &Plant, spindle_hz: Option<f64>) -> Option<DetectedShock> {
-    let shock = strongest(bench)?;
+fn clear(data: &DiagnosisData, plant: &Plant, spindle_hz: Option<f64>) -> Option<DetectedShock> {
+    let shock = strongest(data)?;
     if shock.log_p < PUSH_CHANCE.ln() {
         return Some(shock);
     }
-    let mut runs = bench.runs.clone();
+    let mut runs = data.runs.clone();
     runs[shock.run].shocked = true;
-    let without = DiagnosisData::new(plant, runs, bench.scene.sample_time_s, spindle_hz).ok()?;
+    let without = DiagnosisData::new(plant, runs, data.scene.sample_time_s, spindle_hz).ok()?;
     let run = &without.runs[shock.run];
     let mates = |s: &Segment| without.runs[s.runs[0]].group == run.group && s.len == run.len();
     let at = without.stack.segments.iter().position(mates).filter(|_| without.levels.from_repeats)?;
     let mut stand: Vec<Run> = without.means.clone();
     stand[at] = run.clone();
-    let p = vec![0.0; without.form.knobs.len()];
+    let p = vec![0.0; without.form.free_parameters.len()];
     let fit = without.fit(vec![]);
     let [own, mean] = [&stand, &without.means].map(|runs| fit.errors_of(&p, runs).swap_remove(at));
     let apart: Vec<f64> = own.iter().zip(&mean).map(|(a, b)| a - b).collect();
@@ -195,59 +196,59 @@ fn clear(bench: &DiagnosisData, plant: &Plant, spindle_hz: Option<f64>) -> Optio
 /// Looked for under the refitted plant: in a loop repeats differ in their commands too, and a wrong plant's answer to that difference
 /// looks like a push.
 pub(in crate::diagnose) fn set_aside(
-    bench: &mut DiagnosisData,
+    data: DiagnosisData,
     given: &Plant,
     spindle_hz: Option<f64>,
     iterations: usize,
-) -> Result<Vec<DetectedShock>, LtiError> {
+) -> Result<(DiagnosisData, Vec<DetectedShock>), LtiError> {
     // Around a plant that was cleared of a law that sticks, repeats differ by when it lets go.
-    let sticks = bench.foretold.as_ref().is_some_and(|law| law.effect().is_hard_nonlinearity());
-    if sticks || bench.repeats.is_empty() || strongest(bench).is_none() {
-        return Ok(Vec::new());
+    let sticks = data.foretold.as_ref().is_some_and(|law| law.effect().is_hard_nonlinearity());
+    if sticks || data.repeats.is_empty() || strongest(&data).is_none() {
+        return Ok((data, Vec::new()));
     }
-    let sample_time_s = bench.scene.sample_time_s;
-    let most = (PUSHED_RECORDS * bench.fit_runs.len() as f64).floor().max(1.0) as usize;
-    let plant = refit(&mut bench.clone(), iterations).refitted.plant;
-    let mut cleaner = DiagnosisData::new(&plant, bench.runs.clone(), sample_time_s, spindle_hz)?;
+    let sample_time_s = data.scene.sample_time_s;
+    let most = (PUSHED_RECORDS * data.fit_runs.len() as f64).floor().max(1.0) as usize;
+    let plant = refit(data.clone(), iterations).1.refitted.plant;
+    let mut cleaner = DiagnosisData::new(&plant, data.runs.clone(), sample_time_s, spindle_hz)?;
     let mut found = Vec::new();
     while let Some(b) = clear(&cleaner, &plant, spindle_hz) {
         if found.len() == most || bent(&cleaner, &b) {
-            return Ok(Vec::new());
+            return Ok((data, Vec::new()));
         }
         let mut runs = cleaner.runs.clone();
         runs[b.run].shocked = true;
         found.push(b);
         cleaner = DiagnosisData::new(&plant, runs, sample_time_s, spindle_hz)?;
     }
-    if !found.is_empty() {
-        *bench = DiagnosisData::new(given, cleaner.runs, sample_time_s, spindle_hz)?;
+    if found.is_empty() {
+        return Ok((data, found));
     }
-    Ok(found)
+    Ok((DiagnosisData::new(given, cleaner.runs, sample_time_s, spindle_hz)?, found))
 }
 
 /// Whether the repeats may differ by what an amplifier does to their commands: at a limit a peak more or less looks like a push.
-fn bent(bench: &DiagnosisData, shock: &DetectedShock) -> bool {
-    let Ok(sampled) = Sampled::of(&bench.form.given, bench.scene.sample_time_s) else { return false };
+fn bent(data: &DiagnosisData, shock: &DetectedShock) -> bool {
+    let Ok(sampled) = Sampled::of(&data.form.given, data.scene.sample_time_s) else { return false };
     let explains = |e: &dyn Effect| {
-        let gain = |law: &AnyLaw| Difference::of(bench, &sampled, law).gain();
-        e.grid(&bench.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
+        let gain = |law: &AnyLaw| Difference::of(data, &sampled, law).gain();
+        e.grid(&data.scene).par_iter().map(gain).reduce(|| 0.0, f64::max)
     };
     library().iter().filter(|e| e.is_hard_nonlinearity()).any(|e| explains(*e) > PUSH_BY_AMPLIFIER * shock.gain)
 }
 
 /// The pushes that the final model does not do without: at a limit or at the end of a slip repeats differ too, and look like pushes.
 pub(in crate::diagnose) fn beyond(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     shocks: Vec<DetectedShock>,
     linear: &SimulatedModel,
     found: &SimulatedModel,
 ) -> Vec<DetectedShock> {
     let stays = |b: &DetectedShock| {
-        let run = &bench.runs[b.run];
+        let run = &data.runs[b.run];
         let left = |model: &SimulatedModel| {
             let mut e = error(model, run, None).ok()?;
-            bench.whitener.apply(&mut e);
-            b.gain(bench, &e)
+            data.whitener.apply(&mut e);
+            b.gain(data, &e)
         };
         left(linear).zip(left(found)).is_none_or(|(before, after)| after > PUSH_STAYS * before)
     };
@@ -256,10 +257,10 @@ pub(in crate::diagnose) fn beyond(
 
 impl DetectedShock {
     /// What the push takes of a whitened error of its record: fall of the sum of squares.
-    fn gain(&self, bench: &DiagnosisData, error: &[f64]) -> Option<f64> {
-        let sampled = Sampled::of(&bench.form.given, bench.scene.sample_time_s).ok()?;
-        let from = (self.time_s / bench.scene.sample_time_s).round() as usize;
-        let answer = answer(bench, &sampled, error.len(), self.width_s)?;
+    fn gain(&self, data: &DiagnosisData, error: &[f64]) -> Option<f64> {
+        let sampled = Sampled::of(&data.form.given, data.scene.sample_time_s).ok()?;
+        let from = (self.time_s / data.scene.sample_time_s).round() as usize;
+        let answer = answer(data, &sampled, error.len(), self.width_s)?;
         let n = error.len().checked_sub(from)?;
         let along = dot(&answer.whitened[..n], &error[from..]);
         let gain = along * along / answer.energy[n.checked_sub(1)?];

@@ -50,7 +50,7 @@ impl SimulatedModel<'_> {
     /// The constant torque on a record that does not begin at rest, where laws feel it (command_unit).
     pub fn constant_torque(&self, run: &Run) -> Result<Option<f64>, LtiError> {
         let asked = self.fit.filter(|_| !run.rested && !self.effects.is_empty());
-        asked.map(|(bench, fit)| bench.constant_torque(run, fit)).transpose()
+        asked.map(|(data, fit)| data.constant_torque(run, fit)).transpose()
     }
 
     /// Position per constant command (position_unit per command_unit), infinite for a free inertia.

@@ -14,7 +14,7 @@ use crate::physics::Entry;
 pub(in crate::diagnose) struct Slopes<'a> {
     fit: &'a Fit<'a>,
     p: &'a [f64],
-    carrier: NominalModel,
+    nominal: NominalModel,
     sampled: Sampled,
     drives: &'a [(&'a Drive, &'a [f64])],
     records: Vec<Answers>,
@@ -26,7 +26,7 @@ struct Answers {
     command: TermAnswers,
     /// To the torques of effects.
     effects: Option<TermAnswers>,
-    /// To spring and damper of the carrier.
+    /// To spring and damper of the nominal.
     body: Option<TermAnswers>,
     /// The answer of all three.
     sum: Vec<f64>,
@@ -35,15 +35,15 @@ struct Answers {
 impl Answers {
     fn of(
         fit: &Fit,
-        carrier: &NominalModel,
+        nominal: &NominalModel,
         sampled: &Sampled,
         drives: &[(&Drive, &[f64])],
         segment: usize,
     ) -> Answers {
         let run = &fit.means[segment];
         let Entering { command, torque, .. } = entering(drives, run, segment, None);
-        let body = (carrier.spring != 0.0 || carrier.damper != 0.0)
-            .then(|| TermAnswers::of(&sampled.direct, &carrier.torque(&fit.trajectories[segment].samples)));
+        let body = (nominal.spring != 0.0 || nominal.damper != 0.0)
+            .then(|| TermAnswers::of(&sampled.direct, &nominal.torque(&fit.trajectories[segment].samples)));
         let command = TermAnswers::of(&sampled.delayed, &command);
         let effects = torque.map(|w| TermAnswers::of(&sampled.direct, &w));
         let mut made = Answers { command, effects, body, sum: Vec::new() };
@@ -68,19 +68,19 @@ impl Answers {
 impl<'a> Slopes<'a> {
     /// At linear parameters `p`, the effects' laws and strengths as given; none where these parameters make no plant.
     pub fn at(fit: &'a Fit<'a>, p: &'a [f64], drives: &'a [(&'a Drive, &'a [f64])]) -> Option<Slopes<'a>> {
-        let carrier = fit.form.carrier(p);
-        let sampled = Sampled::of(&carrier.plant, fit.scene.sample_time_s).ok()?;
-        let records = (0..fit.means.len()).map(|i| Answers::of(fit, &carrier, &sampled, drives, i)).collect();
-        Some(Slopes { fit, p, carrier, sampled, drives, records })
+        let nominal = fit.form.nominal(p);
+        let sampled = Sampled::of(&nominal.plant, fit.scene.sample_time_s).ok()?;
+        let records = (0..fit.means.len()).map(|i| Answers::of(fit, &nominal, &sampled, drives, i)).collect();
+        Some(Slopes { fit, p, nominal, sampled, drives, records })
     }
 
     /// The slope in linear parameter `i`, of every mean run; by a difference over `step` where it does not enter linearly.
-    pub fn knob(&self, i: usize, step: f64) -> Vec<Vec<f64>> {
+    pub fn free_parameter(&self, i: usize, step: f64) -> Vec<Vec<f64>> {
         let mut moved = self.p.to_vec();
         moved[i] += step;
-        let there = self.fit.form.carrier(&moved);
-        let here = &self.carrier;
-        if matches!(self.fit.form.knobs[i], FreeParameter::Stiffness | FreeParameter::Viscous) {
+        let there = self.fit.form.nominal(&moved);
+        let here = &self.nominal;
+        if matches!(self.fit.form.free_parameters[i], FreeParameter::Stiffness | FreeParameter::Viscous) {
             let [spring, damper] = [there.spring - here.spring, there.damper - here.damper].map(|d| -d / step);
             let less = NominalModel { spring, damper, ..there };
             let along = self.fit.trajectories.iter();
@@ -208,7 +208,7 @@ mod tests {
         let plant = paper_machine(MachineClass::Tunable).unwrap();
         let t = nominal_controller().unwrap().sample_time_s;
         let runs = vec![run(0, 1), run(0, 2), run(1, 3), run(1, 4)];
-        let bench = DiagnosisData::new(&plant, runs, t, None).unwrap();
+        let data = DiagnosisData::new(&plant, runs, t, None).unwrap();
         let laws = || {
             vec![
                 chosen(PivotFriction { sliding_length: 2.5, loading: Loading::Dahl }, &[0.012]),
@@ -217,8 +217,8 @@ mod tests {
             ]
         };
         let mut random = Random::new(9);
-        let p: Vec<f64> = bench.form.knobs.iter().map(|_| 0.01 * random.normal()).collect();
-        let fit = bench.fit(laws());
+        let p: Vec<f64> = data.form.free_parameters.iter().map(|_| 0.01 * random.normal()).collect();
+        let fit = data.fit(laws());
         let made: Vec<_> = laws().iter().map(|c| drive(&c.setting.law, fit.scene, fit.trajectories)).collect();
         let settings = laws();
         let drives: Vec<_> = made.iter().zip(&settings).map(|(d, c)| (d, &c.setting.strengths[..])).collect();
@@ -233,19 +233,19 @@ mod tests {
                 }
             }
         };
-        for (i, knob) in bench.form.knobs.iter().enumerate() {
+        for (i, free_parameter) in data.form.free_parameters.iter().enumerate() {
             let moved = |by: f64| {
                 let mut to = p.clone();
                 to[i] += by;
                 fit.errors(&to)
             };
-            close(&slopes.knob(i, 1e-5), &moved(1e-5), &moved(-1e-5), 1e-5, &format!("{knob:?}"));
+            close(&slopes.free_parameter(i, 1e-5), &moved(1e-5), &moved(-1e-5), 1e-5, &format!("{free_parameter:?}"));
         }
         for (e, place) in [(0, 0), (2, 0), (2, 1)] {
             let moved = |by: f64| {
                 let mut all = laws();
                 all[e].setting.strengths[place] += by;
-                bench.fit(all).errors(&p)
+                data.fit(all).errors(&p)
             };
             let step = 1e-4;
             close(&slopes.strength((e, place)), &moved(step), &moved(-step), step, "strength");

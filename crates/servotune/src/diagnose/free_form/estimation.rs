@@ -130,17 +130,17 @@ fn better<'a>(a: Option<Foretelling<'a>>, b: Option<Foretelling<'a>>) -> Option<
 
 /// The best fit of a shape from several linear parameters.
 fn from_each<'a>(
-    bench: &'a DiagnosisData,
+    data: &'a DiagnosisData,
     stretches: &'a Stretches,
     starts: &[Vec<f64>],
     shape: &Shape,
 ) -> Option<Foretelling<'a>> {
-    starts.iter().map(|p| foretold(Trial::new(bench, stretches, p, shape.clone()))).fold(None, better)
+    starts.iter().map(|p| foretold(Trial::new(data, stretches, p, shape.clone()))).fold(None, better)
 }
 
 /// The same with a lag of the amplifier in front, where that foretells clearly better.
 fn with_lag<'a>(found: Foretelling<'a>) -> Foretelling<'a> {
-    let t = found.trial.bench.scene.sample_time_s;
+    let t = found.trial.data.scene.sample_time_s;
     let lagged = foretold(found.trial.clone().lagged(Some(LAG * t)));
     lagged.filter(|l| l.left_out < CURVE_LAG * found.left_out).unwrap_or(found)
 }
@@ -153,7 +153,7 @@ fn doubled(at: &[f64]) -> Vec<f64> {
 }
 
 /// The same curve over more knots, where it foretells clearly better: what acts at one place only falls between few.
-fn finer<'a>(bench: &'a DiagnosisData, ground: &'a Stretches, mut found: Foretelling<'a>) -> Foretelling<'a> {
+fn finer<'a>(data: &'a DiagnosisData, ground: &'a Stretches, mut found: Foretelling<'a>) -> Foretelling<'a> {
     for _ in 0..FINER {
         let Shape::Curve(port, at, value) = &found.trial.shape else { break };
         if *port == CurvePort::SensorOverPosition {
@@ -163,7 +163,7 @@ fn finer<'a>(bench: &'a DiagnosisData, ground: &'a Stretches, mut found: Foretel
         let at = doubled(at);
         let value = at.iter().map(|a| spline.value(*a)).collect();
         let shape = Shape::Curve(*port, at, value);
-        let next = foretold(Trial::new(bench, ground, &found.trial.p, shape).lagged(found.trial.lag_s));
+        let next = foretold(Trial::new(data, ground, &found.trial.p, shape).lagged(found.trial.lag_s));
         match next.filter(|n| n.left_out < CURVE_CLEARLY * found.left_out) {
             Some(next) => found = next,
             None => break,
@@ -173,8 +173,9 @@ fn finer<'a>(bench: &'a DiagnosisData, ground: &'a Stretches, mut found: Foretel
 }
 
 /// Linear parameters with other gains: what is read may be a part of the motion only.
-fn other_gains(bench: &DiagnosisData, starts: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let gain = bench.form.knobs.iter().position(|k| *k == crate::diagnose::data::linear_form::FreeParameter::Gain);
+fn other_gains(data: &DiagnosisData, starts: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let gain =
+        data.form.free_parameters.iter().position(|k| *k == crate::diagnose::data::linear_form::FreeParameter::Gain);
     let moved = |p: &Vec<f64>, by: f64| {
         let mut p = p.clone();
         if let Some(i) = gain {
@@ -186,7 +187,7 @@ fn other_gains(bench: &DiagnosisData, starts: &[Vec<f64>]) -> Vec<Vec<f64>> {
 }
 
 /// Readings that fold or end at limits, each fitted from several starts.
-fn readings<'a>(bench: &'a DiagnosisData, stretches: &'a Stretches, starts: &[Vec<f64>]) -> Vec<Foretelling<'a>> {
+fn readings<'a>(data: &'a DiagnosisData, stretches: &'a Stretches, starts: &[Vec<f64>]) -> Vec<Foretelling<'a>> {
     let mut all: Vec<f64> = stretches.runs.iter().flat_map(|r| r.position.iter().copied()).collect();
     all.sort_by(f64::total_cmp);
     let at = |share: f64| all.get((share * all.len() as f64) as usize).copied().unwrap_or(0.0);
@@ -196,28 +197,28 @@ fn readings<'a>(bench: &'a DiagnosisData, stretches: &'a Stretches, starts: &[Ve
     let [below, above] = [low - least < edge, most - high < edge];
     let fitted = |starts: &[Vec<f64>], reading: Shape| {
         // A lag in front changes the whole motion: it is no afterthought here.
-        let lags = [None, Some(LAG * bench.scene.sample_time_s)];
+        let lags = [None, Some(LAG * data.scene.sample_time_s)];
         let all = starts.iter().flat_map(|p| lags.map(|lag_s| (p, lag_s)));
         let one = |(p, lag_s): (&Vec<f64>, Option<f64>)| {
-            foretold(Trial::new(bench, stretches, p, Shape::Linear).read_by(reading.clone()).lagged(lag_s))
+            foretold(Trial::new(data, stretches, p, Shape::Linear).read_by(reading.clone()).lagged(lag_s))
         };
         all.map(one).fold(None, better)
     };
-    let fold = below.then(|| fitted(&other_gains(bench, starts), Shape::Fold([low, low])));
+    let fold = below.then(|| fitted(&other_gains(data, starts), Shape::Fold([low, low])));
     let limits = (below || above).then(|| fitted(starts, Shape::Limits([low, high])));
     fold.into_iter().chain(limits).flatten().collect()
 }
 
 /// The sensor's curve: from a straight one, and from the readings that fold or end.
 fn sensor<'a>(
-    bench: &'a DiagnosisData,
+    data: &'a DiagnosisData,
     stretches: &'a Stretches,
     starts: &[Vec<f64>],
     readings: &[Foretelling<'a>],
 ) -> Option<Foretelling<'a>> {
     let port = CurvePort::SensorOverPosition;
-    let straight = Shape::knots(bench, port).and_then(|at| from_each(bench, stretches, starts, &Shape::idle(port, at)));
-    let top = bench.scene.centre + 0.5 * range(bench);
+    let straight = Shape::knots(data, port).and_then(|at| from_each(data, stretches, starts, &Shape::idle(port, at)));
+    let top = data.scene.centre + 0.5 * range(data);
     let bent = readings.iter().filter_map(|reading| {
         let (at, value): (Vec<f64>, Vec<f64>) = match reading.trial.reading {
             Shape::Fold([lowest, fold]) => {
@@ -234,34 +235,34 @@ fn sensor<'a>(
             _ => return None,
         };
         let shape = Shape::Curve(port, at, value);
-        foretold(Trial::new(bench, stretches, &reading.trial.p, shape).lagged(reading.trial.lag_s))
+        foretold(Trial::new(data, stretches, &reading.trial.p, shape).lagged(reading.trial.lag_s))
     });
     bent.fold(straight, |best, b| better(best, Some(b)))
 }
 
-fn range(bench: &DiagnosisData) -> f64 {
-    let all = bench.means.iter().flat_map(|r| &r.position);
+fn range(data: &DiagnosisData) -> f64 {
+    let all = data.means.iter().flat_map(|r| &r.position);
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     high - low
 }
 
 /// Stretches for the linear plant and most ports, and for the sensor's curve.
-pub(in crate::diagnose) fn grounds(bench: &DiagnosisData) -> [Stretches; 2] {
-    let plain = Stretches::of(bench);
+pub(in crate::diagnose) fn grounds(data: &DiagnosisData) -> [Stretches; 2] {
+    let plain = Stretches::of(data);
     let one_place = plain.standing_alike();
     [plain, one_place]
 }
 
 /// Estimates the curve at every port and takes the best; `curves` are those of the balance of torques.
 pub(in crate::diagnose) fn estimated<'a>(
-    bench: &'a DiagnosisData,
+    data: &'a DiagnosisData,
     [ground, one_place]: [&'a Stretches; 2],
     starts: &[Vec<f64>],
     curves: &[Curved],
     progress: &mut dyn FnMut(&str),
 ) -> Option<Estimated<'a>> {
     progress("a curve without a name: the linear plant by simulation");
-    let linear = with_lag(from_each(bench, ground, starts, &Shape::Linear)?);
+    let linear = with_lag(from_each(data, ground, starts, &Shape::Linear)?);
     // What acts may have bent the refit: the given plant is another start.
     let mut from = vec![linear.trial.p.clone()];
     from.extend(starts.first().filter(|p| **p != from[0]).cloned());
@@ -280,17 +281,17 @@ pub(in crate::diagnose) fn estimated<'a>(
         if share > BALANCES_NOT && curves.iter().any(|c| c.share < BALANCES) {
             continue;
         }
-        let idle = Shape::knots(bench, port).filter(|_| share > BALANCES);
-        let idle = idle.and_then(|at| from_each(bench, ground, &from, &Shape::idle(port, at)));
-        let balanced = balanced.and_then(|c| from_balance(bench, ground, c, &from));
+        let idle = Shape::knots(data, port).filter(|_| share > BALANCES);
+        let idle = idle.and_then(|at| from_each(data, ground, &from, &Shape::idle(port, at)));
+        let balanced = balanced.and_then(|c| from_balance(data, ground, c, &from));
         taken(port, better(idle, balanced));
     }
     progress("a curve without a name: sensor over position");
-    let read = readings(bench, one_place, starts);
-    taken(CurvePort::SensorOverPosition, sensor(bench, one_place, &from, &read));
+    let read = readings(data, one_place, starts);
+    taken(CurvePort::SensorOverPosition, sensor(data, one_place, &from, &read));
     let mut curve = best?;
     let Shape::Curve(port, ..) = curve.trial.shape else { return None };
-    curve = finer(bench, ground, curve);
+    curve = finer(data, ground, curve);
     if curve.trial.lag_s.is_none() {
         curve = with_lag(curve);
     }
@@ -315,15 +316,15 @@ pub(in crate::diagnose) fn estimated<'a>(
 
 /// The fit of a shape from the curve of a balance, with the plant beside which it simulates best: its own, or one of some others.
 fn from_balance<'a>(
-    bench: &'a DiagnosisData,
+    data: &'a DiagnosisData,
     ground: &'a Stretches,
     curve: &Curved,
     others: &[Vec<f64>],
 ) -> Option<Foretelling<'a>> {
-    let own = bench.form.numbers_of(&curve.plant);
+    let own = data.form.numbers_of(&curve.plant);
     let beside = |p: &Vec<f64>| {
-        let shape = curve.beside(&bench.form.plant(p))?;
-        let mut trial = Trial::new(bench, ground, p, shape);
+        let shape = curve.beside(&data.form.plant(p))?;
+        let mut trial = Trial::new(data, ground, p, shape);
         let left = trial.left();
         left.is_finite().then_some((left, trial))
     };
@@ -333,15 +334,15 @@ fn from_balance<'a>(
 
 /// The best curve at another port beside a reading that folds or ends at limits.
 fn beside<'a>(reading: &Foretelling<'a>, one_place: &'a Stretches) -> Option<(Foretelling<'a>, Vec<(CurvePort, f64)>)> {
-    let bench = reading.trial.bench;
+    let data = reading.trial.data;
     let (mut best, mut tried) = (None, Vec::new());
     for port in CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition) {
-        let Some(at) = Shape::knots(bench, port) else { continue };
+        let Some(at) = Shape::knots(data, port) else { continue };
         // What is read is not where the arm is: positions and speeds may be of either sign.
         let at = if port == CurvePort::AmplifierOverCommand { at } else { both_sides(port, &at) };
         let from = reading.trial.clone();
         let trial =
-            Trial::new(bench, one_place, &from.p, Shape::idle(port, at)).read_by(from.reading).lagged(from.lag_s);
+            Trial::new(data, one_place, &from.p, Shape::idle(port, at)).read_by(from.reading).lagged(from.lag_s);
         let found = foretold(trial);
         tried.extend(found.as_ref().map(|f| (port, f.left_out)));
         best = better(best, found);
@@ -359,5 +360,5 @@ fn in_plain_form(f: &Foretelling) -> Option<Plain> {
     let Shape::Curve(port, at, value) = &f.trial.shape else { return None };
     let from = f.trial.shape_from();
     let own = f.covariance.view((from, from), (at.len(), at.len())).into_owned();
-    Some(plain(f.trial.bench, *port, at, value, &own, &f.trial.p))
+    Some(plain(f.trial.data, *port, at, value, &own, &f.trial.p))
 }

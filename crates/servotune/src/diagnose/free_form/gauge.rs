@@ -33,13 +33,13 @@ const LEFT: f64 = 0.02;
 const TAIL: f64 = 0.4;
 
 /// How many samples lie near each knot; even for a sensor, behind whose curve nobody saw the arm, and for a loading curve, whose ways nest.
-fn weights(bench: &DiagnosisData, port: CurvePort, at: &[f64]) -> Vec<f64> {
+fn weights(data: &DiagnosisData, port: CurvePort, at: &[f64]) -> Vec<f64> {
     let mut count = vec![0.0; at.len()];
     if matches!(port, CurvePort::SensorOverPosition | CurvePort::TorqueOverLoading) {
         count.fill(1.0);
     } else {
-        let arm = if port == CurvePort::AmplifierOverCommand { 1.0 } else { bench.scene.arm_over_record() };
-        for s in bench.trajectories.iter().flat_map(|t| &t.samples) {
+        let arm = if port == CurvePort::AmplifierOverCommand { 1.0 } else { data.scene.arm_over_record() };
+        for s in data.trajectories.iter().flat_map(|t| &t.samples) {
             let a = port.argument(&s.scaled(arm));
             let i = at.partition_point(|x| *x < a).clamp(1, at.len() - 1);
             count[if a - at[i - 1] < at[i] - a { i - 1 } else { i }] += 1.0;
@@ -50,10 +50,11 @@ fn weights(bench: &DiagnosisData, port: CurvePort, at: &[f64]) -> Vec<f64> {
     count.iter().map(|c| (c + LEAST * mean) / all).collect()
 }
 
-/// What a curve's line may move in the plant: knob and its change per slope.
-fn knob(form: &LinearForm, p: &[f64], port: CurvePort) -> Option<(usize, f64)> {
+/// What a curve's line may move in the plant: free_parameter and its change per slope.
+fn free_parameter(form: &LinearForm, p: &[f64], port: CurvePort) -> Option<(usize, f64)> {
     let (b, k, _) = body_numbers(&form.given.body);
-    let ratio = form.knobs.iter().zip(p).find(|(k, _)| **k == FreeParameter::Gain).map_or(1.0, |(_, v)| v.exp());
+    let ratio =
+        form.free_parameters.iter().zip(p).find(|(k, _)| **k == FreeParameter::Gain).map_or(1.0, |(_, v)| v.exp());
     let gain = b * form.given.resonance_gain * ratio;
     let (wanted, unit) = match port {
         CurvePort::TorqueOverPosition => (FreeParameter::Stiffness, k),
@@ -62,7 +63,7 @@ fn knob(form: &LinearForm, p: &[f64], port: CurvePort) -> Option<(usize, f64)> {
         CurvePort::TorqueOverVelocity => (FreeParameter::Viscous, rate_of(&form.given.body)),
         _ => return None,
     };
-    form.knobs.iter().position(|k| *k == wanted).map(|i| (i, -gain / unit))
+    form.free_parameters.iter().position(|k| *k == wanted).map(|i| (i, -gain / unit))
 }
 
 /// The slope of least squares as weights of the values.
@@ -83,27 +84,27 @@ fn value_of(at: &[f64], x: f64) -> DVector<f64> {
 
 /// The plain form.
 pub(in crate::diagnose) fn plain(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     port: CurvePort,
     at: &[f64],
     value: &[f64],
     covariance: &DMatrix<f64>,
     p: &[f64],
 ) -> Plain {
-    let (n, weight) = (at.len(), weights(bench, port, at));
+    let (n, weight) = (at.len(), weights(data, port, at));
     let theta = DVector::from_column_slice(value);
     let mean = DVector::from_column_slice(&weight);
     let ones = DVector::from_element(n, 1.0);
     let places = DVector::from_column_slice(at);
     let mut out = Plain { port, at: at.to_vec(), value: vec![], spread: vec![], weight: weight.clone(), p: p.to_vec() };
-    let gain = bench.form.knobs.iter().position(|k| *k == FreeParameter::Gain);
+    let gain = data.form.free_parameters.iter().position(|k| *k == FreeParameter::Gain);
     let slope = slope_of(at, &weight);
     let mut map = DMatrix::identity(n, n);
     let plain = match port {
         CurvePort::TorqueOverPosition | CurvePort::TorqueOverVelocity => {
-            if let Some((i, by)) = knob(&bench.form, p, port) {
+            if let Some((i, by)) = free_parameter(&data.form, p, port) {
                 let full = by * slope.dot(&theta);
-                let least = if port == CurvePort::TorqueOverPosition { LEFT - 1.0 } else { least_damping(bench) };
+                let least = if port == CurvePort::TorqueOverPosition { LEFT - 1.0 } else { least_damping(data) };
                 let moved = full.max(least - p[i]);
                 out.p[i] += moved;
                 let share = if full == 0.0 { 1.0 } else { moved / full };
@@ -117,7 +118,7 @@ pub(in crate::diagnose) fn plain(
             &map * &theta
         }
         CurvePort::TorqueOverLoading => {
-            give_spring(&mut out, &mut map, bench, (at, &theta));
+            give_spring(&mut out, &mut map, data, (at, &theta));
             let first = map.row(0).into_owned();
             map.row_iter_mut().for_each(|mut row| row -= &first);
             &map * &theta
@@ -152,13 +153,13 @@ pub(in crate::diagnose) fn plain(
 }
 
 /// What of a loading curve still rises behind all turns is a spring, and goes to the plant.
-fn give_spring(out: &mut Plain, map: &mut DMatrix<f64>, bench: &DiagnosisData, (at, theta): (&[f64], &DVector<f64>)) {
+fn give_spring(out: &mut Plain, map: &mut DMatrix<f64>, data: &DiagnosisData, (at, theta): (&[f64], &DVector<f64>)) {
     let last = at.last().copied().unwrap_or(0.0);
     let behind: Vec<f64> = at.iter().map(|a| f64::from(u8::from(*a > TAIL * last))).collect();
     let count: f64 = behind.iter().sum();
     let behind: Vec<f64> = behind.iter().map(|w| w / count).collect();
     let slope = slope_of(at, &behind);
-    if let Some((i, by)) = knob(&bench.form, &out.p, CurvePort::TorqueOverLoading) {
+    if let Some((i, by)) = free_parameter(&data.form, &out.p, CurvePort::TorqueOverLoading) {
         let full = by * slope.dot(theta);
         let moved = full.max(LEFT - 1.0 - out.p[i]);
         out.p[i] += moved;
@@ -167,10 +168,10 @@ fn give_spring(out: &mut Plain, map: &mut DMatrix<f64>, bench: &DiagnosisData, (
     }
 }
 
-/// Least value of the damping's knob.
-fn least_damping(bench: &DiagnosisData) -> f64 {
-    let (_, _, c) = body_numbers(&bench.form.given.body);
-    -c / rate_of(&bench.form.given.body) + LEFT * f64::from(u8::from(c > 0.0)) * c / rate_of(&bench.form.given.body)
+/// Least value of the damping's free_parameter.
+fn least_damping(data: &DiagnosisData) -> f64 {
+    let (_, _, c) = body_numbers(&data.form.given.body);
+    -c / rate_of(&data.form.given.body) + LEFT * f64::from(u8::from(c > 0.0)) * c / rate_of(&data.form.given.body)
 }
 
 /// Gives a curve's factor to the plant's gain.

@@ -74,22 +74,22 @@ impl Shape {
     }
 
     /// Knots of a curve at a port over the range of the records; none where nothing moves there, or few knots tell nothing.
-    pub fn knots(bench: &DiagnosisData, port: CurvePort) -> Option<Vec<f64>> {
+    pub fn knots(data: &DiagnosisData, port: CurvePort) -> Option<Vec<f64>> {
         if port == CurvePort::TorqueOverTime {
             return None;
         }
         let arm = match port {
             CurvePort::AmplifierOverCommand | CurvePort::SensorOverPosition => 1.0,
-            _ => bench.scene.arm_over_record(),
+            _ => data.scene.arm_over_record(),
         };
         let mut all: Vec<f64> =
-            bench.trajectories.iter().flat_map(|t| &t.samples).map(|s| port.argument(&s.scaled(arm))).collect();
+            data.trajectories.iter().flat_map(|t| &t.samples).map(|s| port.argument(&s.scaled(arm))).collect();
         all.retain(|v| v.is_finite());
         all.sort_by(f64::total_cmp);
         let off = (BEYOND * all.len() as f64) as usize;
         let [low, high] = [*all.get(off)?, *all.get(all.len().checked_sub(off + 1)?)?];
         if port == CurvePort::TorqueOverLoading {
-            let records = bench.trajectories.iter().map(|t| t.samples.iter().map(|s| arm * s.x).collect::<Vec<_>>());
+            let records = data.trajectories.iter().map(|t| t.samples.iter().map(|s| arm * s.x).collect::<Vec<_>>());
             return Shape::loading_knots(records, KNOTS);
         }
         Some(Shape::spread(port, low, high)).filter(|_| low < high)

@@ -47,9 +47,9 @@ fn piece(run: &Run, from: usize, to: usize, sample_time_s: f64) -> Run {
 
 impl Stretches {
     /// Of the mean runs of the diagnosis data.
-    pub fn of(bench: &DiagnosisData) -> Stretches {
-        let total: usize = bench.means.iter().map(Run::len).sum();
-        let runs = if total <= MOST { bench.means.clone() } else { spread(&bench.means, total, bench) };
+    pub fn of(data: &DiagnosisData) -> Stretches {
+        let total: usize = data.means.iter().map(Run::len).sum();
+        let runs = if total <= MOST { data.means.clone() } else { spread(&data.means, total, data) };
         let whole = runs.len() >= MANY;
         let mut blocks = Vec::new();
         for (i, run) in runs.iter().enumerate() {
@@ -79,7 +79,7 @@ impl Stretches {
 }
 
 /// Evenly spread pieces of long records.
-fn spread(means: &[Run], total: usize, bench: &DiagnosisData) -> Vec<Run> {
+fn spread(means: &[Run], total: usize, data: &DiagnosisData) -> Vec<Run> {
     let share = MOST as f64 / total as f64;
     let mut all = Vec::new();
     for run in means {
@@ -89,7 +89,7 @@ fn spread(means: &[Run], total: usize, bench: &DiagnosisData) -> Vec<Run> {
         let gaps = pieces.saturating_sub(1).max(1);
         for k in 0..pieces {
             let from = (run.len() - len) * k / gaps;
-            all.push(piece(run, from, from + len, bench.scene.sample_time_s));
+            all.push(piece(run, from, from + len, data.scene.sample_time_s));
         }
     }
     all

@@ -41,12 +41,12 @@ const LOOKED: usize = 64;
 /// A fit under way.
 #[derive(Clone)]
 pub(in crate::diagnose) struct Trial<'a> {
-    pub bench: &'a DiagnosisData,
+    pub data: &'a DiagnosisData,
     pub stretches: &'a Stretches,
     /// All linear parameters; those that are not free stay as they stand here.
     pub p: Vec<f64>,
     /// Those that are free.
-    pub knobs: Vec<usize>,
+    pub free_parameters: Vec<usize>,
     /// Time constant of the amplifier's lag (s), where there is one.
     pub lag_s: Option<f64>,
     pub shape: Shape,
@@ -71,7 +71,7 @@ struct Made {
 }
 
 /// Linear parameters that the shape leaves free: what it can hold itself stays.
-fn knobs(bench: &DiagnosisData, shape: &Shape) -> Vec<usize> {
+fn free_parameters(data: &DiagnosisData, shape: &Shape) -> Vec<usize> {
     let held = match shape {
         Shape::Curve(CurvePort::TorqueOverPosition | CurvePort::TorqueOverLoading, ..) => {
             Some(FreeParameter::Stiffness)
@@ -81,22 +81,22 @@ fn knobs(bench: &DiagnosisData, shape: &Shape) -> Vec<usize> {
         Shape::Curve(..) => Some(FreeParameter::Gain),
         _ => None,
     };
-    let few = bench.form.knobs.len() <= FEW;
+    let few = data.form.free_parameters.len() <= FEW;
     let body = |k: FreeParameter| {
         matches!(k, FreeParameter::Gain | FreeParameter::Stiffness | FreeParameter::Viscous | FreeParameter::Delay)
     };
-    let all = bench.form.knobs.iter().enumerate();
+    let all = data.form.free_parameters.iter().enumerate();
     all.filter(|(_, k)| Some(**k) != held && (few || body(**k))).map(|(i, _)| i).collect()
 }
 
 impl<'a> Trial<'a> {
     /// A fit from these linear parameters.
-    pub fn new(bench: &'a DiagnosisData, stretches: &'a Stretches, p: &[f64], shape: Shape) -> Trial<'a> {
+    pub fn new(data: &'a DiagnosisData, stretches: &'a Stretches, p: &[f64], shape: Shape) -> Trial<'a> {
         Trial {
-            bench,
+            data,
             stretches,
             p: p.to_vec(),
-            knobs: knobs(bench, &shape),
+            free_parameters: free_parameters(data, &shape),
             lag_s: None,
             shape,
             reading: Shape::Linear,
@@ -125,13 +125,13 @@ impl<'a> Trial<'a> {
 
     /// All numbers that are fitted: linear parameters, lag, reading, shape.
     pub fn numbers(&self) -> Vec<f64> {
-        let linear = self.knobs.iter().map(|&i| self.p[i]);
+        let linear = self.free_parameters.iter().map(|&i| self.p[i]);
         linear.chain(self.lag_s.map(f64::ln)).chain(self.reading.numbers()).chain(self.shape.numbers()).collect()
     }
 
     /// Where the reading's numbers begin.
     pub fn reading_from(&self) -> usize {
-        self.knobs.len() + usize::from(self.lag_s.is_some())
+        self.free_parameters.len() + usize::from(self.lag_s.is_some())
     }
 
     /// Where the shape's numbers begin.
@@ -145,27 +145,27 @@ impl<'a> Trial<'a> {
     }
 
     fn take(&mut self, x: &[f64]) {
-        for (&i, v) in self.knobs.iter().zip(x) {
+        for (&i, v) in self.free_parameters.iter().zip(x) {
             self.p[i] = *v;
         }
-        self.lag_s = self.lag_s.map(|_| x[self.knobs.len()].exp());
+        self.lag_s = self.lag_s.map(|_| x[self.free_parameters.len()].exp());
         self.reading = self.reading.with(&x[self.reading_from()..]);
         self.shape = self.shape.with(&x[self.shape_from()..]);
     }
 
     fn made(&self, x: &[f64]) -> Made {
         let mut p = self.p.clone();
-        self.knobs.iter().zip(x).for_each(|(&i, v)| p[i] = *v);
-        let lag_s = self.lag_s.map(|_| x[self.knobs.len()].exp());
+        self.free_parameters.iter().zip(x).for_each(|(&i, v)| p[i] = *v);
+        let lag_s = self.lag_s.map(|_| x[self.free_parameters.len()].exp());
         let (reading, shape) = (self.reading.with(&x[self.reading_from()..]), self.shape.with(&x[self.shape_from()..]));
-        Made { plant: self.bench.form.plant(&p), effects: effects(lag_s, &shape, &reading) }
+        Made { plant: self.data.form.plant(&p), effects: effects(lag_s, &shape, &reading) }
     }
 
     /// Does something with every stretch under the model at `x`, in parallel.
     fn each<T: Send>(&self, x: &[f64], of: impl Fn(usize, &Run, &SimulatedModel) -> T + Sync) -> Vec<T> {
         let made = self.made(x);
         let effects = || made.effects.iter().collect();
-        let scene = &self.bench.scene;
+        let scene = &self.data.scene;
         let one = |(i, run): (usize, &Run)| {
             let judged =
                 SimulatedModel { plant: &made.plant, effects: effects(), own: vec![], lines: &[], fit: None, scene };
@@ -176,11 +176,11 @@ impl<'a> Trial<'a> {
 
     /// Errors of all stretches, one after the other, in the measure of the fit.
     fn measured(&self, errors: Vec<Vec<f64>>) -> Vec<f64> {
-        let runs_away = matches!(self.bench.form.given.body, Body::FreeInertia { .. });
+        let runs_away = matches!(self.data.form.given.body, Body::FreeInertia { .. });
         let mut out = Vec::with_capacity(self.stretches.total());
         for mut e in errors {
             if runs_away {
-                self.bench.whitener.apply(&mut e);
+                self.data.whitener.apply(&mut e);
             }
             out.extend(e);
         }
@@ -291,7 +291,7 @@ impl<'a> Trial<'a> {
     }
 
     fn step(&self, i: usize) -> f64 {
-        let s = &self.bench.scene;
+        let s = &self.data.scene;
         if i < self.reading_from() {
             return STEP;
         }

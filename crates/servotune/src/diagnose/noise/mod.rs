@@ -2,5 +2,6 @@
 
 pub(super) mod chance;
 pub(super) mod lines;
+pub(super) mod repeats;
 pub(super) mod torque_noise;
 pub(super) mod whitening;

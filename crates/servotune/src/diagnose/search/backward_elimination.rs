@@ -16,13 +16,13 @@ use crate::diagnose::rules::{
 use crate::physics::{Effect, library};
 
 /// Takes effects out again that later ones made needless.
-pub(super) fn prune(bench: &DiagnosisData, model: &mut Model, before: f64, iterations: usize) {
-    let price = (bench.stack.total as f64).ln();
+pub(super) fn prune(data: &DiagnosisData, model: &mut Model, before: f64, iterations: usize) {
+    let price = (data.stack.total as f64).ln();
     while model.chosen.len() > 1 {
         let without = |i: usize| {
             let mut chosen = model.chosen.clone();
             chosen.remove(i);
-            fitted(bench, chosen, &model.refitted.p, iterations)
+            fitted(data, chosen, &model.refitted.p, iterations)
         };
         let all: Vec<Model> = (0..model.chosen.len()).map(without).collect();
         let Some((i, best)) = all.into_iter().enumerate().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost)) else { return };
@@ -38,7 +38,7 @@ pub(super) fn prune(bench: &DiagnosisData, model: &mut Model, before: f64, itera
 /// Takes out what stands beside a drag only because the drag's column, made along a noisy motion, falls short of the drag: simulated,
 /// the model does without.
 pub(super) fn spare(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     model: &mut Model,
     by_simulation: &mut Model,
     rivals: &mut Vec<Vec<Rival>>,
@@ -49,14 +49,14 @@ pub(super) fn spare(
     let drag = |c: &SelectedEffect| c.effect().is_drag();
     let most = model.chosen.iter().map(|c| gain_of(steps, c)).fold(0.0, f64::max);
     let small = |c: &SelectedEffect| gain_of(steps, c) < SMALL_BESIDE_DRAG * most;
-    let price = (bench.stack.total as f64).ln();
+    let price = (data.stack.total as f64).ln();
     while model.chosen.len() > 1 && model.chosen.iter().any(drag) {
         let mut without = Vec::new();
         for at in (0..model.chosen.len()).filter(|&i| !drag(&model.chosen[i]) && small(&model.chosen[i])) {
             let mut chosen = model.chosen.clone();
             chosen.remove(at);
-            let less = fitted(bench, chosen, &model.refitted.p, iterations);
-            if let Some(s) = simulated(bench, &less) {
+            let less = fitted(data, chosen, &model.refitted.p, iterations);
+            if let Some(s) = simulated(data, &less) {
                 without.push((at, less, s));
             }
         }
@@ -82,14 +82,14 @@ fn form(c: &SelectedEffect) -> (&'static str, usize, usize) {
 /// Laws that may stand in the place of effect `at`, simpler forms of its own first: those that came near it in its own step, and where
 /// other laws stand beside it than did then, those it is confused with that explain as much beside these.
 fn others(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     model: &Model,
     at: usize,
     step: &Step,
     gain: f64,
     iterations: usize,
 ) -> Vec<SelectedEffect> {
-    let near = if bench.levels.from_repeats { RIVAL_TRIED } else { RIVAL_TRIED_WITHOUT_REPEATS };
+    let near = if data.noise_known { RIVAL_TRIED } else { RIVAL_TRIED_WITHOUT_REPEATS };
     let own = &model.chosen[at];
     let facts = own.setting.facts();
     let in_place = |c: &SelectedEffect| SelectedEffect { step: own.step, ..c.clone() };
@@ -108,8 +108,8 @@ fn others(
         let alike: Vec<&'static dyn Effect> = library().iter().copied().filter(alike).collect();
         let mut chosen = model.chosen.clone();
         chosen.remove(at);
-        let without = fitted(bench, chosen, &model.refitted.p, iterations);
-        let seen = scan_at(bench, &alike, &without, &without.refitted.p);
+        let without = fitted(data, chosen, &model.refitted.p, iterations);
+        let seen = scan_at(data, &alike, &without, &without.refitted.p);
         let close = seen.iter().filter(|c| c.gain >= near * (without.cost - model.cost));
         let possible = close.filter(|c| c.setting.is_possible(&[]));
         let mut afresh: Vec<(f64, SelectedEffect)> = possible.map(|c| (c.gain, c.chosen(own.step))).collect();
@@ -131,20 +131,20 @@ fn others(
 }
 
 /// Tries the rivals of each effect in its place, everything else refitted, and takes them where they fit better now.
-pub(super) fn exchange(bench: &DiagnosisData, model: &mut Model, steps: &[Step], iterations: usize) -> Vec<Vec<Rival>> {
+pub(super) fn exchange(data: &DiagnosisData, model: &mut Model, steps: &[Step], iterations: usize) -> Vec<Vec<Rival>> {
     let mut all = Vec::new();
     for at in 0..model.chosen.len() {
         let step = &steps[model.chosen[at].step];
         let gain = gain_of(steps, &model.chosen[at]);
         let mut found: Vec<Rival> = Vec::new();
-        for law in others(bench, model, at, step, gain, iterations) {
+        for law in others(data, model, at, step, gain, iterations) {
             let (facts, own) = (law.setting.facts(), model.chosen[at].setting.facts().name);
-            let each = facts.per_record || begun(bench, &law.setting.law) > 0;
+            let each = facts.per_record || begun(data, &law.setting.law) > 0;
             let mut chosen = model.chosen.clone();
             chosen[at] = law;
-            let other = fitted_from_both(bench, &chosen, &model.refitted.p, iterations);
+            let other = fitted_from_both(data, &chosen, &model.refitted.p, iterations);
             let dearer = if each { OWN_OF_RECORD * gain } else { 0.0 };
-            let dearer = dearer + more(bench, &other.chosen[at], &model.chosen[at]);
+            let dearer = dearer + more(data, &other.chosen[at], &model.chosen[at]);
             let better = other.cost + RIVAL_BETTER + dearer < model.cost && other.possible();
             // Another form of the same law is no rival.
             match (better, facts.name == own) {

@@ -21,14 +21,14 @@ const SEED: u64 = 0x5ca1_ab1e;
 
 /// Runs the search on `draws` records without physics; `limit` is the chance below which a candidate counts as seen.
 pub(in crate::diagnose) fn bootstrap(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     library: &[&'static dyn Effect],
     baseline: &Model,
     iterations: usize,
     limit: f64,
     draws: usize,
 ) -> Bootstrap {
-    let observed_log_p = strongest(bench, library, baseline);
+    let observed_log_p = strongest(data, library, baseline);
     // Simulated by the refitted plant itself: what it answers along the recorded motion holds what is wrong with that motion.
     let refitted = &baseline.refitted.plant;
     let model = SimulatedModel {
@@ -37,22 +37,22 @@ pub(in crate::diagnose) fn bootstrap(
         own: Vec::new(),
         lines: &[],
         fit: None,
-        scene: &bench.scene,
+        scene: &data.scene,
     };
-    let along = bench.fit(vec![]).errors(&baseline.refitted.p);
+    let along = data.fit(vec![]).errors(&baseline.refitted.p);
     let simulated = |(run, along): (&Run, Vec<f64>)| error(&model, run, None).unwrap_or(along);
-    let errors: Vec<Vec<f64>> = bench.means.iter().zip(along).map(simulated).collect();
+    let errors: Vec<Vec<f64>> = data.means.iter().zip(along).map(simulated).collect();
     let one = |draw: usize| {
         let mut random = Random::stream(SEED, draw as u64);
-        let mut null = bench.clone();
-        for ((mean, error), segment) in null.means.iter_mut().zip(&errors).zip(&bench.stack.segments) {
+        let mut null = data.clone();
+        for ((mean, error), segment) in null.means.iter_mut().zip(&errors).zip(&data.stack.segments) {
             let mut noise: Vec<f64> = (0..error.len()).map(|_| random.normal() / segment.weight).collect();
-            bench.whitener.colour(&mut noise);
+            data.whitener.colour(&mut noise);
             mean.position.iter_mut().zip(error).zip(&noise).for_each(|((y, e), n)| *y += n - e);
         }
         // From the machine that the draw is made of: the way to it from a given plant far off is no question of chance.
-        null.correct(&baseline.refitted.p, &[]);
-        let model = refit_from(&mut null, &baseline.refitted.p, iterations);
+        let null = null.corrected(&baseline.refitted.p, &[]);
+        let (null, model) = refit_from(null, &baseline.refitted.p, iterations);
         strongest(&null, library, &model)
     };
     let mut null_log_p: Vec<f64> = (0..draws).into_par_iter().map(one).collect();

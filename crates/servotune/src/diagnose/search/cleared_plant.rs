@@ -35,6 +35,8 @@ pub(in crate::diagnose) struct Cleared {
     pub law: Option<SelectedEffect>,
     /// Whether it was a curve without one.
     pub curve: bool,
+    /// What plant and law leave of each mean run in plain simulation (position_unit).
+    pub left: Vec<Vec<f64>>,
 }
 
 /// What plants and laws are tried on.
@@ -48,23 +50,22 @@ struct Tried<'a> {
 
 /// The plant to set out from, where the given one conceals what acts; none where the given one, or a refit of it, does.
 pub(in crate::diagnose) fn cleared(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     iterations: usize,
     say: &mut dyn FnMut(&str),
 ) -> Option<Cleared> {
-    let means = recorded_means(bench);
-    let balances = SMOOTHINGS.iter().flat_map(|&w| SLIDES.map(|s| Balance::of(bench, &means, w, s)));
+    let means = recorded_means(data);
+    let balances = SMOOTHINGS.iter().flat_map(|&w| SLIDES.map(|s| Balance::of(data, &means, w, s)));
     let mut laws: Vec<(f64, Balanced)> = balances.flat_map(|b| b.laws()).collect();
-    let bent = curves(&SMOOTHINGS.map(|w| Balance::of(bench, &means, w, 0.0)));
+    let bent = curves(&SMOOTHINGS.map(|w| Balance::of(data, &means, w, 0.0)));
     let bent: Vec<Curved> = bent.into_iter().filter(|c| c.share < CLEARED_TELLS).collect();
     let nothing_bends = bent.is_empty() && laws.iter().all(|(_, b)| b.law.is_none());
-    let zero = vec![0.0; bench.form.knobs.len()];
-    let near = bench.fit(vec![]).cost(&zero) < CLEARED_FAR * CLEARED_FAR * bench.stack.total as f64;
+    let zero = vec![0.0; data.form.free_parameters.len()];
+    let near = data.fit(vec![]).cost(&zero) < CLEARED_FAR * CLEARED_FAR * data.stack.total as f64;
     if laws.is_empty() || nothing_bends && near {
         return None;
     }
-    let mut own = bench.clone();
-    let linear = refit(&mut own, iterations);
+    let (own, linear) = refit(data.clone(), iterations);
     let whole: Vec<(&Run, usize)> = means.iter().zip(&own.stack.segments).map(|(m, s)| (m, s.runs.len())).collect();
     let samples: f64 = whole.iter().map(|(r, n)| (r.len() * n) as f64).sum();
     let tried = Tried { own: &own, linear, whole };
@@ -80,18 +81,45 @@ pub(in crate::diagnose) fn cleared(
     laws.sort_by(|a, b| a.0.total_cmp(&b.0));
     laws.truncate(TRIED);
     let best = tried.of_curves(bent, tried.of_laws(&laws));
-    best.filter(|(left, _)| *left < CLEARED_BETTER * CLEARED_BETTER * least).map(|(_, cleared)| cleared)
+    best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least).map(|b| tried.cleared(&b))
 }
 
-/// A plant that was cleared, and the sum of squares that its simulation leaves.
-type Best = Option<(f64, Cleared)>;
+/// A plant with what was fitted beside it.
+struct Fitted {
+    /// Sum of squares that its simulation leaves.
+    left: f64,
+    ground: DiagnosisData,
+    model: Model,
+    /// Whether what stands beside it is a curve without a name.
+    curve: bool,
+}
 
 impl Tried<'_> {
-    /// What a model leaves in plain simulation: sum of squares.
-    fn left(&self, ground: &DiagnosisData, model: &Model) -> f64 {
+    /// What a model leaves in plain simulation, mean run after mean run, each over the sensor's noise in it.
+    fn errors(&self, ground: &DiagnosisData, model: &Model) -> Vec<f64> {
         let mut problem = Problem::plain_error(ground, model, None, &self.whole);
         let x = problem.start();
-        size(&problem.settle(&x))
+        problem.settle(&x)
+    }
+
+    /// Its sum of squares.
+    fn left(&self, ground: &DiagnosisData, model: &Model) -> f64 {
+        size(&self.errors(ground, model))
+    }
+
+    /// The plant of a fitted model, its law unless that is a curve, and what both leave.
+    fn cleared(&self, best: &Fitted) -> Cleared {
+        let errors = self.errors(&best.ground, &best.model);
+        let mut rest = &errors[..];
+        let own = |(run, count): &(&Run, usize)| {
+            let (own, behind) = rest.split_at(run.len());
+            rest = behind;
+            let noise = self.own.levels.sensor_rms.max(f64::MIN_POSITIVE) / (*count as f64).sqrt();
+            own.iter().map(|e| e * noise).collect()
+        };
+        let left = self.whole.iter().map(own).collect();
+        let law = best.model.chosen.first().filter(|_| !best.curve).cloned();
+        Cleared { plant: not_too_slow(best.ground.form.plant(&best.model.refitted.p)), law, curve: best.curve, left }
     }
 
     /// A plant with a law beside it, and the ground around it.
@@ -99,7 +127,7 @@ impl Tried<'_> {
         let ground = around(self.own, plant);
         let mut model = self.linear.clone();
         model.chosen = law.into_iter().collect();
-        (model.refitted.p, model.refitted.plant) = (vec![0.0; ground.form.knobs.len()], plant.clone());
+        (model.refitted.p, model.refitted.plant) = (vec![0.0; ground.form.free_parameters.len()], plant.clone());
         (ground, model)
     }
 
@@ -108,7 +136,7 @@ impl Tried<'_> {
     }
 
     /// The best law of some balances, in its fuller form where that is clearly better.
-    fn of_laws(&self, laws: &[(f64, Balanced)]) -> Best {
+    fn of_laws(&self, laws: &[(f64, Balanced)]) -> Option<Fitted> {
         let simulated = |(_, b): &(f64, Balanced)| {
             let (ground, model) = self.model(&b.plant, b.law.clone());
             let left = self.left(&ground, &model);
@@ -116,14 +144,13 @@ impl Tried<'_> {
         };
         let mut tried: Vec<(f64, DiagnosisData, Model)> = laws.iter().filter_map(simulated).collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut settled: Vec<(f64, DiagnosisData, Model)> = Vec::new();
+        let mut settled: Vec<Fitted> = Vec::new();
         for (left, ground, model) in tried.into_iter().take(FITTED) {
             let fitted = self.fitted(&ground, &model).unwrap_or(model);
-            settled.push((self.left(&ground, &fitted).min(left), ground, fitted));
+            let left = self.left(&ground, &fitted).min(left);
+            settled.push(Fitted { left, ground, model: fitted, curve: false });
         }
-        settled.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (left, ground, model) = settled.into_iter().next()?;
-        let mut best = (left, cleared_of(&ground, &model, false));
+        let mut best = settled.into_iter().min_by(|a, b| a.left.total_cmp(&b.left))?;
         let fuller = |law: &SelectedEffect| {
             let of = |full: AnyLaw| SelectedEffect {
                 setting: Setting::new(full, law.setting.strengths.clone()),
@@ -131,20 +158,21 @@ impl Tried<'_> {
             };
             law.setting.law.fuller(&self.own.scene).into_iter().map(of).collect::<Vec<_>>()
         };
-        for full in model.chosen.first().map(fuller).unwrap_or_default() {
-            let model = Model { chosen: vec![with_freedom(full, &self.own.scene)], ..model.clone() };
-            let Some(fitted) = self.fitted(&ground, &model) else { continue };
-            let after = self.left(&ground, &fitted);
-            if after < CLEARED_FULLER * best.0 {
-                best = (after, cleared_of(&ground, &fitted, false));
+        let plain = best.model.clone();
+        for full in plain.chosen.first().map(fuller).unwrap_or_default() {
+            let model = Model { chosen: vec![with_freedom(full, &self.own.scene)], ..plain.clone() };
+            let Some(fitted) = self.fitted(&best.ground, &model) else { continue };
+            let left = self.left(&best.ground, &fitted);
+            if left < CLEARED_FULLER * best.left {
+                best = Fitted { left, model: fitted, ..best };
             }
         }
         Some(best)
     }
 
     /// A curve without a name in the place of the best law, where it leaves far less.
-    fn of_curves(&self, bent: Vec<Curved>, mut best: Best) -> Best {
-        let most = best.as_ref().map_or(f64::INFINITY, |b| b.0);
+    fn of_curves(&self, bent: Vec<Curved>, mut best: Option<Fitted>) -> Option<Fitted> {
+        let most = best.as_ref().map_or(f64::INFINITY, |b| b.left);
         for c in bent.into_iter().take(CURVES) {
             let law = c.shape.effect();
             let law = law.map(|setting| SelectedEffect { setting, continuous: Vec::new(), range: Vec::new(), step: 0 });
@@ -152,20 +180,14 @@ impl Tried<'_> {
             if !self.left(&ground, &model).is_finite() {
                 continue;
             }
-            let fitted = self.fitted(&ground, &model).unwrap_or(model);
-            let left = self.left(&ground, &fitted);
-            if left < CLEARED_BY_CURVE * most && left < best.as_ref().map_or(f64::INFINITY, |b| b.0) {
-                best = Some((left, cleared_of(&ground, &fitted, true)));
+            let model = self.fitted(&ground, &model).unwrap_or(model);
+            let left = self.left(&ground, &model);
+            if left < CLEARED_BY_CURVE * most && left < best.as_ref().map_or(f64::INFINITY, |b| b.left) {
+                best = Some(Fitted { left, ground, model, curve: true });
             }
         }
         best
     }
-}
-
-/// The plant of a fitted model, and its law unless that is a curve.
-fn cleared_of(ground: &DiagnosisData, model: &Model, curve: bool) -> Cleared {
-    let law = model.chosen.first().filter(|_| !curve).cloned();
-    Cleared { plant: not_too_slow(ground.form.plant(&model.refitted.p)), law, curve }
 }
 
 /// The same acceleration and viscous rate on a spring that a plant may have: a fit may end at none.
@@ -180,9 +202,9 @@ fn not_too_slow(plant: Plant) -> Plant {
 }
 
 /// The same ground around another plant, for simulations of plain errors: its noise and its motion stay.
-fn around(bench: &DiagnosisData, plant: &Plant) -> DiagnosisData {
-    let mut ground = bench.clone();
-    ground.form = crate::diagnose::data::linear_form::LinearForm::new(plant, bench.scene.sample_time_s);
+fn around(data: &DiagnosisData, plant: &Plant) -> DiagnosisData {
+    let mut ground = data.clone();
+    ground.form = crate::diagnose::data::linear_form::LinearForm::new(plant, data.scene.sample_time_s);
     ground.scene.plant = plant.clone();
     ground
 }

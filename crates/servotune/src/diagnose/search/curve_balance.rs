@@ -66,7 +66,7 @@ impl Balance<'_> {
         if port != Some(CurvePort::TorqueOverVelocity) {
             plant.push(raw(&|p, _, k| -p.samples[k].v));
         }
-        let free = matches!(self.bench.form.given.body, Body::FreeInertia { .. });
+        let free = matches!(self.data.form.given.body, Body::FreeInertia { .. });
         if !free && port != Some(CurvePort::TorqueOverPosition) {
             plant.push(raw(&|p, r, k| self.means[r].origin - p.samples[k].x));
         }
@@ -119,7 +119,7 @@ impl Balance<'_> {
     }
 
     fn arm(&self, port: CurvePort) -> f64 {
-        if port == CurvePort::AmplifierOverCommand { 1.0 } else { self.bench.scene.arm_over_record() }
+        if port == CurvePort::AmplifierOverCommand { 1.0 } else { self.data.scene.arm_over_record() }
     }
 
     /// The columns of a curve's values, a command's at this share of the later one.
@@ -157,7 +157,7 @@ impl Balance<'_> {
 
     /// Of a loading curve: its values are slopes between knots, and each slider holds the fall of the slope at its knot.
     fn loading_columns(&self, at: &[f64], weights: &[f64]) -> Vec<Vec<f64>> {
-        let arm = self.bench.scene.arm_over_record();
+        let arm = self.data.scene.arm_over_record();
         let mut sliders: Vec<Vec<f64>> = vec![Vec::with_capacity(self.total()); at.len() - 1];
         for part in &self.parts {
             let mut row = Sliders::of(at);
@@ -232,7 +232,7 @@ impl Balance<'_> {
             }
         };
         let viscous = if port == CurvePort::TorqueOverVelocity { 0.0 } else { own.next()? };
-        let free = matches!(self.bench.form.given.body, Body::FreeInertia { .. });
+        let free = matches!(self.data.form.given.body, Body::FreeInertia { .. });
         let stiffness = if free || port == CurvePort::TorqueOverPosition { 0.0 } else { own.next()? };
         if !gain.is_normal() {
             return None;

@@ -13,29 +13,29 @@ use crate::numeric::least_squares::dot;
 use nalgebra::{DMatrix, DVector};
 
 /// Whether the strengths of effect `at`, which are each record's own, follow the motion; false where too few repeats tell.
-pub(super) fn follows_motion(bench: &DiagnosisData, model: &Model, at: usize) -> bool {
+pub(super) fn follows_motion(data: &DiagnosisData, model: &Model, at: usize) -> bool {
     let chosen = &model.chosen[at];
     let facts = chosen.setting.facts();
     if !facts.per_record || !chosen.effect().independent_of_motion() {
         return false;
     }
-    let carrier = bench.form.carrier(&model.refitted.p).plant;
-    let Ok(sampled) = Sampled::of(&carrier, bench.scene.sample_time_s) else { return false };
-    let segments = &bench.stack.segments;
-    let local = bench.fit(vec![]).local_basis();
+    let nominal = data.form.nominal(&model.refitted.p).plant;
+    let Ok(sampled) = Sampled::of(&nominal, data.scene.sample_time_s) else { return false };
+    let segments = &data.stack.segments;
+    let local = data.fit(vec![]).local_basis();
     let m = facts.columns;
     let (mut total, mut pull) = (DMatrix::zeros(m, m), DVector::zeros(m));
     let mut moves: Vec<(DMatrix<f64>, DVector<f64>)> = Vec::new();
     let (mut within, mut repeats) = (0.0, 0);
     for (i, s) in segments.iter().enumerate() {
-        let motion = &bench.trajectories[i];
+        let motion = &data.trajectories[i];
         let law = &chosen.setting.law;
-        let columns = white_columns(law, &bench.scene, motion, &sampled, &bench.whitener);
+        let columns = white_columns(law, &data.scene, motion, &sampled, &data.whitener);
         let mut basis = NuisanceBasis::default();
         let free: Vec<Vec<f64>> = columns
             .into_iter()
             .map(|mut c| {
-                let mut whole = vec![0.0; bench.stack.total];
+                let mut whole = vec![0.0; data.stack.total];
                 whole[s.start..s.start + s.len].copy_from_slice(&c);
                 local.project(&mut whole);
                 c.copy_from_slice(&whole[s.start..s.start + s.len]);
@@ -44,7 +44,7 @@ pub(super) fn follows_motion(bench: &DiagnosisData, model: &Model, at: usize) ->
             .collect();
         free.iter().for_each(|c| basis.add_local(0, c.clone()));
         let of_segment: Vec<&Vec<f64>> =
-            bench.repeats.iter().filter(|(r, e)| s.runs.contains(r) && e.len() == s.len).map(|(_, e)| e).collect();
+            data.repeats.iter().filter(|(r, e)| s.runs.contains(r) && e.len() == s.len).map(|(_, e)| e).collect();
         if of_segment.len() > 1 {
             let n = of_segment.len() as f64;
             // Repeats come scaled back to the noise of one record.

@@ -20,7 +20,7 @@ pub(super) fn deep(step: &Step) -> bool {
 
 /// Fits the best laws of a step by simulation, drags first, and keeps what is better: much is left, and along a noisy or a stuck motion a law that
 /// bends falls far short of itself.
-pub(super) fn by_simulation_first(bench: &DiagnosisData, step: &mut Step) {
+pub(super) fn by_simulation_first(data: &DiagnosisData, step: &mut Step) {
     let last = |m: &Model| {
         m.chosen.last().map(|c| (c.setting.facts().name, c.effect().is_drag() || c.effect().is_hard_nonlinearity()))
     };
@@ -32,7 +32,7 @@ pub(super) fn by_simulation_first(bench: &DiagnosisData, step: &mut Step) {
     order.sort_by(|a, b| rank(a).0.cmp(&rank(b).0).then(rank(a).1.total_cmp(&rank(b).1)));
     for i in order.into_iter().take(SIMULATED) {
         let tried = &step.tried[i].1;
-        if let Some(s) = simulated(bench, tried).filter(|s| s.cost < tried.cost && s.possible()) {
+        if let Some(s) = simulated(data, tried).filter(|s| s.cost < tried.cost && s.possible()) {
             let evidence = tried.evidence + s.cost - tried.cost;
             step.tried[i].1 = Model { evidence, ..s };
         }
@@ -40,14 +40,14 @@ pub(super) fn by_simulation_first(bench: &DiagnosisData, step: &mut Step) {
 }
 
 /// The scan of what a model leaves in simulation.
-pub(super) fn felt_scan(bench: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> Step {
-    let mut candidates = in_simulation(bench, library, model);
+pub(super) fn felt_scan(data: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> Step {
+    let mut candidates = in_simulation(data, library, model);
     candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     Step { before: model.evidence, candidates, tried: Vec::new(), taken: None }
 }
 
 /// A model with one law more, all of it fitted by simulation; none where nothing is won.
-pub(super) fn felt_trial(bench: &DiagnosisData, model: &Model, chosen: Vec<SelectedEffect>) -> Option<Model> {
+pub(super) fn felt_trial(data: &DiagnosisData, model: &Model, chosen: Vec<SelectedEffect>) -> Option<Model> {
     let numbers = |c: &[SelectedEffect]| -> usize {
         let strengths = |c: &SelectedEffect| if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
         c.iter().map(|c| strengths(c) + c.continuous.iter().filter(|c| **c).count()).sum()
@@ -58,23 +58,23 @@ pub(super) fn felt_trial(bench: &DiagnosisData, model: &Model, chosen: Vec<Selec
     start.refitted.directions = vec![vec![0.0; count]];
     start.freedom -= (numbers(&chosen) - numbers(&model.chosen)) as f64;
     start.chosen = chosen;
-    let s = simulated(bench, &start).filter(|s| s.cost < model.cost && s.possible())?;
+    let s = simulated(data, &start).filter(|s| s.cost < model.cost && s.possible())?;
     let evidence = model.evidence + s.cost - model.cost;
     Some(Model { evidence, ..s })
 }
 
 /// The law that the plant was cleared of, fitted by simulation as a first step; whether there is one.
-pub(in crate::diagnose) fn foretold(bench: &DiagnosisData, model: &Model, step: &mut Step) -> bool {
-    let Some(law) = bench.foretold.clone() else { return false };
+pub(in crate::diagnose) fn foretold(data: &DiagnosisData, model: &Model, step: &mut Step) -> bool {
+    let Some(law) = data.foretold.clone() else { return false };
     let mut start = model.clone();
     start.refitted.p.fill(0.0);
-    start.refitted.plant = bench.form.given.clone();
-    let Some(found) = felt_trial(bench, &start, vec![law.clone()]) else { return false };
+    start.refitted.plant = data.form.given.clone();
+    let Some(found) = felt_trial(data, &start, vec![law.clone()]) else { return false };
     let candidate = Candidate {
         setting: found.chosen[0].setting.clone(),
         gain: model.evidence - found.evidence,
         concealed: 0.0,
-        points: law.effect().grid(&bench.scene).len(),
+        points: law.effect().grid(&data.scene).len(),
         strengths: if law.setting.facts().fixed { 1 } else { law.setting.strengths.len() },
         continuous: law.continuous,
         range: law.range,

@@ -17,28 +17,28 @@ use crate::physics::Effect;
 /// Along the recorded motion laws see the sensor's noise and fall a little short of themselves, in open-loop simulation a free body
 /// may drift away: what counts is seen in both.
 pub(in crate::diagnose) fn leftover(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     library: &[&'static dyn Effect],
     model: &Model,
     simulated: Option<&Model>,
     steps: &[Step],
     (before, limit): (f64, f64),
 ) -> Option<ResidualEffect> {
-    if model.chosen.is_empty() || !bench.levels.from_repeats {
+    if model.chosen.is_empty() || !data.noise_known {
         return None;
     }
-    let chance = |c: &Candidate| c.log_p_value(library.len()).max(hums(bench, c, c.gain, library.len()));
+    let chance = |c: &Candidate| c.log_p_value(library.len()).max(hums(data, c, c.gain, library.len()));
     let strongest = |candidates: &[Candidate]| {
         let possible = candidates.iter().filter(|c| c.setting.is_possible(&[]));
         possible.min_by(|a, b| chance(a).total_cmp(&chance(b))).filter(|c| chance(c) < limit).cloned()
     };
     let along = match steps.last().filter(|s| s.taken.is_none()) {
         Some(step) => strongest(&step.candidates),
-        None => strongest(&scan(bench, library, model).candidates),
+        None => strongest(&scan(data, library, model).candidates),
     }?;
     let left = match simulated {
         Some(s) => {
-            let other = strongest(&in_simulation(bench, library, s))?;
+            let other = strongest(&in_simulation(data, library, s))?;
             if other.gain < along.gain { other } else { along }
         }
         None => along,
@@ -53,12 +53,12 @@ pub(in crate::diagnose) fn leftover(
 }
 
 /// The scan of the simulation's error.
-pub(super) fn in_simulation(bench: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> Vec<Candidate> {
-    let fit = bench.fit(model.chosen.clone());
+pub(super) fn in_simulation(data: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> Vec<Candidate> {
+    let fit = data.fit(model.chosen.clone());
     let (_, basis) = fit.screen_basis(&model.refitted.p);
-    let mut error = simulation_error(bench, model);
+    let mut error = simulation_error(data, model);
     basis.project(&mut error);
-    let plant = bench.form.carrier(&model.refitted.p).plant;
+    let plant = data.form.nominal(&model.refitted.p).plant;
     let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
     ground.best(library)
 }

@@ -14,10 +14,10 @@ use crate::diagnose::rules::{OWN_OF_RECORD, RIVAL_BETTER, RIVAL_DOUBT, SIMULATIO
 
 /// What one law must take more than another because it has more numbers (Schwarz 1978) or because machines seldom follow it; less where
 /// it has fewer, or most machines do.
-pub(in crate::diagnose) fn more(bench: &DiagnosisData, law: &SelectedEffect, than: &SelectedEffect) -> f64 {
-    let price = (bench.stack.total as f64).ln();
+pub(in crate::diagnose) fn more(data: &DiagnosisData, law: &SelectedEffect, than: &SelectedEffect) -> f64 {
+    let price = (data.stack.total as f64).ln();
     let of = |c: &SelectedEffect| {
-        let numbers = c.numbers() + begun(bench, &c.setting.law);
+        let numbers = c.numbers() + begun(data, &c.setting.law);
         price * numbers as f64 - if c.effect().is_on_every_machine() { USUAL_LAW } else { 0.0 }
     };
     of(law) - of(than)
@@ -25,7 +25,7 @@ pub(in crate::diagnose) fn more(bench: &DiagnosisData, law: &SelectedEffect, tha
 
 /// Costs of the rivals of one family by simulation; one that is better there takes the place.
 pub(in crate::diagnose) fn by_simulation(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     model: &mut Model,
     by_simulation: &mut Model,
     rivals: &mut [Vec<Rival>],
@@ -42,11 +42,11 @@ pub(in crate::diagnose) fn by_simulation(
             if r.cost - model.cost >= width {
                 continue;
             }
-            let Some(s) = simulated(bench, &r.model) else { continue };
+            let Some(s) = simulated(data, &r.model) else { continue };
             r.cost = model.cost + (s.cost - by_simulation.cost);
             let facts = r.model.chosen[at].setting.facts();
             let dearer = if facts.per_record { OWN_OF_RECORD * won } else { 0.0 };
-            let ahead = by_simulation.cost - s.cost - dearer - more(bench, &s.chosen[at], &by_simulation.chosen[at]);
+            let ahead = by_simulation.cost - s.cost - dearer - more(data, &s.chosen[at], &by_simulation.chosen[at]);
             if ahead > RIVAL_BETTER && r.model.possible() && best.as_ref().is_none_or(|b| ahead > b.0) {
                 best = Some((ahead, i, s));
             }

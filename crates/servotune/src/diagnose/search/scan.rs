@@ -157,7 +157,7 @@ impl<'a, 'f> Ground<'a, 'f> {
     fn difference(&self, law: &AnyLaw) -> Option<Difference> {
         self.repeats
             .filter(|_| law.effect().is_hard_nonlinearity())
-            .map(|bench| Difference::of(bench, &self.sampled, law))
+            .map(|data| Difference::of(data, &self.sampled, law))
     }
 
     /// The normal equations of an effect at one point.

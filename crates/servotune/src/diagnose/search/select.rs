@@ -34,7 +34,7 @@ const AGAIN: usize = 3;
 
 /// The search on its way.
 struct Search<'a> {
-    bench: &'a mut DiagnosisData,
+    data: DiagnosisData,
     library: &'a [&'static dyn Effect],
     settings: &'a SelectSettings,
     baseline: Model,
@@ -57,24 +57,24 @@ enum Onward {
     End,
 }
 
-/// Searches the library for what the linear model lacks.
+/// Searches the library for what the linear model lacks; the ground comes back around the model that was found.
 pub fn select(
-    bench: &mut DiagnosisData,
+    data: DiagnosisData,
     library: &[&'static dyn Effect],
     settings: &SelectSettings,
     mut progress: impl FnMut(&str),
-) -> Selection {
-    let zero = vec![0.0; bench.form.knobs.len()];
-    let given = bench.fit(vec![]).cost(&zero);
+) -> (DiagnosisData, Selection) {
+    let zero = vec![0.0; data.form.free_parameters.len()];
+    let given = data.fit(vec![]).cost(&zero);
     progress("refit of the linear parameters");
-    let baseline = refit(bench, settings.iterations);
+    let (data, baseline) = refit(data, settings.iterations);
     let calibration = (settings.bootstrap > 0).then(|| {
         progress("bootstrap: the search on records without physics");
-        bootstrap(bench, library, &baseline, settings.iterations, settings.false_alarm, settings.bootstrap)
+        bootstrap(&data, library, &baseline, settings.iterations, settings.false_alarm, settings.bootstrap)
     });
     let model = baseline.clone();
     let mut search = Search {
-        bench,
+        data,
         library,
         settings,
         baseline,
@@ -95,12 +95,12 @@ impl Search<'_> {
         let seen = if self.felt { felt_scan } else { scan };
         let turns = |e: &&'static dyn Effect| !self.disk_only || e.facts().port == Port::Disk;
         let library: Vec<&'static dyn Effect> = self.library.iter().copied().filter(turns).collect();
-        let mut step = seen(self.bench, &library, &self.model);
+        let mut step = seen(&self.data, &library, &self.model);
         self.try_each(&mut step, progress);
         let first = self.settings.by_simulation && self.model.chosen.is_empty();
-        let to_the_end = first && (foretold(self.bench, &self.model, &mut step) || deep(&step));
-        if to_the_end && self.bench.foretold.is_none() {
-            by_simulation_first(self.bench, &mut step);
+        let to_the_end = first && (foretold(&self.data, &self.model, &mut step) || deep(&step));
+        if to_the_end && self.data.foretold.is_none() {
+            by_simulation_first(&self.data, &mut step);
         }
         let paid = |t: usize| self.paid(&step, t);
         step.taken = (0..step.tried.len()).min_by(|&a, &b| paid(a).total_cmp(&paid(b)));
@@ -117,22 +117,22 @@ impl Search<'_> {
 
     /// Refits the model with each candidate that is worth it.
     fn try_each(&self, step: &mut Step, progress: &mut dyn FnMut(&str)) {
-        let Search { bench, settings, model, felt, .. } = self;
-        let worth = Shortlist { bench, laws: self.library.len(), settings, model, felt: *felt };
+        let Search { data, settings, model, felt, .. } = self;
+        let worth = Shortlist { data, laws: self.library.len(), settings, model, felt: *felt };
         for i in worth.of(step) {
             let c = &step.candidates[i];
             progress(&format!("refit with {}", c.setting.facts().name));
             let mut chosen = model.chosen.clone();
             chosen.push(c.chosen(self.steps.len()));
             if *felt {
-                step.tried.extend(felt_trial(bench, model, chosen).map(|m| (i, m)));
+                step.tried.extend(felt_trial(data, model, chosen).map(|m| (i, m)));
                 continue;
             }
-            let mut tried = fitted_from_both(bench, &chosen, &model.refitted.p, settings.iterations);
-            if !bench.levels.from_repeats {
-                tried = settled(bench, tried, settings.iterations);
+            let mut tried = fitted_from_both(data, &chosen, &model.refitted.p, settings.iterations);
+            if !data.noise_known {
+                tried = settled(data, tried, settings.iterations);
             }
-            if tried.possible() && !follows_motion(bench, &tried, tried.chosen.len() - 1) {
+            if tried.possible() && !follows_motion(data, &tried, tried.chosen.len() - 1) {
                 step.tried.push((i, tried));
             }
         }
@@ -143,8 +143,8 @@ impl Search<'_> {
     fn paid(&self, step: &Step, t: usize) -> f64 {
         let (i, tried) = &step.tried[t];
         let c = &step.candidates[*i];
-        let price = (self.bench.stack.total as f64).ln();
-        let begun = begun(self.bench, &c.setting.law);
+        let price = (self.data.stack.total as f64).ln();
+        let begun = begun(&self.data, &c.setting.law);
         let own = c.setting.facts().per_record || begun > 0;
         let dearer = if own { OWN_OF_RECORD * (self.model.evidence - tried.evidence).max(0.0) } else { 0.0 };
         tried.evidence + price * (numbers(c) + begun as f64) + dearer
@@ -152,12 +152,12 @@ impl Search<'_> {
 
     /// The trial that was taken, if its gain is beyond chance and large enough.
     fn accepted(&self, step: &Step) -> Option<Model> {
-        let Search { bench, settings, model, .. } = self;
+        let Search { data, settings, model, .. } = self;
         let (i, next) = &step.tried[step.taken?];
         let c = &step.candidates[*i];
         let mut gain = model.evidence - next.evidence;
-        if !bench.levels.from_repeats {
-            gain = gain.min(taken_by_last(bench, next, settings.iterations));
+        if !data.noise_known {
+            gain = gain.min(taken_by_last(data, next, settings.iterations));
         }
         let explained = (self.baseline.evidence - model.evidence).max(0.0);
         let dragged = model.chosen.iter().any(|c| c.effect().is_drag());
@@ -171,9 +171,9 @@ impl Search<'_> {
     /// Logarithm of the chance that noise alone gives a candidate this gain.
     fn chance(&self, c: &Candidate, gain: f64) -> f64 {
         let laws = self.library.len();
-        let free = c.strengths.max(1) + begun(self.bench, &c.setting.law);
+        let free = c.strengths.max(1) + begun(&self.data, &c.setting.law);
         let log_p = log_tail(gain, free) + (c.points.max(1) as f64).ln() + (laws as f64).ln();
-        log_p.max(hums(self.bench, c, gain, laws))
+        log_p.max(hums(&self.data, c, gain, laws))
     }
 
     /// A gain that the linear parameters alone would have made is none of the law's: the model without it had not come to its end, and the step
@@ -183,9 +183,9 @@ impl Search<'_> {
             return false;
         }
         let iterations = self.settings.iterations;
-        let mut without = fitted(self.bench, self.model.chosen.clone(), &next.refitted.p, iterations);
-        if !self.bench.levels.from_repeats {
-            without = settled(self.bench, without, iterations);
+        let mut without = fitted(&self.data, self.model.chosen.clone(), &next.refitted.p, iterations);
+        if !self.data.noise_known {
+            without = settled(&self.data, without, iterations);
         }
         let linear = self.model.evidence - without.evidence;
         let further = linear > LINEAR_FURTHER.max(LINEAR_OF_GAIN * (self.model.evidence - next.evidence));
@@ -201,12 +201,11 @@ impl Search<'_> {
 
     /// Goes on from the model that was taken.
     fn adopt(&mut self, next: Model, to_the_end: bool) -> Onward {
-        let bench = &mut *self.bench;
-        bench.correct(&next.refitted.p, &next.chosen);
-        if !bench.levels.from_repeats {
-            bench.renew(&next.refitted.p, &next.chosen);
+        self.data = self.data.clone().corrected(&next.refitted.p, &next.chosen);
+        if !self.data.noise_known {
+            self.data = self.data.clone().renewed(&next.refitted.p, &next.chosen);
         }
-        self.model = fitted(bench, next.chosen.clone(), &next.refitted.p, self.settings.iterations);
+        self.model = fitted(&self.data, next.chosen.clone(), &next.refitted.p, self.settings.iterations);
         // What its column along a noisy motion falls short by is nobody's: from here on simulation tells.
         if (self.felt || to_the_end) && self.model.cost > next.cost {
             (self.model, self.felt) = (next, true);
@@ -220,38 +219,43 @@ impl Search<'_> {
     }
 
     /// The model looked at again: needless effects, rivals, the fit by simulation, and what is left.
-    fn finished(self, mut given: f64, bootstrap: Option<Bootstrap>, progress: &mut dyn FnMut(&str)) -> Selection {
-        let Search { bench, library, settings, mut baseline, mut model, steps, felt, .. } = self;
+    fn finished(
+        self,
+        mut given: f64,
+        bootstrap: Option<Bootstrap>,
+        progress: &mut dyn FnMut(&str),
+    ) -> (DiagnosisData, Selection) {
+        let Search { data, library, settings, mut baseline, mut model, steps, felt, .. } = self;
         let iterations = settings.iterations;
         if !felt {
-            prune(bench, &mut model, baseline.cost, iterations);
+            prune(&data, &mut model, baseline.cost, iterations);
         }
         progress("rivals of the findings");
-        let mut rivals = exchange(bench, &mut model, &steps, iterations);
+        let mut rivals = exchange(&data, &mut model, &steps, iterations);
         // A law that has found its place may do what another was there for.
         let before = model.chosen.len();
         if !felt {
-            prune(bench, &mut model, baseline.cost, iterations);
+            prune(&data, &mut model, baseline.cost, iterations);
         }
         if model.chosen.len() < before {
-            rivals = exchange(bench, &mut model, &steps, iterations);
+            rivals = exchange(&data, &mut model, &steps, iterations);
         }
-        if !bench.levels.from_repeats && !model.chosen.is_empty() {
+        if !data.noise_known && !model.chosen.is_empty() {
             // By the noise that the best model leaves, what the others left too.
-            given = bench.fit(vec![]).cost(&vec![0.0; bench.form.knobs.len()]);
-            baseline = fitted(bench, vec![], &baseline.refitted.p, iterations);
+            given = data.fit(vec![]).cost(&vec![0.0; data.form.free_parameters.len()]);
+            baseline = fitted(&data, vec![], &baseline.refitted.p, iterations);
         }
         if baseline.cost > given {
             baseline.cost = given;
         }
         progress("fit by simulation");
-        let mut simulated = simulated(bench, &model);
+        let mut simulated = simulated(&data, &model);
         if let Some(s) = &mut simulated {
-            spare(bench, &mut model, s, &mut rivals, &steps, baseline.cost, iterations);
-            by_simulation(bench, &mut model, s, &mut rivals, &steps);
+            spare(&data, &mut model, s, &mut rivals, &steps, baseline.cost, iterations);
+            by_simulation(&data, &mut model, s, &mut rivals, &steps);
         }
         let limit = settings.false_alarm.ln();
-        let leftover = leftover(bench, library, &model, simulated.as_ref(), &steps, (baseline.cost, limit));
-        Selection { given, baseline, steps, model, felt, simulated, rivals, leftover, bootstrap }
+        let leftover = leftover(&data, library, &model, simulated.as_ref(), &steps, (baseline.cost, limit));
+        (data, Selection { given, baseline, steps, model, felt, simulated, rivals, leftover, bootstrap })
     }
 }

@@ -81,7 +81,7 @@ impl Corrected {
     /// The same as a model to be judged, with what is each record's own.
     pub(in crate::diagnose) fn judged<'a>(
         &'a self,
-        bench: &'a DiagnosisData,
+        data: &'a DiagnosisData,
         selection: &'a Selection,
     ) -> SimulatedModel<'a> {
         let own = selection.model.chosen.iter().filter(|c| c.setting.facts().per_record);
@@ -89,9 +89,9 @@ impl Corrected {
             plant: &self.plant,
             effects: self.effects.iter().collect(),
             own: own.map(|c| &c.setting.law).collect(),
-            lines: &bench.lines,
-            fit: Some((bench, &selection.model)),
-            scene: &bench.scene,
+            lines: &data.lines,
+            fit: Some((data, &selection.model)),
+            scene: &data.scene,
         }
     }
 }

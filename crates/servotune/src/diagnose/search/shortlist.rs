@@ -14,7 +14,7 @@ use crate::physics::{Effect, Setting, effect};
 
 /// What the candidates of one step are judged by.
 pub(super) struct Shortlist<'a> {
-    pub bench: &'a DiagnosisData,
+    pub data: &'a DiagnosisData,
     /// Laws that are scanned.
     pub laws: usize,
     pub settings: &'a SelectSettings,
@@ -55,14 +55,14 @@ impl Shortlist<'_> {
         // A push falls into one record; what every repeat shows at the same time is none.
         other
             && (!c.effect().is_single_event()
-                || self.bench.stack.segments.iter().any(|s| s.runs.len() == 1)
+                || self.data.stack.segments.iter().any(|s| s.runs.len() == 1)
                 || c.together())
     }
 
     fn beyond_chance(&self, c: &Candidate) -> bool {
         let limit = self.settings.false_alarm.ln();
-        c.log_p_value(self.laws) < limit && hums(self.bench, c, c.gain, self.laws) < limit
-            || (!self.bench.levels.from_repeats && c.gain > GAIN_WITHOUT_REPEATS)
+        c.log_p_value(self.laws) < limit && hums(self.data, c, c.gain, self.laws) < limit
+            || (!self.data.noise_known && c.gain > GAIN_WITHOUT_REPEATS)
     }
 
     /// Whether its law has not had its turns, one for each law and two for the leading one, and whether there is room.
@@ -83,7 +83,7 @@ impl Shortlist<'_> {
 
     /// Of two forms of one law, the one that is worth its numbers most: each number is paid for (Schwarz 1978).
     fn best_form(&self, step: &Step, c: &Candidate) -> bool {
-        let price = (self.bench.stack.total as f64).ln();
+        let price = (self.data.stack.total as f64).ln();
         let net = |c: &Candidate| c.gain - price * c.chosen(0).numbers() as f64;
         let forms = step.candidates.iter().filter(|o| o.setting.facts().name == c.setting.facts().name);
         forms.map(net).fold(f64::NEG_INFINITY, f64::max) <= net(c)
@@ -103,11 +103,11 @@ pub(in crate::diagnose) fn numbers(c: &Candidate) -> f64 {
 
 /// Logarithm of the chance of a hum's gain where the noise itself is stronger near its frequency, a narrow band of it being no hum;
 /// -infinity for all other effects.
-pub(in crate::diagnose) fn hums(bench: &DiagnosisData, c: &Candidate, gain: f64, effects: usize) -> f64 {
+pub(in crate::diagnose) fn hums(data: &DiagnosisData, c: &Candidate, gain: f64, effects: usize) -> f64 {
     if !c.effect().is_tone() {
         return f64::NEG_INFINITY;
     }
-    let fair = Candidate { gain: gain / bench.noise_near(c.setting.law.first_number()), ..c.clone() };
+    let fair = Candidate { gain: gain / data.noise_near(c.setting.law.first_number()), ..c.clone() };
     fair.log_p_value(effects)
 }
 
@@ -118,8 +118,8 @@ fn again(c: &Candidate, first: &Setting) -> bool {
 }
 
 /// Logarithm of the closed-form bound of the strongest candidate beside a model.
-pub(in crate::diagnose) fn strongest(bench: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> f64 {
-    let step = scan(bench, library, model);
+pub(in crate::diagnose) fn strongest(data: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> f64 {
+    let step = scan(data, library, model);
     let possible = step.candidates.iter().filter(|c| c.setting.is_possible(&[]) && c.concealed < CONFOUNDED);
     possible.map(|c| c.log_p_value(library.len())).fold(0.0, f64::min)
 }

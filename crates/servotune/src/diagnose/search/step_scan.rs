@@ -10,24 +10,24 @@ use crate::physics::{Effect, Port};
 
 /// The scan around linear parameters `p`; gains count from where the model stands.
 pub(super) fn scan_at(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     library: &[&'static dyn Effect],
     model: &Model,
     p: &[f64],
 ) -> Vec<Candidate> {
-    let fit = bench.fit(model.chosen.clone());
+    let fit = data.fit(model.chosen.clone());
     let (error, basis) = fit.screen_basis(p);
-    let plant = bench.form.carrier(p).plant;
+    let plant = data.form.nominal(p).plant;
     let ahead = model.cost - error.iter().map(|e| e * e).sum::<f64>();
     let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
-    let mut candidates = ground.beside(bench).best(library);
+    let mut candidates = ground.beside(data).best(library);
     candidates.iter_mut().for_each(|c| c.gain += ahead.min(0.0));
     candidates
 }
 
 /// The scan around where the model stands, and around the given plant where the refit may have bent what is looked for.
-pub(in crate::diagnose) fn scan(bench: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> Step {
-    let mut candidates = scan_at(bench, library, model, &model.refitted.p);
+pub(in crate::diagnose) fn scan(data: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> Step {
+    let mut candidates = scan_at(data, library, model, &model.refitted.p);
     // A law without a strength of its own (a lag, a limit), or a vibration that a known mode has moved to stand in for, is not straight
     // in the linear parameters: it is looked for around the given plant too.
     if model.chosen.is_empty() && model.excess_sigma() > REFIT_HIDES {
@@ -35,7 +35,7 @@ pub(in crate::diagnose) fn scan(bench: &DiagnosisData, library: &[&'static dyn E
         let far = model.excess_sigma() > FAR_FROM_NOISE;
         let crooked = |e: &&'static dyn Effect| far || e.facts().fixed || e.facts().port == Port::Structure;
         let apart: Vec<&'static dyn Effect> = library.iter().copied().filter(crooked).collect();
-        candidates.extend(scan_at(bench, &apart, model, &vec![0.0; model.refitted.p.len()]));
+        candidates.extend(scan_at(data, &apart, model, &vec![0.0; model.refitted.p.len()]));
     }
     candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     Step { before: model.evidence, candidates, tried: Vec::new(), taken: None }

@@ -111,13 +111,13 @@ fn roughness(means: &[Run]) -> f64 {
 }
 
 /// The mean run of every segment as recorded: what was taken out around a bent plant (lines) is none of theirs.
-pub(in crate::diagnose) fn recorded_means(bench: &DiagnosisData) -> Vec<Run> {
-    bench.stack.segments.iter().map(|s| mean_run(&bench.runs, &s.runs)).collect()
+pub(in crate::diagnose) fn recorded_means(data: &DiagnosisData) -> Vec<Run> {
+    data.stack.segments.iter().map(|s| mean_run(&data.runs, &s.runs)).collect()
 }
 
 /// The balance of all mean runs at one smoothing.
 pub(in crate::diagnose) struct Balance<'a> {
-    pub bench: &'a DiagnosisData,
+    pub data: &'a DiagnosisData,
     /// Mean runs as recorded: what was taken out of them around a bent plant (lines) is none of theirs.
     pub means: &'a [Run],
     /// The machine with the size of the motion as it is seen here.
@@ -134,17 +134,17 @@ pub(in crate::diagnose) struct Balanced {
 }
 
 impl<'a> Balance<'a> {
-    pub fn of(bench: &'a DiagnosisData, means: &'a [Run], width: f64, slides: f64) -> Balance<'a> {
-        let t = bench.scene.sample_time_s;
-        let spindle = std::f64::consts::TAU * bench.scene.spindle_hz.unwrap_or(0.0);
+    pub fn of(data: &'a DiagnosisData, means: &'a [Run], width: f64, slides: f64) -> Balance<'a> {
+        let t = data.scene.sample_time_s;
+        let spindle = std::f64::consts::TAU * data.scene.spindle_hz.unwrap_or(0.0);
         let slides = slides * jitter(roughness(means), t, width);
         let widths = [width, sharpest(means, t, width)];
         let parts: Vec<Smoothed> = means.par_iter().map(|m| Smoothed::of(m, t, widths, slides, spindle)).collect();
         let moving = parts.iter().flat_map(|p| p.rows.iter().map(|&k| p.samples[k].v.abs()));
         let speed = moving.fold(0.0f64, f64::max).max(1e-12);
-        let noise = roughness(means).min(bench.levels.sensor_rms);
-        let scene = Scene { speed, noise, ..bench.scene.clone() };
-        Balance { bench, means, scene, width, parts }
+        let noise = roughness(means).min(data.levels.sensor_rms);
+        let scene = Scene { speed, noise, ..data.scene.clone() };
+        Balance { data, means, scene, width, parts }
     }
 
     /// Columns that a command held between samples puts into the balance, early and late: what acts around a sample is the mean of the two beside it.
@@ -159,7 +159,7 @@ impl<'a> Balance<'a> {
         let weights = weights(self.width);
         let facts = law.map(|l| l.facts());
         let own = facts.map_or(0, |f| if f.fixed { 0 } else { f.columns });
-        let free_body = matches!(self.bench.form.given.body, Body::FreeInertia { .. });
+        let free_body = matches!(self.data.form.given.body, Body::FreeInertia { .. });
         let count = 4 + own + self.parts.len();
         let total: usize = self.parts.iter().map(|p| p.rows.len()).sum();
         if total < 4 * count {
@@ -221,9 +221,9 @@ impl<'a> Balance<'a> {
 
     /// The given plant with another body and delay; a spring or a damper that pushes is none.
     pub fn plant(&self, gain: f64, delay_samples: f64, viscous: f64, stiffness: f64) -> Plant {
-        let given = &self.bench.form.given;
-        let t = self.bench.scene.sample_time_s;
-        let over = given.resonance_gain / self.bench.scene.arm_over_record();
+        let given = &self.data.form.given;
+        let t = self.data.scene.sample_time_s;
+        let over = given.resonance_gain / self.data.scene.arm_over_record();
         let gain = gain / over;
         let body = match given.body {
             Body::FreeInertia { .. } => {
@@ -231,7 +231,7 @@ impl<'a> Balance<'a> {
             }
             _ => {
                 // A spring too weak for these records to show still makes a body of second order.
-                let slowest = (std::f64::consts::PI / self.bench.scene.duration_s.max(t)).powi(2);
+                let slowest = (std::f64::consts::PI / self.data.scene.duration_s.max(t)).powi(2);
                 let k = stiffness.max(1e-2 * slowest).max(SLOWEST_RAD_S * SLOWEST_RAD_S);
                 let damping_ratio = (0.5 * viscous / k.sqrt()).max(1e-3);
                 Body::SecondOrder { dc_gain: gain / k, natural_frequency_rad_s: k.sqrt(), damping_ratio }

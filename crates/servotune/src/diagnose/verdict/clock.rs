@@ -29,25 +29,25 @@ pub(super) struct Clock {
 }
 
 /// The linear parameters under a clock that makes all frequencies 1 + e times as high.
-fn scaled(bench: &DiagnosisData, e: f64) -> Vec<f64> {
-    let form = &bench.form;
+fn scaled(data: &DiagnosisData, e: f64) -> Vec<f64> {
+    let form = &data.form;
     let (_, _, c) = body_numbers(&form.given.body);
-    let knob = |knob: &FreeParameter| match knob {
+    let free_parameter = |free_parameter: &FreeParameter| match free_parameter {
         FreeParameter::Gain => 2.0 * e.ln_1p(),
         FreeParameter::Stiffness => e * (2.0 + e),
         FreeParameter::Viscous => c * e / rate_of(&form.given.body),
-        FreeParameter::Delay => -form.given.delay_s * e / (1.0 + e) / bench.scene.sample_time_s,
+        FreeParameter::Delay => -form.given.delay_s * e / (1.0 + e) / data.scene.sample_time_s,
         FreeParameter::Pole(_) | FreeParameter::Zero(_) => e.ln_1p(),
         FreeParameter::PoleDamping(_) | FreeParameter::ZeroDamping(_) => 0.0,
     };
-    form.knobs.iter().map(knob).collect()
+    form.free_parameters.iter().map(free_parameter).collect()
 }
 
 impl Clock {
     /// The scale under which the given plant fits best.
-    pub fn of(bench: &DiagnosisData, given: f64) -> Clock {
-        let fit = bench.fit(vec![]);
-        let cost = |e: f64| fit.cost(&scaled(bench, e));
+    pub fn of(data: &DiagnosisData, given: f64) -> Clock {
+        let fit = data.fit(vec![]);
+        let cost = |e: f64| fit.cost(&scaled(data, e));
         // Farther off the error has more than one valley.
         let coarse = (-20..=20).map(|i| LARGEST * (f64::from(i) / 20.0).powi(3)).map(|e| (cost(e), e));
         let near = coarse.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.0, |c| c.1);
@@ -66,9 +66,9 @@ impl Clock {
     }
 
     /// The finding.
-    pub fn finding(&self, bench: &DiagnosisData) -> Finding {
+    pub fn finding(&self, data: &DiagnosisData) -> Finding {
         let &Facts { name: effect, says, port, .. } = &time_base_drift::FACTS;
-        let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
+        let runs: Vec<&Run> = data.fit_runs.iter().map(|&r| &data.runs[r]).collect();
         let off = 1.96 * self.sigma;
         let (value, unit) = (self.relative, "1".to_owned());
         Finding {

@@ -40,20 +40,20 @@ impl Confirmation {
 /// Every law of the final model, asked of the held-out records within the fit's range. Where one of them is each record's own, or goes by a
 /// clock, the model says nothing of other records.
 pub(in crate::diagnose) fn confirm(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     selection: &Selection,
     fixed: &Corrected,
     held_out: &[HeldOut],
     iterations: usize,
 ) -> Result<Vec<Confirmation>, LtiError> {
     let model = &selection.model;
-    let asked: Vec<_> = bench.runs.iter().filter(|r| held_out.iter().any(|h| h.inside && h.record == r.name)).collect();
+    let asked: Vec<_> = data.runs.iter().filter(|r| held_out.iter().any(|h| h.inside && h.record == r.name)).collect();
     let errors = |model: &Model| -> Result<Vec<f64>, LtiError> {
-        let carrier = bench.form.carrier(&model.refitted.p).plant;
+        let nominal = data.form.nominal(&model.refitted.p).plant;
         let mut all = Vec::new();
         for run in &asked {
-            let own = SimulatedModel { plant: &carrier, ..fixed.judged(bench, selection) }.columns(run)?;
-            all.extend(bench.along(run, model, &own)?);
+            let own = SimulatedModel { plant: &nominal, ..fixed.judged(data, selection) }.columns(run)?;
+            all.extend(data.along(run, model, &own)?);
         }
         Ok(all)
     };
@@ -69,7 +69,7 @@ pub(in crate::diagnose) fn confirm(
         chosen.remove(at);
         let without = match chosen.is_empty() {
             true => errors(&selection.baseline)?,
-            false => errors(&fitted(bench, chosen, &model.refitted.p, iterations.div_ceil(2)))?,
+            false => errors(&fitted(data, chosen, &model.refitted.p, iterations.div_ceil(2)))?,
         };
         let sums = with
             .iter()

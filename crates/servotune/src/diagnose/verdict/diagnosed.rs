@@ -11,7 +11,7 @@ pub struct Diagnosed {
     /// What stands in diagnosis.json.
     pub diagnosis: Diagnosis,
     /// The ground it was made on.
-    pub bench: DiagnosisData,
+    pub data: DiagnosisData,
     /// The search.
     pub selection: Selection,
     /// The corrected model.

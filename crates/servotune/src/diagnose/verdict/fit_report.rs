@@ -14,7 +14,7 @@ pub(in crate::diagnose) type Errors = [Vec<Vec<f64>>; 3];
 
 /// The figures, and the errors of all runs under the three models: as the report shows them, and in open loop.
 pub(in crate::diagnose) fn fit_report(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     given: &Plant,
     reporting: &Reporting,
     reported: &Reported,
@@ -27,12 +27,12 @@ pub(in crate::diagnose) fn fit_report(
     };
     let open = three(None);
     let chosen = if closed.is_some() { three(closed) } else { open.clone() };
-    (figures_of(bench, &every, [&open, &chosen], closed.is_some()), chosen, open)
+    (figures_of(data, &every, [&open, &chosen], closed.is_some()), chosen, open)
 }
 
 /// The figures of these errors: given, refit, corrected; in open loop and as the report shows them.
 pub(in crate::diagnose) fn figures_of(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     every: &[&Run],
     [open, chosen]: [&Errors; 2],
     closed: bool,
@@ -46,8 +46,8 @@ pub(in crate::diagnose) fn figures_of(
         let [before, refit, after] = [rms(&pick(0)), rms(&pick(1)), rms(&pick(2))];
         // The floor from repeats of the fit records, under the model that fits best; it is the same for every record.
         let least = if after <= before || before.is_nan() { &e[2] } else { &e[0] };
-        let rounding = bench.grid.map_or(0.0, |g| g.step / 12f64.sqrt());
-        let noise = floor(least, every).unwrap_or_else(|| fallback_floor(bench, after)).max(rounding.min(after));
+        let rounding = data.grid.map_or(0.0, |g| g.step / 12f64.sqrt());
+        let noise = floor(least, every).unwrap_or_else(|| fallback_floor(data, after)).max(rounding.min(after));
         let room = before * before - noise * noise;
         let explained_share =
             if room > 0.0 { (1.0 - (after * after - noise * noise).max(0.0) / room).clamp(-1.0, 1.0) } else { 1.0 };
@@ -89,6 +89,6 @@ pub(in crate::diagnose) fn figures_of(
 }
 
 /// Without repeats the floor is the sensor's noise as the spectrum shows it, never more than what the best model leaves.
-fn fallback_floor(bench: &DiagnosisData, after: f64) -> f64 {
-    bench.levels.sensor_rms.min(after)
+fn fallback_floor(data: &DiagnosisData, after: f64) -> f64 {
+    data.levels.sensor_rms.min(after)
 }

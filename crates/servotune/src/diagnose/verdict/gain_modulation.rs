@@ -37,39 +37,39 @@ struct Swung {
 }
 
 impl Ready {
-    fn of(bench: &DiagnosisData, sampled: &Sampled, run: &Run, error: &[f64]) -> Ready {
+    fn of(data: &DiagnosisData, sampled: &Sampled, run: &Run, error: &[f64]) -> Ready {
         let mut local = NuisanceBasis::default();
-        let t = bench.scene.sample_time_s;
+        let t = data.scene.sample_time_s;
         // Lines are looked for elsewhere: at a frequency that the command has too, a swing would take them.
-        let lines = bench.lines.iter().flat_map(|l| l.columns(run, t));
-        for mut c in free_motions(&bench.form.given.body, t, run.len()).into_iter().chain(lines) {
-            bench.whitener.apply(&mut c);
+        let lines = data.lines.iter().flat_map(|l| l.columns(run, t));
+        for mut c in free_motions(&data.form.given.body, t, run.len()).into_iter().chain(lines) {
+            data.whitener.apply(&mut c);
             local.add_local(0, c);
         }
         let mut error = error.to_vec();
-        bench.whitener.apply(&mut error);
+        data.whitener.apply(&mut error);
         local.project(&mut error);
         Ready { acting: acting(&sampled.delayed, &run.input, run.before), error, local }
     }
 
     /// The command times the error sent back to where the command acts.
-    fn product(&self, bench: &DiagnosisData, sampled: &Sampled) -> Vec<f64> {
+    fn product(&self, data: &DiagnosisData, sampled: &Sampled) -> Vec<f64> {
         // The adjoint of a filter that does not change in time is itself, run backwards.
         let mut back: Vec<f64> = self.error.iter().rev().copied().collect();
-        bench.whitener.apply(&mut back);
+        data.whitener.apply(&mut back);
         let mut torque = vec![0.0; back.len()];
         sampled.direct.add_response(&back, &mut torque);
         self.acting.iter().zip(torque.iter().rev()).map(|(i, w)| i * w).collect()
     }
 
-    fn swung(&self, bench: &DiagnosisData, sampled: &Sampled, hz: f64) -> Swung {
-        let t = bench.scene.sample_time_s;
+    fn swung(&self, data: &DiagnosisData, sampled: &Sampled, hz: f64) -> Swung {
+        let t = data.scene.sample_time_s;
         let column = |of: fn(f64) -> f64| {
             let torque: Vec<f64> =
                 self.acting.iter().enumerate().map(|(k, i)| i * of(TAU * hz * (k as f64 + 0.5) * t)).collect();
             let mut y = vec![0.0; torque.len()];
             sampled.direct.add_response(&torque, &mut y);
-            bench.whitener.apply(&mut y);
+            data.whitener.apply(&mut y);
             y
         };
         let columns = [column(f64::cos), column(f64::sin)];
@@ -81,13 +81,12 @@ impl Ready {
 }
 
 /// A swing of the gain that all runs show, each in its own phase.
-pub(in crate::diagnose) fn gain_modulation(bench: &DiagnosisData, selection: &Selection) -> Option<Finding> {
-    let t = bench.scene.sample_time_s;
-    let plant = bench.form.carrier(&selection.model.refitted.p).plant;
+pub(in crate::diagnose) fn gain_modulation(data: &DiagnosisData, selection: &Selection) -> Option<Finding> {
+    let t = data.scene.sample_time_s;
+    let plant = data.form.nominal(&selection.model.refitted.p).plant;
     let sampled = Sampled::of(&plant, t).ok()?;
-    let runs: Vec<Ready> =
-        left(bench, selection).par_iter().map(|(run, e)| Ready::of(bench, &sampled, run, e)).collect();
-    let products: Vec<Vec<f64>> = runs.par_iter().map(|r| r.product(bench, &sampled)).collect();
+    let runs: Vec<Ready> = left(data, selection).par_iter().map(|(run, e)| Ready::of(data, &sampled, run, e)).collect();
+    let products: Vec<Vec<f64>> = runs.par_iter().map(|r| r.product(data, &sampled)).collect();
     let numbers = 2 * runs.len();
     let line = peak(&products, &vec![1.0; runs.len()], numbers, t, None)?;
     let longest = products.iter().map(Vec::len).max()?;
@@ -95,7 +94,7 @@ pub(in crate::diagnose) fn gain_modulation(bench: &DiagnosisData, selection: &Se
     if line.hz < SWING_PERIODS * width {
         return None;
     }
-    let at = |hz: f64| -> Vec<Swung> { runs.par_iter().map(|r| r.swung(bench, &sampled, hz)).collect() };
+    let at = |hz: f64| -> Vec<Swung> { runs.par_iter().map(|r| r.swung(data, &sampled, hz)).collect() };
     let gain = |all: &[Swung]| all.iter().map(|s| s.gain).sum::<f64>();
     let hz = golden_section(|hz| -gain(&at(hz)), line.hz - 0.5 * width, line.hz + 0.5 * width, 1e-3 * width).x;
     let all = at(hz);
@@ -111,7 +110,7 @@ pub(in crate::diagnose) fn gain_modulation(bench: &DiagnosisData, selection: &Se
     let apart = 1.96 * (12.0 / gain(&all)).sqrt() / (TAU * longest as f64 * t);
     let estimate =
         |value: f64, off: f64, unit: &str| Estimate { value, low: value - off, high: value + off, unit: unit.into() };
-    let fitted: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
+    let fitted: Vec<&Run> = data.fit_runs.iter().map(|&r| &data.runs[r]).collect();
     Some(Finding {
         effect: effect.into(),
         family: vec![effect.into()],

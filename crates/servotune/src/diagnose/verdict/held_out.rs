@@ -47,26 +47,26 @@ fn within(inner: [f64; 2], outer: [f64; 2]) -> bool {
 
 /// Every record that was not used, under the linear refit and the final model.
 pub(in crate::diagnose) fn held_out(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     selection: &Selection,
     fixed: &Corrected,
 ) -> Result<Vec<HeldOut>, LtiError> {
-    let used = || bench.fit_runs.iter().map(|&r| &bench.runs[r]);
+    let used = || data.fit_runs.iter().map(|&r| &data.runs[r]);
     let positions = span(used().map(|r| &r.position[..]));
     let commands = span(used().map(|r| &r.input[..]));
     let judge = |run: &Run| {
         let per_sample = |model: &Model| -> Result<f64, LtiError> {
-            // Along the recorded motion the arm answers as the carrier does, so it starts as the carrier does.
-            let carrier = bench.form.carrier(&model.refitted.p).plant;
-            let own = SimulatedModel { plant: &carrier, ..fixed.judged(bench, selection) }.columns(run)?;
-            let e = bench.along(run, model, &own)?;
+            // Along the recorded motion the arm answers as the nominal does, so it starts as the nominal does.
+            let nominal = data.form.nominal(&model.refitted.p).plant;
+            let own = SimulatedModel { plant: &nominal, ..fixed.judged(data, selection) }.columns(run)?;
+            let e = data.along(run, model, &own)?;
             Ok(dot(&e, &e) / run.len() as f64)
         };
         let refit = per_sample(&selection.baseline)?;
         let mut after = per_sample(&selection.model)?;
         if selection.stands_by_simulation() {
-            let mut e = error(&fixed.judged(bench, selection), run, None)?;
-            bench.whitener.apply(&mut e);
+            let mut e = error(&fixed.judged(data, selection), run, None)?;
+            data.whitener.apply(&mut e);
             after = after.min(dot(&e, &e) / run.len() as f64);
         }
         Ok(HeldOut {
@@ -77,7 +77,7 @@ pub(in crate::diagnose) fn held_out(
             whitened: [refit, after],
         })
     };
-    bench.runs.iter().filter(|r| r.role == Role::Holdout).map(judge).collect()
+    data.runs.iter().filter(|r| r.role == Role::Holdout).map(judge).collect()
 }
 
 /// Mean over all records, each sample counting alike; none without records.
@@ -89,20 +89,20 @@ pub(in crate::diagnose) fn mean(all: &[HeldOut]) -> Option<[f64; 2]> {
 
 /// Power of the noise of the noisiest segment over that of what the filter makes white: where some of the fit's records are noisier than
 /// the filter says, so may one that was not used be.
-fn loudest(bench: &DiagnosisData) -> f64 {
+fn loudest(data: &DiagnosisData) -> f64 {
     let noise = |s: &Segment| s.runs.len() as f64 / (s.weight * s.weight);
-    bench.stack.segments.iter().map(noise).fold(1.0, f64::max)
+    data.stack.segments.iter().map(noise).fold(1.0, f64::max)
 }
 
 /// The record that contradicts the final model most: it still misses it by far more than noise, and the laws that were found elsewhere
 /// take too little of what the linear refit leaves there.
 ///
 /// None where a law goes by a clock of its own, which each record starts anew.
-pub(super) fn contradicts<'a>(bench: &DiagnosisData, all: &'a [HeldOut], model: &Model) -> Option<&'a HeldOut> {
+pub(super) fn contradicts<'a>(data: &DiagnosisData, all: &'a [HeldOut], model: &Model) -> Option<&'a HeldOut> {
     if model.chosen.iter().any(|c| c.setting.facts().per_record || c.effect().has_own_clock()) {
         return None;
     }
-    let loudest = loudest(bench);
+    let loudest = loudest(data);
     let [excess, left] = [0, 1].map(|i| move |h: &HeldOut| h.whitened[i] - loudest);
     let far = |h: &&HeldOut| {
         let (far, share) = if h.inside { (HELD_OUT_FAR, HELD_OUT_LEFT) } else { (BEYOND_FAR, BEYOND_LEFT) };
@@ -122,20 +122,20 @@ pub(super) fn contradicts<'a>(bench: &DiagnosisData, all: &'a [HeldOut], model: 
 }
 
 /// The record that the linear refit misses most, by far more than noise.
-pub(super) fn astray<'a>(bench: &DiagnosisData, all: &'a [HeldOut]) -> Option<&'a HeldOut> {
-    let loudest = loudest(bench);
+pub(super) fn astray<'a>(data: &DiagnosisData, all: &'a [HeldOut]) -> Option<&'a HeldOut> {
+    let loudest = loudest(data);
     let left = |h: &HeldOut| h.whitened[0] - loudest;
     let far = |h: &&HeldOut| left(h) > loudest * ASTRAY_SHARE.max(ASTRAY_SIGMA * (2.0 / h.samples as f64).sqrt());
     all.iter().filter(far).max_by(|a, b| left(a).total_cmp(&left(b)))
 }
 
 /// What acts on a record that was not used and shows on no other: the finding without a name.
-pub(super) fn unseen(bench: &DiagnosisData, selection: &Selection, h: &HeldOut) -> Option<Finding> {
-    let run = bench.runs.iter().find(|r| r.name == h.record)?;
-    let carrier = bench.form.carrier(&selection.baseline.refitted.p).plant;
-    let free = free_motions(&carrier.body, bench.scene.sample_time_s, run.len());
-    let error = bench.along(run, &selection.baseline, &free).ok()?;
-    let t = bench.scene.sample_time_s;
+pub(super) fn unseen(data: &DiagnosisData, selection: &Selection, h: &HeldOut) -> Option<Finding> {
+    let run = data.runs.iter().find(|r| r.name == h.record)?;
+    let nominal = data.form.nominal(&selection.baseline.refitted.p).plant;
+    let free = free_motions(&nominal.body, data.scene.sample_time_s, run.len());
+    let error = data.along(run, &selection.baseline, &free).ok()?;
+    let t = data.scene.sample_time_s;
     let speed = |k: usize| (run.position[(k + 1).min(run.len() - 1)] - run.position[k.saturating_sub(1)]) / (2.0 * t);
     let motion = (0..run.len()).map(|k| [run.position[k], speed(k)]).collect();
     let part = Part { records: vec![h.record.clone()], signal: &error, from_s: run.from_s, motion };

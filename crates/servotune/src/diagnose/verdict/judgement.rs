@@ -30,7 +30,7 @@ pub(in crate::diagnose) struct ByOthers {
 
 /// What stands for and against the model of the search.
 struct Evidence<'a> {
-    bench: &'a DiagnosisData,
+    data: &'a DiagnosisData,
     selection: &'a Selection,
     model: &'a Model,
     /// Share of the error in excess of noise that it explains.
@@ -44,7 +44,7 @@ struct Evidence<'a> {
 }
 
 impl<'a> Evidence<'a> {
-    fn of(d: &Diagnosis, bench: &'a DiagnosisData, selection: &'a Selection, reported: &Reported) -> Evidence<'a> {
+    fn of(d: &Diagnosis, data: &'a DiagnosisData, selection: &'a Selection, reported: &Reported) -> Evidence<'a> {
         let (base, model) = (&selection.baseline, selection.best());
         let explained = if base.excess() > 0.0 { 1.0 - model.excess().max(0.0) / base.excess() } else { 1.0 };
         // Down to the noise, and not only because there was little above it; or as near as its level may err, no law seeing anything more.
@@ -67,8 +67,8 @@ impl<'a> Evidence<'a> {
             .is_none_or(|[refit, after]| after <= HELD_OUT_NO_WORSE * refit || after <= HELD_OUT_HOLDS)
             && (simulations.is_empty() || simulations.into_iter().any(simulated))
             && reported.withdrawn.is_none();
-        let against = contradicts(bench, &d.held_out, &selection.model).cloned();
-        Evidence { bench, selection, model, explained, clean, restless, holds, against }
+        let against = contradicts(data, &d.held_out, &selection.model).cloned();
+        Evidence { data, selection, model, explained, clean, restless, holds, against }
     }
 
     /// Whether the laws of the model may be named; what speaks against it is said.
@@ -97,7 +97,7 @@ impl<'a> Evidence<'a> {
                 c.effect, c.says, c.gains
             ));
         }
-        let mixture = self.bench.levels.from_repeats && selection.mixture();
+        let mixture = self.data.noise_known && selection.mixture();
         if mixture {
             let laws: Vec<&str> = model.chosen.iter().map(|c| c.setting.facts().name).collect();
             d.remarks.push(format!(
@@ -138,7 +138,7 @@ impl<'a> Evidence<'a> {
             ));
         }
         let mut found: Vec<Finding> = Vec::new();
-        for f in (0..self.model.chosen.len()).filter_map(|at| finding(self.bench, self.selection, at)) {
+        for f in (0..self.model.chosen.len()).filter_map(|at| finding(self.data, self.selection, at)) {
             if found.iter().all(|g| g.effect != f.effect) {
                 found.push(f);
             }
@@ -157,14 +157,14 @@ impl<'a> Evidence<'a> {
     fn unnamed(&self, d: &mut Diagnosis, explained: f64) {
         // A swing in one phase for all records may have taken the first step of one that has a phase in each.
         let of_the_gain = self.model.chosen.iter().all(|c| matches!(c.setting.law, AnyLaw::ParametricGain(_)));
-        match of_the_gain.then(|| gain_modulation(self.bench, self.selection)).flatten() {
+        match of_the_gain.then(|| gain_modulation(self.data, self.selection)).flatten() {
             Some(f) => {
                 d.verdict = Verdict::Named;
                 d.findings.push(f);
             }
             None => {
                 d.verdict = Verdict::LocatedUnexplained;
-                d.findings.push(unexplained(self.bench, self.selection, explained));
+                d.findings.push(unexplained(self.data, self.selection, explained));
             }
         }
     }
@@ -173,13 +173,13 @@ impl<'a> Evidence<'a> {
 /// From findings to a verdict.
 pub(in crate::diagnose) fn judge(
     d: &mut Diagnosis,
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     selection: &Selection,
     given: &Plant,
     reported: &Reported,
     by_others: ByOthers,
 ) {
-    let evidence = Evidence::of(d, bench, selection, reported);
+    let evidence = Evidence::of(d, data, selection, reported);
     let ByOthers { logs, shocks, noise } = by_others;
     if let Some(f) = logs {
         d.verdict = if f.port == Port::Controller { Verdict::Named } else { Verdict::DataFault };
@@ -202,34 +202,34 @@ pub(in crate::diagnose) fn judge(
             evidence.unnamed(d, evidence.explained);
         }
     } else if d.findings.is_empty()
-        && let Some(f) = gain_modulation(bench, selection)
+        && let Some(f) = gain_modulation(data, selection)
     {
         d.verdict = Verdict::Named;
         d.findings.push(f);
     } else if (evidence.restless || unaccounted(selection)) && d.findings.is_empty() {
         d.verdict = Verdict::LocatedUnexplained;
-        d.findings.push(unexplained(bench, selection, 0.0));
+        d.findings.push(unexplained(data, selection, 0.0));
     }
     if d.verdict != Verdict::DataFault {
-        take_lines(d, bench, selection, shocks);
+        take_lines(d, data, selection, shocks);
     }
-    linear_verdict(d, bench, selection, given);
+    linear_verdict(d, data, selection, given);
     if d.verdict == Verdict::Refit && !reported.refits {
         // The given plant stands; whether it agrees, its own error says.
         let far = d.fit.fit.rms_before > GIVEN_FAR * d.fit.fit.noise_floor;
         d.verdict = if far { Verdict::LocatedUnexplained } else { Verdict::NoMismatch };
-        d.findings.extend(far.then(|| unexplained(bench, selection, 0.0)));
+        d.findings.extend(far.then(|| unexplained(data, selection, 0.0)));
     }
-    take_noise(d, bench, noise);
-    beyond_the_fit(d, bench, selection);
-    far_from_noise(d, bench, selection);
+    take_noise(d, data, noise);
+    beyond_the_fit(d, data, selection);
+    far_from_noise(d, data, selection);
 }
 
 /// Nothing is said to be explained while several times what repeats differ by stays in closed loop, where nothing drifts.
-fn far_from_noise(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection) {
+fn far_from_noise(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection) {
     let says = matches!(d.verdict, Verdict::Named | Verdict::Family | Verdict::NoMismatch | Verdict::Refit);
     let figures = d.fit.holdout.unwrap_or(d.fit.fit);
-    if !(says && bench.levels.from_repeats && loop_left(d, figures)) {
+    if !(says && data.levels.from_repeats && loop_left(d, figures)) {
         return;
     }
     let times = figures.rms_after / figures.noise_floor;
@@ -237,7 +237,7 @@ fn far_from_noise(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selectio
     let beside = if names.is_empty() { String::new() } else { format!(" beside {}", names.join(", ")) };
     d.remarks.push(format!("{times:.1} times the noise stay in the simulation{beside}: something else acts"));
     d.verdict = Verdict::LocatedUnexplained;
-    d.findings = vec![unexplained(bench, selection, figures.explained_share.clamp(0.0, 1.0))];
+    d.findings = vec![unexplained(data, selection, figures.explained_share.clamp(0.0, 1.0))];
 }
 
 /// Whether these figures, of records in closed loop, leave several times the noise and much of what the given plant leaves.
@@ -247,8 +247,8 @@ fn loop_left(d: &Diagnosis, figures: FitFigures) -> bool {
 }
 
 /// Pushes and lines, which were found before the search.
-fn take_lines(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection, shocks: Vec<Finding>) {
-    let (lines, unsteady) = line_findings(bench, selection);
+fn take_lines(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection, shocks: Vec<Finding>) {
+    let (lines, unsteady) = line_findings(data, selection);
     for f in shocks.into_iter().chain(lines) {
         if d.findings.is_empty() {
             d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
@@ -259,21 +259,21 @@ fn take_lines(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection, s
     }
     if d.findings.is_empty() && !unsteady.is_empty() {
         d.verdict = Verdict::LocatedUnexplained;
-        d.findings.push(super::line_finding::unsteady(bench, &unsteady));
+        d.findings.push(super::line_finding::unsteady(data, &unsteady));
     }
 }
 
 /// What the fitted records do not show, or cannot.
-fn beyond_the_fit(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection) {
+fn beyond_the_fit(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection) {
     // Nothing missing on the records that were fitted, and yet one that was not used is far off.
     if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit)
-        && let Some(f) = astray(bench, &d.held_out).and_then(|h| unseen(bench, selection, h))
+        && let Some(f) = astray(data, &d.held_out).and_then(|h| unseen(data, selection, h))
     {
         d.verdict = Verdict::LocatedUnexplained;
         d.findings.push(f);
     }
     // Without repeats, what the refit leaves beyond the sensor's white noise may be noise of torque or missing physics.
-    if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit) && coloured(d, bench, bench.levels.sensor_rms) {
+    if matches!(d.verdict, Verdict::NoMismatch | Verdict::Refit) && coloured(d, data, data.levels.sensor_rms) {
         d.verdict = Verdict::Undecidable;
         d.remarks.push(
             "no record was repeated: the error that the refit leaves is coloured, and cannot be told from noise of torque".into(),
@@ -293,20 +293,20 @@ fn believed(d: &mut Diagnosis, selection: &Selection) -> bool {
 }
 
 /// Whether, no record being repeated, the simulation leaves far more than a noise of the sensor: noise of torque, or missing physics.
-fn coloured(d: &Diagnosis, bench: &DiagnosisData, noise: f64) -> bool {
-    !bench.levels.from_repeats && d.fit.open_loop.is_some_and(|o| o.rms_after > COLOURED * noise)
+fn coloured(d: &Diagnosis, data: &DiagnosisData, noise: f64) -> bool {
+    !data.levels.from_repeats && d.fit.open_loop.is_some_and(|o| o.rms_after > COLOURED * noise)
 }
 
 /// Findings of the noise beside those of the search. What is left without a name is theirs where the linear refit comes down to their noise:
 /// a count of the encoder is no reason for what is a hundred times as large.
-fn take_noise(d: &mut Diagnosis, bench: &DiagnosisData, noise: Vec<Finding>) {
-    let rounding = bench.grid.map_or(0.0, |g| g.step / 12f64.sqrt());
-    let beyond = coloured(d, bench, bench.levels.sensor_rms.hypot(rounding));
+fn take_noise(d: &mut Diagnosis, data: &DiagnosisData, noise: Vec<Finding>) {
+    let rounding = data.grid.map_or(0.0, |g| g.step / 12f64.sqrt());
+    let beyond = coloured(d, data, data.levels.sensor_rms.hypot(rounding));
     let wind = noise.iter().any(|f| f.port == Port::Torque);
     let open = beyond && !wind;
     // A plant that was fitted under wind differs from that of records under other wind: as little as that has no name of its own.
     let h = d.fit.holdout.unwrap_or(d.fit.fit);
-    let blown = wind && !bench.coarse() && bench.levels.from_repeats && h.rms_refit_linear < WIND_LEFT * h.noise_floor;
+    let blown = wind && !data.coarse() && data.levels.from_repeats && h.rms_refit_linear < WIND_LEFT * h.noise_floor;
     if blown && d.verdict == Verdict::LocatedUnexplained {
         d.verdict = Verdict::Refit;
         d.findings.clear();

@@ -15,16 +15,16 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Every fit run with its error under the final model.
-pub(in crate::diagnose) fn left(bench: &DiagnosisData, selection: &Selection) -> Vec<(Run, Vec<f64>)> {
+pub(in crate::diagnose) fn left(data: &DiagnosisData, selection: &Selection) -> Vec<(Run, Vec<f64>)> {
     let model = &selection.model;
     let mut out = Vec::new();
     // One repeat of every segment at a time stands in for its mean.
-    let most = bench.stack.segments.iter().map(|s| s.runs.len()).max().unwrap_or(0);
+    let most = data.stack.segments.iter().map(|s| s.runs.len()).max().unwrap_or(0);
     for j in 0..most {
         let runs: Vec<Run> =
-            bench.stack.segments.iter().map(|s| bench.runs[s.runs[j.min(s.runs.len() - 1)]].clone()).collect();
-        let errors = bench.fit(model.chosen.clone()).errors_of(&model.refitted.p, &runs);
-        let own = bench.stack.segments.iter().map(|s| j < s.runs.len());
+            data.stack.segments.iter().map(|s| data.runs[s.runs[j.min(s.runs.len() - 1)]].clone()).collect();
+        let errors = data.fit(model.chosen.clone()).errors_of(&model.refitted.p, &runs);
+        let own = data.stack.segments.iter().map(|s| j < s.runs.len());
         out.extend(runs.into_iter().zip(errors).zip(own).filter(|(_, own)| *own).map(|(r, _)| r));
     }
     out
@@ -34,8 +34,8 @@ pub(in crate::diagnose) fn left(bench: &DiagnosisData, selection: &Selection) ->
 struct Phasors([Vec<[f64; 2]>; 3], f64);
 
 impl Phasors {
-    fn of(bench: &DiagnosisData, runs: &[(Run, Vec<f64>)], line: &Line) -> Phasors {
-        let (t, body) = (bench.scene.sample_time_s, &bench.form.given.body);
+    fn of(data: &DiagnosisData, runs: &[(Run, Vec<f64>)], line: &Line) -> Phasors {
+        let (t, body) = (data.scene.sample_time_s, &data.form.given.body);
         let over = |part: [usize; 2]| -> Vec<[f64; 2]> {
             let each = runs.iter().map(|(run, e)| {
                 let [from, to] = part.map(|p| p * run.len() / 2);
@@ -84,30 +84,30 @@ fn estimate(values: &[f64], scale: f64, unit: &str) -> Estimate {
 }
 
 /// A line's place: as narrow as the longest record resolves (Hz).
-fn resolved(bench: &DiagnosisData, hz: f64) -> [f64; 2] {
-    let width = 1.0 / bench.scene.duration_s.max(bench.scene.sample_time_s);
+fn resolved(data: &DiagnosisData, hz: f64) -> [f64; 2] {
+    let width = 1.0 / data.scene.duration_s.max(data.scene.sample_time_s);
     [(hz - width).max(0.0), hz + width]
 }
 
 /// A line's frequency with its 95 % interval: the Cramér-Rao bound for a tone of the strength found, its phase each record's own
 /// (Rife & Boorstyn 1974).
-fn frequency(bench: &DiagnosisData, line: &Line) -> Estimate {
-    let off = 1.96 * (12.0 / (-2.0 * line.log_p).max(1.0)).sqrt() / (TAU * bench.scene.duration_s);
+fn frequency(data: &DiagnosisData, line: &Line) -> Estimate {
+    let off = 1.96 * (12.0 / (-2.0 * line.log_p).max(1.0)).sqrt() / (TAU * data.scene.duration_s);
     Estimate { value: line.hz, low: line.hz - off, high: line.hz + off, unit: "Hz".into() }
 }
 
 /// One finding for all orders of the spindle, one for each other line; and the frequencies (Hz) of those that are none, but narrow
 /// bands of noise or something that rings.
-pub(super) fn line_findings(bench: &DiagnosisData, selection: &Selection) -> (Vec<Finding>, Vec<f64>) {
-    let errors = if bench.lines.is_empty() { Vec::new() } else { left(bench, selection) };
-    let all: Vec<(&Line, Phasors)> = bench.lines.iter().map(|l| (l, Phasors::of(bench, &errors, l))).collect();
+pub(super) fn line_findings(data: &DiagnosisData, selection: &Selection) -> (Vec<Finding>, Vec<f64>) {
+    let errors = if data.lines.is_empty() { Vec::new() } else { left(data, selection) };
+    let all: Vec<(&Line, Phasors)> = data.lines.iter().map(|l| (l, Phasors::of(data, &errors, l))).collect();
     let (hums, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|(_, p)| p.steady());
-    let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
-    let given = &bench.form.given;
+    let runs: Vec<&Run> = data.fit_runs.iter().map(|&r| &data.runs[r]).collect();
+    let given = &data.form.given;
     let make = |effect: &str, family: &[&str], lines: &[&Line], parameters: BTreeMap<String, Estimate>| {
         let (says, port) = text_of(effect);
         let strongest = lines.iter().map(|l| l.log_p).fold(0.0, f64::min);
-        let place = Where { frequency_hz: lines.iter().map(|l| resolved(bench, l.hz)).collect(), ..everywhere(&runs) };
+        let place = Where { frequency_hz: lines.iter().map(|l| resolved(data, l.hz)).collect(), ..everywhere(&runs) };
         let at: Vec<String> = lines.iter().map(|l| format!("{:.3}", l.hz)).collect();
         Finding {
             effect: effect.into(),
@@ -123,7 +123,7 @@ pub(super) fn line_findings(bench: &DiagnosisData, selection: &Selection) -> (Ve
     let mut orders: Vec<&(&Line, Phasors)> = hums.iter().filter(|l| l.0.order.is_some()).collect();
     orders.sort_by_key(|l| l.0.order);
     if let Some((first, _)) = orders.first() {
-        let mut parameters = BTreeMap::from([("base_hz".to_owned(), frequency(bench, first))]);
+        let mut parameters = BTreeMap::from([("base_hz".to_owned(), frequency(data, first))]);
         for (l, phasors) in &orders {
             let harmonic = l.order.unwrap_or(1) as f64 / first.order.unwrap_or(1) as f64;
             let name = if l.order == first.order {
@@ -140,18 +140,18 @@ pub(super) fn line_findings(bench: &DiagnosisData, selection: &Selection) -> (Ve
         let family: &[&str] = if alone { &[RUNOUT, HUM] } else { &[RUNOUT] };
         out.push(make(RUNOUT, family, &lines, parameters));
     }
-    let sampled = Sampled::of(&selection.model.refitted.plant, bench.scene.sample_time_s);
+    let sampled = Sampled::of(&selection.model.refitted.plant, data.scene.sample_time_s);
     for (l, phasors) in hums.iter().filter(|l| l.0.order.is_none()) {
         let values = phasors.amplitudes();
         let mut parameters = BTreeMap::from([
-            ("frequency_hz".to_owned(), frequency(bench, l)),
+            ("frequency_hz".to_owned(), frequency(data, l)),
             ("amplitude".to_owned(), estimate(&values, 1.0, &given.position_unit)),
         ]);
         if let Ok(s) = &sampled {
             let gain = s.direct.at(TAU * l.hz).norm();
             parameters.insert("amplitude_command".into(), estimate(&values, 1.0 / gain, &given.command_unit));
         }
-        let family: &[&str] = match bench.scene.spindle_hz {
+        let family: &[&str] = match data.scene.spindle_hz {
             Some(_) => &[HUM],
             None => &[HUM, RUNOUT],
         };
@@ -168,10 +168,10 @@ pub(super) fn same_line(a: &Finding, b: &Finding) -> bool {
 }
 
 /// What shows at some frequencies (Hz) in every repeat differently, and is no hum.
-pub(super) fn unsteady(bench: &DiagnosisData, frequencies_hz: &[f64]) -> Finding {
-    let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
+pub(super) fn unsteady(data: &DiagnosisData, frequencies_hz: &[f64]) -> Finding {
+    let runs: Vec<&Run> = data.fit_runs.iter().map(|&r| &data.runs[r]).collect();
     let port = unexplained::FACTS.port;
-    let strongest = bench.lines.iter().filter(|l| frequencies_hz.contains(&l.hz)).map(|l| l.log_p).fold(0.0, f64::min);
+    let strongest = data.lines.iter().filter(|l| frequencies_hz.contains(&l.hz)).map(|l| l.log_p).fold(0.0, f64::min);
     let at: Vec<String> = frequencies_hz.iter().map(|f| format!("{f:.3}")).collect();
     Finding {
         effect: unexplained::FACTS.name.into(),
@@ -183,9 +183,6 @@ pub(super) fn unsteady(bench: &DiagnosisData, frequencies_hz: &[f64]) -> Finding
             at.join(", ")
         ),
         parameters: BTreeMap::new(),
-        place: Where {
-            frequency_hz: frequencies_hz.iter().map(|&f| resolved(bench, f)).collect(),
-            ..everywhere(&runs)
-        },
+        place: Where { frequency_hz: frequencies_hz.iter().map(|&f| resolved(data, f)).collect(), ..everywhere(&runs) },
     }
 }

@@ -44,7 +44,7 @@ impl Way<'_> {
     /// Sum of squares with only some of the linear parameters free, and with one effect more where it is given; and those parameters.
     fn restricted(
         self,
-        bench: &DiagnosisData,
+        data: &DiagnosisData,
         keep: impl Fn(FreeParameter) -> bool,
         more: Option<SelectedEffect>,
     ) -> (f64, Vec<f64>) {
@@ -52,17 +52,18 @@ impl Way<'_> {
             Way::Simulated(model) => {
                 let mut model = model.clone();
                 model.chosen.extend(more);
-                let (cost, p) = simulated_with(bench, &model, &keep);
-                (cost, (0..p.len()).filter(|&i| keep(bench.form.knobs[i])).map(|i| p[i]).collect())
+                let (cost, p) = simulated_with(data, &model, &keep);
+                (cost, (0..p.len()).filter(|&i| keep(data.form.free_parameters[i])).map(|i| p[i]).collect())
             }
             Way::Along(model) => {
-                let knobs: Vec<FreeParameter> = bench.form.knobs.iter().copied().filter(|k| keep(*k)).collect();
-                let form = LinearForm { knobs: knobs.clone(), ..bench.form.clone() };
-                let start = vec![0.0; knobs.len()];
+                let free_parameters: Vec<FreeParameter> =
+                    data.form.free_parameters.iter().copied().filter(|k| keep(*k)).collect();
+                let form = LinearForm { free_parameters: free_parameters.clone(), ..data.form.clone() };
+                let start = vec![0.0; free_parameters.len()];
                 let mut chosen = model.chosen.clone();
                 chosen.extend(more);
-                let mut fit = Fit { form: &form, ..bench.fit(chosen) };
-                if knobs.is_empty() && fit.chosen.is_empty() {
+                let mut fit = Fit { form: &form, ..data.fit(chosen) };
+                if free_parameters.is_empty() && fit.chosen.is_empty() {
                     return (fit.cost(&start), start);
                 }
                 let r = fit.refit(&start, 8);
@@ -73,8 +74,8 @@ impl Way<'_> {
 }
 
 /// Lags that fit as well as a delay of `delay_s` does, beside linear parameters as given: a lag far above the band is a delay.
-fn lags_like(bench: &DiagnosisData, way: Way, delay_s: f64, cost: f64) -> Vec<String> {
-    let as_good = |law: &AnyLaw| way.restricted(bench, |_| false, Some(lag(law.clone(), delay_s))).0 < cost + FAMILY;
+fn lags_like(data: &DiagnosisData, way: Way, delay_s: f64, cost: f64) -> Vec<String> {
+    let as_good = |law: &AnyLaw| way.restricted(data, |_| false, Some(lag(law.clone(), delay_s))).0 < cost + FAMILY;
     lags(delay_s).into_iter().filter(as_good).map(|law| law.facts().name.to_owned()).collect()
 }
 
@@ -103,10 +104,10 @@ struct Lag {
 impl Lag {
     /// The lags of the library, each fitted beside linear parameters as given, the best first; `near_s` is a delay that does something
     /// like it.
-    fn alone(bench: &DiagnosisData, near_s: f64) -> Vec<Lag> {
-        let form = LinearForm { knobs: Vec::new(), ..bench.form.clone() };
+    fn alone(data: &DiagnosisData, near_s: f64) -> Vec<Lag> {
+        let form = LinearForm { free_parameters: Vec::new(), ..data.form.clone() };
         let fitted = |law: AnyLaw| {
-            let mut fit = Fit { form: &form, ..bench.fit(vec![lag(law, near_s)]) };
+            let mut fit = Fit { form: &form, ..data.fit(vec![lag(law, near_s)]) };
             let r = fit.refit(&[], ITERATIONS);
             Lag { spread: r.spread(0), cost: r.cost, chosen: fit.chosen.swap_remove(0) }
         };
@@ -120,12 +121,12 @@ impl Lag {
     }
 
     /// The finding; `before` is the sum of squares of the given plant.
-    fn finding(&self, bench: &DiagnosisData, family: Vec<String>, before: f64) -> Finding {
+    fn finding(&self, data: &DiagnosisData, family: Vec<String>, before: f64) -> Finding {
         let (says, port) = text_of(self.name());
-        let given = &bench.form.given;
+        let given = &data.form.given;
         let parameters = |by: f64| {
             let law = &self.chosen.setting.law;
-            Setting::fixed(law.with_number(0, law.first_number() * by.exp())).parameters(&bench.scene)
+            Setting::fixed(law.with_number(0, law.first_number() * by.exp())).parameters(&data.scene)
         };
         let off = 1.96 * self.spread;
         let ends = parameters(-off).into_iter().zip(parameters(off));
@@ -141,18 +142,18 @@ impl Lag {
             p_value: log_tail(before - self.cost, 1).min(0.0).exp().max(1e-300),
             says: format!("{says}; with it alone the model fits as well as with all of its numbers fitted."),
             parameters: parameters(0.0).into_iter().zip(ends).map(estimate).collect(),
-            place: everywhere(&bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect::<Vec<_>>()),
+            place: everywhere(&data.fit_runs.iter().map(|&r| &data.runs[r]).collect::<Vec<_>>()),
         }
     }
 }
 
 /// What happened to the linear parameters of the `given` plant: nothing, the delay alone, one mode alone, or a refit.
-pub(super) fn linear_verdict(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection, given: &Plant) {
+pub(super) fn linear_verdict(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection, given: &Plant) {
     if d.verdict == Verdict::LocatedUnexplained || d.verdict == Verdict::DataFault {
         return;
     }
     // Around another plant the given one was far off already.
-    if bench.form.given == *given && simple_story(d, bench, selection) {
+    if data.form.given == *given && simple_story(d, data, selection) {
         return;
     }
     if d.verdict == Verdict::NoMismatch {
@@ -168,8 +169,8 @@ pub(super) fn linear_verdict(d: &mut Diagnosis, bench: &DiagnosisData, selection
 }
 
 /// Whether the given numbers still do, but for one of them; says which.
-fn simple_story(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection) -> bool {
-    let all = bench.form.knobs.len() as f64;
+fn simple_story(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection) -> bool {
+    let all = data.form.free_parameters.len() as f64;
     // Chi-square of as many parameters as were freed, and four of its standard deviations.
     let allowed = |free: usize| {
         let n = all - free as f64;
@@ -177,7 +178,7 @@ fn simple_story(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection)
     };
     let (mut fixed, mut later_s) = (Vec::new(), 0.0);
     for way in Way::all(selection) {
-        let cost = way.restricted(bench, |_| false, None).0;
+        let cost = way.restricted(data, |_| false, None).0;
         if cost - way.full() < allowed(0) {
             d.remarks.push("the linear parameters agree with the given plant".into());
             return true;
@@ -185,16 +186,16 @@ fn simple_story(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection)
         fixed.push(cost);
     }
     for (way, &fixed) in Way::all(selection).zip(&fixed) {
-        let (delay, p) = way.restricted(bench, |k| k == FreeParameter::Delay, None);
-        let t = bench.scene.sample_time_s;
+        let (delay, p) = way.restricted(data, |k| k == FreeParameter::Delay, None);
+        let t = data.scene.sample_time_s;
         let value = p[0] * t;
         if delay - way.full() >= allowed(1) {
             later_s = value;
             continue;
         }
-        let sigma = bench
+        let sigma = data
             .form
-            .knobs
+            .free_parameters
             .iter()
             .position(|k| *k == FreeParameter::Delay)
             .map_or(0.0, |i| selection.model.refitted.spread(i))
@@ -202,7 +203,7 @@ fn simple_story(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection)
         let &Facts { name: effect, says, port, .. } = &extra_delay::FACTS;
         let mut family = vec![effect.to_owned()];
         if value > 0.0 {
-            family.extend(lags_like(bench, way, value, delay));
+            family.extend(lags_like(data, way, value, delay));
         }
         // Only a controller's replay tells a late log from a late machine.
         if d.replay.is_none() {
@@ -218,7 +219,7 @@ fn simple_story(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection)
                 "delay_s".to_owned(),
                 Estimate { value, low: value - 1.96 * sigma, high: value + 1.96 * sigma, unit: "s".into() },
             )]),
-            place: everywhere(&bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect::<Vec<_>>()),
+            place: everywhere(&data.fit_runs.iter().map(|&r| &data.runs[r]).collect::<Vec<_>>()),
         };
         if d.verdict == Verdict::NoMismatch {
             d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
@@ -227,22 +228,22 @@ fn simple_story(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection)
         return true;
     }
     if d.findings.is_empty() && selection.model.chosen.is_empty() && later_s > 0.0 {
-        let lags = Lag::alone(bench, later_s);
+        let lags = Lag::alone(data, later_s);
         let width = lags.first().map_or(0.0, |l| FAMILY.max(LAGS_ALIKE * (fixed[0] - l.cost)));
         let like: Vec<String> =
             lags.iter().filter(|l| l.cost < lags[0].cost + width).map(|l| l.name().to_owned()).collect();
         let sure = |l: &&Lag| fixed[0] - l.cost > ONE_NUMBER && l.cost - selection.model.cost < allowed(1);
         if let Some(lag) = lags.first().filter(sure) {
             d.verdict = if like.len() > 1 { Verdict::Family } else { Verdict::Named };
-            d.findings.push(lag.finding(bench, like, fixed[0]));
+            d.findings.push(lag.finding(data, like, fixed[0]));
             return true;
         }
     }
     if d.findings.is_empty() && selection.model.chosen.is_empty() {
-        let clock = Clock::of(bench, fixed[0]);
+        let clock = Clock::of(data, fixed[0]);
         if clock.sure() && clock.cost - selection.model.cost < allowed(1) {
             d.verdict = Verdict::DataFault;
-            d.findings.push(clock.finding(bench));
+            d.findings.push(clock.finding(data));
             return true;
         }
     }

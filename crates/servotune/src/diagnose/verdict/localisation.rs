@@ -80,15 +80,15 @@ pub struct Part<'a> {
 }
 
 /// Where `signal`, stacked and whitened, has its energy.
-pub fn place(bench: &DiagnosisData, stack: &StackedRecords, signal: &[f64]) -> Where {
+pub fn place(data: &DiagnosisData, stack: &StackedRecords, signal: &[f64]) -> Where {
     let part = |(s, motion): (&Segment, &Trajectory)| Part {
-        records: s.runs.iter().map(|&r| bench.runs[r].name.clone()).collect(),
+        records: s.runs.iter().map(|&r| data.runs[r].name.clone()).collect(),
         signal: &signal[s.start..s.start + s.len],
-        from_s: bench.runs[s.runs[0]].from_s,
+        from_s: data.runs[s.runs[0]].from_s,
         motion: motion.samples.iter().map(|m| [m.x, m.v]).collect(),
     };
-    let parts: Vec<Part> = stack.segments.iter().zip(&bench.trajectories).map(part).collect();
-    place_of(&parts, bench.scene.sample_time_s)
+    let parts: Vec<Part> = stack.segments.iter().zip(&data.trajectories).map(part).collect();
+    place_of(&parts, data.scene.sample_time_s)
 }
 
 /// Where whitened signals, sampled every `t` seconds, have their energy.

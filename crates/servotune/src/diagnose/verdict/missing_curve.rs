@@ -53,17 +53,17 @@ pub(in crate::diagnose) struct Standing<'a> {
 
 /// Looks for a curve and takes it where it is worth it.
 pub(in crate::diagnose) fn stand_in(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     selection: &Selection,
     standing: &Standing,
     progress: &mut dyn FnMut(&str),
 ) -> Option<StandIn> {
-    let [ground, one_place] = grounds(bench);
-    let found = estimated(bench, [&ground, &one_place], &starts(bench, selection), &balanced(bench), progress)?;
+    let [ground, one_place] = grounds(data);
+    let found = estimated(data, [&ground, &one_place], &starts(data, selection), &balanced(data), progress)?;
     let best = taken(&found)?;
-    let model = model(bench, best, &found.plain);
-    let errors = [standing.closed, None].map(|closed| shown(bench, &model, best, &one_place, closed));
-    let which = judged_runs(bench);
+    let model = model(data, best, &found.plain);
+    let errors = [standing.closed, None].map(|closed| shown(data, &model, best, &one_place, closed));
+    let which = judged_runs(data);
     let of = |e: &[Vec<f64>]| rms(&which.iter().map(|&i| e[i].clone()).collect::<Vec<_>>());
     let [given, refit, laws] = [0, 1, 2].map(|m| of(&standing.errors[m]));
     let (linear, after) = (given.min(refit), of(&errors[0]));
@@ -73,12 +73,12 @@ pub(in crate::diagnose) fn stand_in(
     let floor = standing.floor.min(after);
     let explained_share =
         1.0 - (after * after - floor * floor) / (linear * linear - floor * floor).max(f64::MIN_POSITIVE);
-    let reading = found.reading.as_ref().map(|_| reading_finding(bench, best, &found));
+    let reading = found.reading.as_ref().map(|_| reading_finding(data, best, &found));
     let near = explained_share >= NAMED_SHARE && after <= CURVE_NAMED * standing.floor;
-    let finding = reading.or_else(|| bearing_finding(bench, best, &found).filter(|_| near));
+    let finding = reading.or_else(|| bearing_finding(data, best, &found).filter(|_| near));
     let curved = matches!(best.trial.shape, Shape::Curve(..));
     let named = finding.is_some();
-    let curve = curved.then(|| described(bench, &found, explained_share.clamp(-1.0, 1.0), named));
+    let curve = curved.then(|| described(data, &found, explained_share.clamp(-1.0, 1.0), named));
     Some(StandIn { corrected: model, errors, curve, finding })
 }
 
@@ -96,16 +96,16 @@ fn taken<'e, 'a>(found: &'e Estimated<'a>) -> Option<&'e Foretelling<'a>> {
 }
 
 /// The runs that judge: those that were not used, else those that were.
-fn judged_runs(bench: &DiagnosisData) -> Vec<usize> {
+fn judged_runs(data: &DiagnosisData) -> Vec<usize> {
     let role = |role: Role| -> Vec<usize> {
-        (0..bench.runs.len()).filter(|&i| bench.runs[i].role == role && !bench.runs[i].shocked).collect()
+        (0..data.runs.len()).filter(|&i| data.runs[i].role == role && !data.runs[i].shocked).collect()
     };
     Some(role(Role::Holdout)).filter(|h| !h.is_empty()).unwrap_or_else(|| role(Role::Fit))
 }
 
 /// Recorded less simulated position of every run under the model.
 fn shown(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     model: &Corrected,
     best: &Foretelling,
     one_place: &Stretches,
@@ -115,20 +115,20 @@ fn shown(
         // Where the arm stands is not known from what is read: every place that gives the first reading is a start.
         let place = &one_place.runs[0];
         let runs: Vec<Run> =
-            bench.runs.iter().map(|r| Run { origin: place.origin, before: place.before, ..r.clone() }).collect();
+            data.runs.iter().map(|r| Run { origin: place.origin, before: place.before, ..r.clone() }).collect();
         let all = Stretches { blocks: runs.iter().map(|r| (r.len(), 0)).collect(), runs };
         return best.trial.clone().over(&all).shown();
     }
-    let every: Vec<&Run> = bench.runs.iter().collect();
+    let every: Vec<&Run> = data.runs.iter().collect();
     let effects = model.effects.iter().collect();
-    let scene = &bench.scene;
-    let judged = SimulatedModel { plant: &model.plant, effects, own: vec![], lines: &bench.lines, fit: None, scene };
+    let scene = &data.scene;
+    let judged = SimulatedModel { plant: &model.plant, effects, own: vec![], lines: &data.lines, fit: None, scene };
     errors(&judged, &every, closed)
 }
 
 /// The entry of an effect with named parameters.
-fn entry(bench: &DiagnosisData, setting: &Setting) -> PhysicsEntry {
-    let parameters = setting.parameters(&bench.scene).into_iter().map(|q| (q.name.to_owned(), q.value));
+fn entry(data: &DiagnosisData, setting: &Setting) -> PhysicsEntry {
+    let parameters = setting.parameters(&data.scene).into_iter().map(|q| (q.name.to_owned(), q.value));
     PhysicsEntry { effect: setting.facts().name.into(), parameters: parameters.collect(), curve: None }
 }
 
@@ -145,14 +145,14 @@ fn knots(c: &Plain) -> Vec<CurveKnot> {
 }
 
 /// The plant with everything that the fit put beside it.
-fn model(bench: &DiagnosisData, best: &Foretelling, c: &Plain) -> Corrected {
+fn model(data: &DiagnosisData, best: &Foretelling, c: &Plain) -> Corrected {
     let trial = &best.trial;
     let curved = matches!(trial.shape, Shape::Curve(..));
-    let mut plant: Plant = bench.form.plant(if curved { &c.p } else { &trial.p });
+    let mut plant: Plant = data.form.plant(if curved { &c.p } else { &trial.p });
     let (position, command) = (plant.position_unit.clone(), plant.command_unit.clone());
     let behind = trial.lag_s.filter(|_| curved && c.port == CurvePort::AmplifierOverCommand);
     let mut effects: Vec<Setting> = trial.lag_s.filter(|_| behind.is_none()).map(lag).into_iter().collect();
-    plant.physics = effects.iter().map(|s| entry(bench, s)).collect();
+    plant.physics = effects.iter().map(|s| entry(data, s)).collect();
     if curved {
         let mut curve = c.port.curve(&c.at, &c.value);
         curve.lag_s = behind;
@@ -160,7 +160,7 @@ fn model(bench: &DiagnosisData, best: &Foretelling, c: &Plain) -> Corrected {
         effects.push(Setting::fixed(curve));
     }
     if let Some(s) = trial.reading.effect() {
-        plant.physics.push(entry(bench, &s));
+        plant.physics.push(entry(data, &s));
         effects.push(s);
     }
     Corrected { plant, effects }
@@ -178,9 +178,9 @@ pub fn curve_title(port: &str, argument: &str) -> String {
     }
 }
 
-fn described(bench: &DiagnosisData, found: &Estimated, explained_share: f64, named: bool) -> FreeForm {
+fn described(data: &DiagnosisData, found: &Estimated, explained_share: f64, named: bool) -> FreeForm {
     let c = &found.plain;
-    let form = &bench.form.given;
+    let form = &data.form.given;
     let [port, argument] = c.port.names();
     let [argument_unit, unit] = c.port.units(&form.position_unit, &form.command_unit);
     let like = likeness(c);
@@ -211,13 +211,13 @@ fn described(bench: &DiagnosisData, found: &Estimated, explained_share: f64, nam
 }
 
 /// The finding of a reading that folds or ends at limits.
-fn reading_finding(bench: &DiagnosisData, best: &Foretelling, found: &Estimated) -> Finding {
+fn reading_finding(data: &DiagnosisData, best: &Foretelling, found: &Estimated) -> Finding {
     let &Facts { name: effect, says, port, .. } = &sensor_curve::FACTS;
     let none = || Setting::fixed(SensorCurve::Folded { lowest: 0.0, at: 0.0 });
     let setting = best.trial.reading.effect().unwrap_or_else(none);
     let from = best.trial.reading_from();
-    let unit = &bench.form.given.position_unit;
-    let parameters = setting.parameters(&bench.scene).into_iter().enumerate().map(|(i, q)| {
+    let unit = &data.form.given.position_unit;
+    let parameters = setting.parameters(&data.scene).into_iter().enumerate().map(|(i, q)| {
         let off = 1.96 * best.spread(from + i);
         let e = Estimate { value: q.value, low: q.value - off, high: q.value + off, unit: unit.clone() };
         (q.name.to_owned(), e)
@@ -226,7 +226,7 @@ fn reading_finding(bench: &DiagnosisData, best: &Foretelling, found: &Estimated)
     let samples = best.trial.stretches.total() as f64;
     // The ratio of the likelihoods of what is foretold, as a chance under noise alone.
     let log_p = -0.5 * samples * (found.linear.left_out / best.left_out).ln();
-    let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
+    let runs: Vec<&Run> = data.fit_runs.iter().map(|&r| &data.runs[r]).collect();
     Finding {
         effect: effect.into(),
         family: vec![effect.into()],
@@ -239,7 +239,7 @@ fn reading_finding(bench: &DiagnosisData, best: &Foretelling, found: &Estimated)
 }
 
 /// The finding of a drag of any loading curve: generalised Maxwell slip, whose sliders all resist.
-fn bearing_finding(bench: &DiagnosisData, best: &Foretelling, found: &Estimated) -> Option<Finding> {
+fn bearing_finding(data: &DiagnosisData, best: &Foretelling, found: &Estimated) -> Option<Finding> {
     let c = &found.plain;
     if c.port != CurvePort::TorqueOverLoading || !matches!(best.trial.shape, Shape::Curve(..)) {
         return None;
@@ -255,7 +255,7 @@ fn bearing_finding(bench: &DiagnosisData, best: &Foretelling, found: &Estimated)
     if !(falls < LOADING_FALLS * most && c.value[last / 2] > LOADING_LEVEL * most) {
         return None;
     }
-    let [position, command] = [&bench.form.given.position_unit, &bench.form.given.command_unit];
+    let [position, command] = [&data.form.given.position_unit, &data.form.given.command_unit];
     let level = Estimate {
         value: c.value[last],
         low: c.value[last] - 1.96 * c.spread[last],
@@ -266,11 +266,11 @@ fn bearing_finding(bench: &DiagnosisData, best: &Foretelling, found: &Estimated)
     let half = (0..=last).find(|&i| c.value[i] >= 0.5 * c.value[last])?;
     let (way, off) = (c.at[half] * c.value[last] / c.value[half], 1.96 * c.spread[half] / c.value[half]);
     let length = Estimate { value: way, low: way * (1.0 - off), high: way * (1.0 + off), unit: position.clone() };
-    let pivot = way > shortest_loop(&bench.scene);
+    let pivot = way > shortest_loop(&data.scene);
     let facts = if pivot { &pivot_friction::FACTS } else { &coulomb_friction::FACTS };
     let samples = best.trial.stretches.total() as f64;
     let log_p = -0.5 * samples * (found.linear.left_out / best.left_out).ln();
-    let runs: Vec<&Run> = bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect();
+    let runs: Vec<&Run> = data.fit_runs.iter().map(|&r| &data.runs[r]).collect();
     Some(Finding {
         effect: facts.name.into(),
         family: vec![facts.name.into()],
@@ -303,18 +303,18 @@ pub struct MissingCurve {
 }
 
 /// The curve at the port where it foretells best, whatever the verdict; none where it foretells no better than a linear plant.
-pub fn missing_curve(bench: &DiagnosisData, selection: &Selection) -> Option<MissingCurve> {
-    let [ground, one_place] = grounds(bench);
-    let found = estimated(bench, [&ground, &one_place], &starts(bench, selection), &balanced(bench), &mut |_| {})?;
+pub fn missing_curve(data: &DiagnosisData, selection: &Selection) -> Option<MissingCurve> {
+    let [ground, one_place] = grounds(data);
+    let found = estimated(data, [&ground, &one_place], &starts(data, selection), &balanced(data), &mut |_| {})?;
     let best = taken(&found).filter(|b| matches!(b.trial.shape, Shape::Curve(..)))?;
-    let errors = shown(bench, &model(bench, best, &found.plain), best, &one_place, None);
+    let errors = shown(data, &model(data, best, &found.plain), best, &one_place, None);
     let share = 1.0 - best.left_out / found.linear.left_out;
-    Some(MissingCurve { curve: described(bench, &found, share, false), errors })
+    Some(MissingCurve { curve: described(data, &found, share, false), errors })
 }
 
 /// Linear parameters from which curves are looked for: the given plant, the refit, and the plant beside the laws that were found.
-fn starts(bench: &DiagnosisData, selection: &Selection) -> Vec<Vec<f64>> {
-    let mut starts = vec![vec![0.0; bench.form.knobs.len()]];
+fn starts(data: &DiagnosisData, selection: &Selection) -> Vec<Vec<f64>> {
+    let mut starts = vec![vec![0.0; data.form.free_parameters.len()]];
     for p in [&selection.baseline.refitted.p, &selection.last().refitted.p] {
         if starts.iter().all(|s| s != p) {
             starts.push(p.clone());
@@ -324,7 +324,7 @@ fn starts(bench: &DiagnosisData, selection: &Selection) -> Vec<Vec<f64>> {
 }
 
 /// Plants and curves by the balance of torques.
-fn balanced(bench: &DiagnosisData) -> Vec<Curved> {
-    let means = recorded_means(bench);
-    curves(&SMOOTHINGS.map(|width| Balance::of(bench, &means, width, 0.0)))
+fn balanced(data: &DiagnosisData) -> Vec<Curved> {
+    let means = recorded_means(data);
+    curves(&SMOOTHINGS.map(|width| Balance::of(data, &means, width, 0.0)))
 }

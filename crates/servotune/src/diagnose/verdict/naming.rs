@@ -49,17 +49,17 @@ pub(in crate::diagnose) fn everywhere(runs: &[&Run]) -> Where {
 }
 
 /// The finding about effect `at` of the final model; none where its step took nothing.
-pub(in crate::diagnose) fn finding(bench: &DiagnosisData, selection: &Selection, at: usize) -> Option<Finding> {
+pub(in crate::diagnose) fn finding(data: &DiagnosisData, selection: &Selection, at: usize) -> Option<Finding> {
     let chosen = &selection.model.chosen[at];
     let step = &selection.steps[chosen.step];
     let c = &step.candidates[step.tried[step.taken?].0];
     let gain = selection.gain(at);
-    let spindle_hz = bench.scene.spindle_hz;
+    let spindle_hz = data.scene.spindle_hz;
     let spindle = |hz: f64| spindle_hz.is_some_and(|s| ((hz / s).round() - hz / s).abs() < 0.004 && hz > 0.9 * s);
     let own = chosen.setting.facts().name;
     // A line at a multiple of the spindle is run-out, whichever law carried it.
     // A pre-sliding length that the sensor's noise covers is no pre-sliding: the drag is dry.
-    let dry = chosen.setting.law.presliding_length().is_some_and(|l| l < DRY_LENGTH * bench.scene.noise);
+    let dry = chosen.setting.law.presliding_length().is_some_and(|l| l < DRY_LENGTH * data.scene.noise);
     let line = chosen.effect().is_tone();
     let name = if line && spindle(chosen.setting.law.first_number()) {
         RUNOUT
@@ -80,7 +80,7 @@ pub(in crate::diagnose) fn finding(bench: &DiagnosisData, selection: &Selection,
         }
     }
     let nothing_between = selection.model.chosen.iter().all(|c| c.setting.facts().entry != Entry::Torque);
-    for twin in twins(bench, chosen).filter(|_| nothing_between) {
+    for twin in twins(data, chosen).filter(|_| nothing_between) {
         if !family.iter().any(|f| f == twin) {
             family.push(twin.to_owned());
         }
@@ -103,13 +103,13 @@ pub(in crate::diagnose) fn finding(bench: &DiagnosisData, selection: &Selection,
     }
     let log_p = log_tail(gain, c.strengths.max(1)) + (c.points.max(1) as f64).ln() + (library().len() as f64).ln();
     let (says, port) = text_of(name);
-    let signal = effect_signal(bench, selection, at);
-    let mut parameters = estimates(bench, selection, at);
+    let signal = effect_signal(data, selection, at);
+    let mut parameters = estimates(data, selection, at);
     if name == RUNOUT && line {
-        parameters.insert("base_hz".into(), plain(bench.scene.spindle_hz.unwrap_or(0.0), "Hz"));
+        parameters.insert("base_hz".into(), plain(data.scene.spindle_hz.unwrap_or(0.0), "Hz"));
     }
-    let place = place(bench, &bench.stack, &signal);
-    let always = chosen.effect().is_single_event() && bench.stack.segments.len() > 1;
+    let place = place(data, &data.stack, &signal);
+    let always = chosen.effect().is_single_event() && data.stack.segments.len() > 1;
     let when = if always { ", at the same time of every record: it comes with the record" } else { "" };
     let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
     Some(Finding {
@@ -125,16 +125,16 @@ pub(in crate::diagnose) fn finding(bench: &DiagnosisData, selection: &Selection,
 
 /// Effects that do the same to the recorded position from another place of a linear machine: where a lag sits, before the plant or behind
 /// it, no record of the two ends tells.
-fn twins<'a>(bench: &'a DiagnosisData, chosen: &'a SelectedEffect) -> impl Iterator<Item = &'static str> + 'a {
-    let ratio = |s: &Setting, w: f64| match s.response_share(&bench.scene, w) {
+fn twins<'a>(data: &'a DiagnosisData, chosen: &'a SelectedEffect) -> impl Iterator<Item = &'static str> + 'a {
+    let ratio = |s: &Setting, w: f64| match s.response_share(&data.scene, w) {
         Share::Ratio(r) => Some(r),
         _ => None,
     };
     let same = move |e: &dyn Effect| {
         let numbers: Vec<f64> = chosen.setting.law.numbers().into_iter().flatten().collect();
-        let Some(other) = e.grid(&bench.scene).first().map(|l| l.with_numbers(&numbers)) else { return false };
+        let Some(other) = e.grid(&data.scene).first().map(|l| l.with_numbers(&numbers)) else { return false };
         let other = Setting::fixed(other);
-        let share = [0.1, 1.0, 2.5].map(|a| a / bench.scene.sample_time_s);
+        let share = [0.1, 1.0, 2.5].map(|a| a / data.scene.sample_time_s);
         share.iter().all(|&w| {
             let own = ratio(&chosen.setting, w);
             own.is_some_and(|a| ratio(&other, w).is_some_and(|b| (a - b).norm() < ALIKE * a.norm()))
@@ -146,22 +146,22 @@ fn twins<'a>(bench: &'a DiagnosisData, chosen: &'a SelectedEffect) -> impl Itera
 }
 
 /// What the effect adds, whitened and stacked.
-fn effect_signal(bench: &DiagnosisData, selection: &Selection, at: usize) -> Vec<f64> {
+fn effect_signal(data: &DiagnosisData, selection: &Selection, at: usize) -> Vec<f64> {
     let model = &selection.model;
     let chosen = &model.chosen[at];
-    let plant = bench.form.carrier(&model.refitted.p).plant;
-    let Ok(sampled) = Sampled::of(&plant, bench.scene.sample_time_s) else { return vec![0.0; bench.stack.total] };
-    let mut signal = bench.stack.series(|i| {
-        let columns = position_columns(&chosen.setting.law, &bench.scene, &bench.trajectories[i], &sampled);
-        let mut y = vec![0.0; bench.means[i].len()];
+    let plant = data.form.nominal(&model.refitted.p).plant;
+    let Ok(sampled) = Sampled::of(&plant, data.scene.sample_time_s) else { return vec![0.0; data.stack.total] };
+    let mut signal = data.stack.series(|i| {
+        let columns = position_columns(&chosen.setting.law, &data.scene, &data.trajectories[i], &sampled);
+        let mut y = vec![0.0; data.means[i].len()];
         for (c, s) in columns.iter().zip(chosen.own(i)) {
             y.iter_mut().zip(c).for_each(|(y, c)| *y += s * c);
         }
-        bench.whitener.apply(&mut y);
+        data.whitener.apply(&mut y);
         y
     });
     // What a record's own start and a constant torque imitate is no evidence of place.
-    bench.fit(vec![]).local_basis().project(&mut signal);
+    data.fit(vec![]).local_basis().project(&mut signal);
     signal
 }
 
@@ -175,18 +175,19 @@ fn single_order(setting: &Setting) -> Option<f64> {
 
 /// Parameters of the chosen effect `at` with 95 % intervals: its numbers moved together along each direction that errs independently,
 /// the changes of each parameter added as squares; widened where the model leaves more than noise, and by what no machine follows a law to.
-fn estimates(bench: &DiagnosisData, selection: &Selection, at: usize) -> BTreeMap<String, Estimate> {
+fn estimates(data: &DiagnosisData, selection: &Selection, at: usize) -> BTreeMap<String, Estimate> {
     let model = selection.last();
-    let scene = &bench.scene;
+    let scene = &data.scene;
     let chosen = &model.chosen[at];
     let base = chosen.setting.parameters(scene);
     let widen = (model.cost / model.freedom).max(1.0).sqrt() * 1.96;
     let strengths_of = |c: &SelectedEffect| if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
     let moving = |c: &SelectedEffect| c.continuous.iter().filter(|c| **c).count();
     let (before, all) = (&model.chosen[..at], &model.chosen);
-    let strength = bench.form.knobs.len() + before.iter().map(strengths_of).sum::<usize>();
-    let number =
-        bench.form.knobs.len() + all.iter().map(strengths_of).sum::<usize>() + before.iter().map(moving).sum::<usize>();
+    let strength = data.form.free_parameters.len() + before.iter().map(strengths_of).sum::<usize>();
+    let number = data.form.free_parameters.len()
+        + all.iter().map(strengths_of).sum::<usize>()
+        + before.iter().map(moving).sum::<usize>();
     let moved = |direction: &Vec<f64>| -> Vec<Parameter> {
         let by = |i: usize| direction.get(i).copied().unwrap_or(0.0) * widen;
         let mut s: Setting = chosen.setting.clone();
@@ -205,7 +206,7 @@ fn estimates(bench: &DiagnosisData, selection: &Selection, at: usize) -> BTreeMa
     let free = (0..chosen.continuous.len()).filter(|&i| chosen.continuous[i]);
     nudged.law = free.fold(nudged.law, |law, i| scaled(&law, i, NUDGE));
     let nudged = nudged.parameters(scene);
-    let (position, command) = (&bench.form.given.position_unit, &bench.form.given.command_unit);
+    let (position, command) = (&data.form.given.position_unit, &data.form.given.command_unit);
     let out: BTreeMap<String, Estimate> = base
         .iter()
         .enumerate()
@@ -235,10 +236,10 @@ fn scaled(law: &AnyLaw, place: usize, by: f64) -> AnyLaw {
 }
 
 /// There, but no effect of the library explains it.
-pub(in crate::diagnose) fn unexplained(bench: &DiagnosisData, selection: &Selection, explained: f64) -> Finding {
-    let (fit, model) = (bench.fit(vec![]), &selection.baseline);
+pub(in crate::diagnose) fn unexplained(data: &DiagnosisData, selection: &Selection, explained: f64) -> Finding {
+    let (fit, model) = (data.fit(vec![]), &selection.baseline);
     let (error, _) = fit.screen_basis(&model.refitted.p);
-    let place = place(bench, &bench.stack, &error);
+    let place = place(data, &data.stack, &error);
     let laws: Vec<&str> = selection.best().chosen.iter().map(|c| c.setting.facts().name).collect();
     let nearest = match laws[..] {
         [] => "none of its laws explains enough of it".to_owned(),

@@ -17,7 +17,7 @@ const STROKE: f64 = 2.0;
 
 /// Proposes the record that tells the final model best from its strongest rival: the existing excitations at other sizes
 /// (T-optimality over a catalogue; Atkinson & Fedorov 1975), by simulating both and counting the whitened difference.
-pub(in crate::diagnose) fn propose(d: &mut Diagnosis, bench: &DiagnosisData, selection: &Selection) {
+pub(in crate::diagnose) fn propose(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection) {
     let standing = match d.verdict {
         Verdict::DataFault => "record again with the log repaired; every other verdict rests on it".to_owned(),
         Verdict::Undecidable => {
@@ -42,12 +42,12 @@ pub(in crate::diagnose) fn propose(d: &mut Diagnosis, bench: &DiagnosisData, sel
     let rival = rival.unwrap_or(&selection.baseline);
     let mut best = (0.0, 1.0, 0usize);
     if !final_model.chosen.is_empty() {
-        for (i, run) in bench.means.iter().enumerate() {
+        for (i, run) in data.means.iter().enumerate() {
             for scale in SCALES {
                 let mut test: Run = run.clone();
                 test.input.iter_mut().for_each(|u| *u *= scale);
                 (test.before, test.origin) = (scale * test.before, scale * test.origin);
-                let separation = difference(bench, &test, final_model, rival);
+                let separation = difference(data, &test, final_model, rival);
                 if separation > best.0 {
                     best = (separation, scale, i);
                 }
@@ -57,7 +57,7 @@ pub(in crate::diagnose) fn propose(d: &mut Diagnosis, bench: &DiagnosisData, sel
     let what = if best.0 > 0.0 {
         format!(
             "{standing}; of the excitations at hand, `{}` at {:.1} times its size separates most",
-            bench.means[best.2].name, best.1
+            data.means[best.2].name, best.1
         )
     } else {
         standing
@@ -66,15 +66,14 @@ pub(in crate::diagnose) fn propose(d: &mut Diagnosis, bench: &DiagnosisData, sel
 }
 
 fn difference(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     run: &Run,
     a: &crate::diagnose::fit::model::Model,
     b: &crate::diagnose::fit::model::Model,
 ) -> f64 {
     let simulate = |m: &crate::diagnose::fit::model::Model| {
-        let fixed =
-            crate::diagnose::fit::corrected_model::corrected(&bench.form, &m.refitted.p, &m.chosen, &bench.scene);
-        let (effects, scene): (_, &Scene) = (fixed.effects.iter().collect(), &bench.scene);
+        let fixed = crate::diagnose::fit::corrected_model::corrected(&data.form, &m.refitted.p, &m.chosen, &data.scene);
+        let (effects, scene): (_, &Scene) = (fixed.effects.iter().collect(), &data.scene);
         error(
             &SimulatedModel { plant: &fixed.plant, effects, own: Vec::new(), lines: &[], fit: None, scene },
             run,
@@ -85,11 +84,11 @@ fn difference(
     let (Some(x), Some(y)) = (simulate(a), simulate(b)) else { return 0.0 };
     // A record that would leave the stroke is no proposal.
     let reach = |e: &[f64]| run.position.iter().zip(e).map(|(y, e)| (y - e).abs()).fold(0.0, f64::max);
-    if !(reach(&x) < STROKE * bench.scene.travel && reach(&y) < STROKE * bench.scene.travel) {
+    if !(reach(&x) < STROKE * data.scene.travel && reach(&y) < STROKE * data.scene.travel) {
         return 0.0;
     }
     let mut off: Vec<f64> = x.iter().zip(&y).map(|(x, y)| x - y).collect();
-    let whitener: &Whitener = &bench.whitener;
+    let whitener: &Whitener = &data.whitener;
     whitener.apply(&mut off);
     let sum: f64 = off.iter().map(|v| v * v).sum();
     if sum.is_finite() { sum } else { 0.0 }

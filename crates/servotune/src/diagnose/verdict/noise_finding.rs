@@ -20,37 +20,37 @@ const SHAPE: f64 = 0.05;
 
 /// Findings of the noise; `left` is what the best model leaves on the fit records.
 pub(in crate::diagnose) fn noise_findings(
-    bench: &DiagnosisData,
+    data: &DiagnosisData,
     torque_noise: Option<&TorqueNoise>,
     nominal: &NominalNoise,
     left: FitFigures,
 ) -> Vec<Finding> {
-    let mut all: Vec<Finding> = counted(bench).into_iter().collect();
-    let larger = left.rms_after.powi(2) > NOISE_LARGER * bench.levels.sensor_rms.powi(2);
+    let mut all: Vec<Finding> = counted(data).into_iter().collect();
+    let larger = left.rms_after.powi(2) > NOISE_LARGER * data.levels.sensor_rms.powi(2);
     let blown = torque_noise.filter(|u| match nominal.windage_rms {
         Some(level) => u.rms_command > NOISE_DEPARTED * level,
         None => larger,
     });
-    all.extend(blown.map(|u| wind(bench, u)));
-    all.extend(nominal.encoder_rms.and_then(|level| loud(bench, level)));
+    all.extend(blown.map(|u| wind(data, u)));
+    all.extend(nominal.encoder_rms.and_then(|level| loud(data, level)));
     if all.is_empty() {
-        all.extend(faster(bench));
+        all.extend(faster(data));
     }
     all
 }
 
 /// The encoder's count, where it makes a part of the noise that is worth a word.
-fn counted(bench: &DiagnosisData) -> Option<Finding> {
-    let grid = bench.grid.filter(|_| bench.coarse())?;
+fn counted(data: &DiagnosisData) -> Option<Finding> {
+    let grid = data.grid.filter(|_| data.coarse())?;
     let off = grid.off.max(GRADUATION * grid.step);
-    let unit = bench.form.given.position_unit.clone();
+    let unit = data.form.given.position_unit.clone();
     let step = Estimate { value: grid.step, low: grid.step - off, high: grid.step + off, unit };
-    Some(statistic(&quantisation::FACTS, vec![("step", step)], 1e-300, &fitted(bench)))
+    Some(statistic(&quantisation::FACTS, vec![("step", step)], 1e-300, &fitted(data)))
 }
 
 /// Torque without a pattern, with level and corner.
-fn wind(bench: &DiagnosisData, u: &TorqueNoise) -> Finding {
-    let unit = bench.form.given.command_unit.clone();
+fn wind(data: &DiagnosisData, u: &TorqueNoise) -> Finding {
+    let unit = data.form.given.command_unit.clone();
     let off = 1.96 * u.spread.hypot(SHAPE) * u.rms_command;
     let level = Estimate { value: u.rms_command, low: u.rms_command - off, high: u.rms_command + off, unit };
     let [low, high] = u.corners_hz;
@@ -60,41 +60,41 @@ fn wind(bench: &DiagnosisData, u: &TorqueNoise) -> Finding {
         &broadband_disturbance::FACTS,
         vec![("rms_command", level), ("corner_hz", corner)],
         p_value,
-        &fitted(bench),
+        &fitted(data),
     );
     f.says = format!("{} It is the larger part of what the simulation leaves.", f.says);
     f
 }
 
 /// An encoder whose noise is above the stated one.
-fn loud(bench: &DiagnosisData, stated: f64) -> Option<Finding> {
-    let level = bench.levels.sensor_rms;
-    if !bench.levels.from_repeats || level < NOISE_DEPARTED * stated {
+fn loud(data: &DiagnosisData, stated: f64) -> Option<Finding> {
+    let level = data.levels.sensor_rms;
+    if !data.levels.from_repeats || level < NOISE_DEPARTED * stated {
         return None;
     }
-    let n: usize = bench.repeats.iter().map(|r| r.1.len()).sum();
+    let n: usize = data.repeats.iter().map(|r| r.1.len()).sum();
     let off = 1.96 * level / (2.0 * n as f64).sqrt();
-    let unit = bench.form.given.position_unit.clone();
+    let unit = data.form.given.position_unit.clone();
     let rms = Estimate { value: level, low: level - off, high: level + off, unit };
     let gain = n as f64 * ((level / stated).powi(2) - 1.0 - 2.0 * (level / stated).ln());
     let mut f =
-        statistic(&encoder_noise::FACTS, vec![("rms", rms)], log_tail(gain, 1).exp().max(1e-300), &fitted(bench));
+        statistic(&encoder_noise::FACTS, vec![("rms", rms)], log_tail(gain, 1).exp().max(1e-300), &fitted(data));
     f.says = format!("{} {:.2} times the stated level.", f.says.trim_end_matches('.').to_owned() + ":", level / stated);
     Some(f)
 }
 
-fn fitted(bench: &DiagnosisData) -> Vec<&Run> {
-    bench.fit_runs.iter().map(|&r| &bench.runs[r]).collect()
+fn fitted(data: &DiagnosisData) -> Vec<&Run> {
+    data.fit_runs.iter().map(|&r| &data.runs[r]).collect()
 }
 
 /// Noise that grows with the speed: a clock that trembles, or an encoder that does.
-fn faster(bench: &DiagnosisData) -> Option<Finding> {
+fn faster(data: &DiagnosisData) -> Option<Finding> {
     // Squares of the whitened repeats against the square of the speed.
     let (mut n, mut sx, mut sy, mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    for (run, series) in &bench.repeats {
-        let Some(segment) = bench.stack.segments.iter().position(|s| s.runs.contains(run)) else { continue };
-        for (e, m) in series.iter().zip(&bench.trajectories[segment].samples) {
-            let (x, y) = ((m.v / bench.scene.speed).powi(2), e * e);
+    for (run, series) in &data.repeats {
+        let Some(segment) = data.stack.segments.iter().position(|s| s.runs.contains(run)) else { continue };
+        for (e, m) in series.iter().zip(&data.trajectories[segment].samples) {
+            let (x, y) = ((m.v / data.scene.speed).powi(2), e * e);
             n += 1.0;
             sx += x;
             sy += y;
@@ -115,13 +115,13 @@ fn faster(bench: &DiagnosisData) -> Option<Finding> {
     if !(slope > NOISE_SLOPE * sigma && slope > NOISE_WITH_SPEED * floor) {
         return None;
     }
-    let seconds = (slope * bench.levels.sensor_rms.powi(2)).sqrt() / bench.scene.speed;
+    let seconds = (slope * data.levels.sensor_rms.powi(2)).sqrt() / data.scene.speed;
     let z = slope / sigma;
     // Half the slope's relative error, the value being its root.
     let off = 0.5 * 1.96 * seconds / z;
     let rms = Estimate { value: seconds, low: seconds - off, high: seconds + off, unit: "s".into() };
     let p_value = log_tail(z * z, 1).exp().max(1e-300);
-    let mut f = statistic(&jitter::FACTS, vec![("rms_s", rms)], p_value, &fitted(bench));
+    let mut f = statistic(&jitter::FACTS, vec![("rms_s", rms)], p_value, &fitted(data));
     f.family.push(encoder_noise::FACTS.name.into());
     Some(f)
 }

@@ -50,7 +50,7 @@ pub(in crate::diagnose) struct Reported {
 /// How models are simulated for the report.
 #[derive(Clone, Copy)]
 pub(in crate::diagnose) struct Reporting<'a> {
-    pub bench: &'a DiagnosisData,
+    pub data: &'a DiagnosisData,
     pub selection: &'a Selection,
     /// All runs, whole.
     pub runs: &'a [Run],
@@ -77,10 +77,9 @@ impl<'a> Reporting<'a> {
     pub fn errors(&self, offer: &Offer, runs: &[&Run], closed: Option<&Law>) -> Vec<Vec<f64>> {
         let made = &offer.made;
         if offer.full {
-            return errors(&made.judged(self.bench, self.selection), runs, closed);
+            return errors(&made.judged(self.data, self.selection), runs, closed);
         }
-        let plain =
-            SimulatedModel { own: Vec::new(), lines: &[], fit: None, ..made.judged(self.bench, self.selection) };
+        let plain = SimulatedModel { own: Vec::new(), lines: &[], fit: None, ..made.judged(self.data, self.selection) };
         errors(&plain, runs, closed)
     }
 
@@ -89,7 +88,7 @@ impl<'a> Reporting<'a> {
     }
 
     fn linear(&self, p: &[f64]) -> Offer {
-        Offer { made: corrected(&self.bench.form, p, &[], &self.bench.scene), full: false }
+        Offer { made: corrected(&self.data.form, p, &[], &self.data.scene), full: false }
     }
 
     /// Records of a role that no push fell into.
@@ -99,7 +98,7 @@ impl<'a> Reporting<'a> {
 
     /// The model fitted by the reported error, where the logs are sound.
     fn descended(&self, model: &Model, runs: &[(&Run, usize)]) -> Option<Model> {
-        if self.sound { descended(self.bench, model, self.closed, runs) } else { None }
+        if self.sound { descended(self.data, model, self.closed, runs) } else { None }
     }
 
     /// Root mean square over the fit records, each simulated by a model that was fitted without it, beside that of the given plant.
@@ -113,7 +112,7 @@ impl<'a> Reporting<'a> {
             };
             let fitted = self.descended(model, &part(1 - fold))?;
             let offer = Offer {
-                made: corrected(&self.bench.form, &fitted.refitted.p, &fitted.chosen, &self.bench.scene),
+                made: corrected(&self.data.form, &fitted.refitted.p, &fitted.chosen, &self.data.scene),
                 full: !fitted.chosen.is_empty(),
             };
             for (run, n) in part(fold) {
@@ -130,10 +129,10 @@ impl<'a> Reporting<'a> {
 
     /// What a model is fitted to: the mean runs where it is linear, every record where it bends.
     fn material(&self, model: &Model) -> Vec<(&'a Run, usize)> {
-        let bench = self.bench;
+        let data = self.data;
         match model.chosen.is_empty() {
-            true => bench.means.iter().zip(&bench.stack.segments).map(|(m, s)| (m, s.runs.len())).collect(),
-            false => bench.fit_runs.iter().map(|&r| (&bench.runs[r], 1)).collect(),
+            true => data.means.iter().zip(&data.stack.segments).map(|(m, s)| (m, s.runs.len())).collect(),
+            false => data.fit_runs.iter().map(|&r| (&data.runs[r], 1)).collect(),
         }
     }
 }
@@ -176,7 +175,7 @@ impl Reporting<'_> {
     /// Why the records that were held out withdraw a model, where they do.
     fn denied(&self, what: &str, own: &Measured, given: &Measured) -> Option<String> {
         let (own, given) = own.held.zip(given.held)?;
-        let unit = &self.bench.form.given.position_unit;
+        let unit = &self.data.form.given.position_unit;
         worse(own, given, self.samples(Role::Holdout)).then(|| {
             format!(
                 "{what} is withdrawn: it simulates the hold-out records with an error of {} {unit} rms where the given model leaves {} {unit}",
@@ -189,12 +188,12 @@ impl Reporting<'_> {
     /// The linear model that is offered, and whether it is a refit.
     fn linear_offer(&self, given: &Offer, of_given: &Measured, remarks: &mut Vec<String>) -> (Offer, bool) {
         let baseline = &self.selection.baseline;
-        let (unit, fit) = (&self.bench.form.given.position_unit, self.of_role(Role::Fit));
+        let (unit, fit) = (&self.data.form.given.position_unit, self.of_role(Role::Fit));
         let samples = self.samples(Role::Fit);
         let own = self.linear(&baseline.refitted.p);
         let own_errors = self.errors(&own, &fit, self.closed);
         let left = rms(&own_errors);
-        let noise = floor(&own_errors, &fit).unwrap_or(self.bench.levels.sensor_rms);
+        let noise = floor(&own_errors, &fit).unwrap_or(self.data.levels.sensor_rms);
         let sound = !worse(left, of_given.fit, samples);
         let mut offer = (own, true);
         if !sound || left > REFIT_FAR * noise {
@@ -242,14 +241,13 @@ impl Reporting<'_> {
     /// The corrected model that is offered, or why none is.
     fn fixed_offer(&self, linear: &Offer, given: &Offer, of_given: &Measured) -> (Offer, Option<String>) {
         let last = self.selection.last();
-        let bench = self.bench;
-        let made =
-            |m: &Model| Offer { made: corrected(&bench.form, &m.refitted.p, &m.chosen, &bench.scene), full: true };
+        let data = self.data;
+        let made = |m: &Model| Offer { made: corrected(&data.form, &m.refitted.p, &m.chosen, &data.scene), full: true };
         let samples = self.samples(Role::Fit);
         let least = of_given.fit.min(self.measured(linear).fit * (1.0 + SIMULATION_ALIKE));
         let mut offer = made(last);
         let mut of_offer = self.measured(&offer);
-        let unit = &bench.form.given.position_unit;
+        let unit = &data.form.given.position_unit;
         if worse(of_offer.fit, least, samples) {
             let other = self.descended(last, &self.material(last)).filter(|m| {
                 !worse(self.rms(&made(m), &self.of_role(Role::Fit)), least, samples)

@@ -16,7 +16,6 @@ mod pes_spectrum;
 mod resonance;
 mod response;
 mod row;
-mod statistics;
 mod table;
 mod view;
 

@@ -6,7 +6,7 @@ use super::machine::PesRecord;
 use super::pes_shape::shape;
 use super::pes_spectrum::spectrum;
 use super::row::Row;
-use super::statistics::{deviation, range};
+use crate::numeric::statistics::{deviation, range};
 use crate::pes::{HIGH_BAND_HZ, LOW_BAND_HZ, WindowDft};
 
 /// Servo samples of the window, first (included) to last (excluded), from the start of the move (section 2.7).

@@ -1,7 +1,7 @@
 //! The PES in time: moments, quantiles, stretches, settling, oscillation.
 
 use super::row::Row;
-use super::statistics::{
+use crate::numeric::statistics::{
     autocorrelation, detrended, deviation, largest, line, mean, median, moment, quantile, range, rms, sign_changes,
     sorted, steps,
 };
@@ -54,7 +54,7 @@ fn distribution(name: &str, x: &[f64], row: &mut Row) {
         put(&format!("percentile_{percent}"), quantile(&s, f64::from(percent) / 100.0));
     }
     put("quartile_range", quantile(&s, 0.75) - quantile(&s, 0.25));
-    put("median_deviation", median(&x.iter().map(|v| (v - middle).abs()).collect::<Vec<f64>>()));
+    put("median_deviation", median(&x.iter().map(|v| (v - middle).abs()).collect::<Vec<f64>>()).unwrap_or(f64::NAN));
     put("crest", largest(&x.iter().map(|v| v.abs()).collect::<Vec<f64>>()) / rms(x));
 }
 

@@ -1,8 +1,8 @@
 //! The PES over frequency: bands of the whole record and of the window, centre, spread, flatness, spindle lines.
 
 use super::row::Row;
-use super::statistics::detrended;
 use crate::numeric::spectrum::forward;
+use crate::numeric::statistics::detrended;
 use std::f64::consts::TAU;
 
 /// Edges of the bands (Hz).

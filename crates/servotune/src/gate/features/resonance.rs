@@ -6,9 +6,9 @@
 //! explains most is refined, divided out, and the search starts again until nothing is explained that noise would not.
 
 use super::body::BodyFit;
-use super::statistics::median;
 use super::view::ResponseView;
 use crate::numeric::golden::golden_section;
+use crate::numeric::statistics::median;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
@@ -263,7 +263,7 @@ fn refined(view: &ResponseView, ratio: &[Complex<f64>], start: Resonance, floor:
 pub(super) fn noise_variance(ratio: &[Complex<f64>]) -> f64 {
     let bend: Vec<f64> = ratio.windows(3).map(|r| ((r[0] - r[1] * 2.0 + r[2]) / r[1].norm()).norm_sqr()).collect();
     // 1 + 4 + 1 = 6 times the variance of both parts; the median of its exponential law is ln 2 of the mean.
-    let v = median(&bend) / (12.0 * std::f64::consts::LN_2);
+    let v = median(&bend).unwrap_or(f64::NAN) / (12.0 * std::f64::consts::LN_2);
     // Files print five digits.
     if v.is_finite() { v.max(1e-10) } else { 1e-10 }
 }

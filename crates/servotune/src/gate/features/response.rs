@@ -5,9 +5,9 @@
 use super::body::body_fit;
 use super::resonance::{Resonance, noise_variance, pair_near, resonances};
 use super::row::Row;
-use super::statistics::{deviation, largest, line, mean};
 use super::view::ResponseView;
 use crate::frf::Frf;
+use crate::numeric::statistics::{deviation, largest, line, mean};
 use std::f64::consts::TAU;
 
 /// Fixed frequencies (Hz), thirds of an octave.

@@ -1,7 +1,7 @@
 //! A response as its plots show it: decibels and degrees over frequency, with smooth reading between the points.
 
-use super::statistics::line;
 use crate::frf::{Frf, phase_rad};
+use crate::numeric::statistics::line;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 

@@ -1,4 +1,4 @@
-//! How a change of one section pulls at a whole grid: d ln C over the change, at every point.
+//! Gradients of one section on a whole grid: d ln C over a change of its parameter, at every point.
 //!
 //! In: the section a little to either side. Out: real and imaginary part of the central difference of its logarithm, in arrays over the grid.
 
@@ -9,16 +9,16 @@ use crate::numeric::wide::wide;
 
 /// d ln C at every point of a grid, one array pair for each parameter. Made once, used for every candidate.
 #[derive(Clone, Debug, Default)]
-pub struct Pulls {
+pub struct SectionGradients {
     /// Real and imaginary part, parameter by parameter; filled up to whole lanes.
     pub of: Vec<[Vec<f64>; 2]>,
 }
 
 impl SampledPlant {
-    /// The pulls of sections given at -h and +h of each parameter, into `pulls`.
-    pub fn pull(&self, sections: &[[Section; 2]], h: f64, pulls: &mut Pulls) {
-        pulls.of.resize_with(sections.len(), Default::default);
-        for (pair, out) in sections.iter().zip(&mut pulls.of) {
+    /// The gradients of sections given at -h and +h of each parameter, into `gradients`.
+    pub fn section_gradients(&self, sections: &[[Section; 2]], h: f64, gradients: &mut SectionGradients) {
+        gradients.of.resize_with(sections.len(), Default::default);
+        for (pair, out) in sections.iter().zip(&mut gradients.of) {
             out.iter_mut().for_each(|a| a.resize(self.cos.len() * LANES, 0.0));
             wide(|| self.pull_lanes(pair, 1.0 / h, out));
         }
@@ -59,14 +59,14 @@ mod tests {
         let w: Vec<f64> = (1..30).map(|i| 2000.0 * f64::from(i)).collect();
         let grid = SampledPlant::of_points(t, 0, w.clone(), &vec![Complex::new(1.0, 0.0); w.len()]);
         let section = |x: f64| Section::notch(1200.0 * x.exp(), 0.05, 0.25, t).unwrap();
-        let mut pulls = Pulls::default();
-        grid.pull(&[[section(-1e-5), section(1e-5)]], 1e-5, &mut pulls);
+        let mut gradients = SectionGradients::default();
+        grid.section_gradients(&[[section(-1e-5), section(1e-5)]], 1e-5, &mut gradients);
         for (i, w) in w.iter().enumerate() {
             let at = |x: f64| section(x).at_delay(Complex::from_polar(1.0, -w * t)).ln();
             // A wider difference of fourth order: what it leaves is 1e-12 of the fifth derivative, a notch's damping to the fifth below.
             let h = 1e-4;
             let wide = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
-            let found = Complex::new(pulls.of[0][0][i], pulls.of[0][1][i]);
+            let found = Complex::new(gradients.of[0][0][i], gradients.of[0][1][i]);
             assert!((found - wide).norm() < 1e-6 * (1.0 + wide.norm()), "{found} {wide}");
         }
     }
