@@ -73,17 +73,9 @@ pub fn diagnose(
     let sound = log_checks.finding.is_none();
     let start = sound.then(|| cleared(&data, settings.select.iterations, &mut |step: &str| progress(step))).flatten();
     if let Some(start) = start {
-        remarks.push(match start.law {
-            Some(_) => {
-                "the search set out from a plant fitted together with a law: the given one conceals what acts".into()
-            }
-            None if start.curve => {
-                "the search set out from a plant fitted together with a curve without a name: the given one conceals what acts".into()
-            }
-            None => "the search set out from a plant fitted to the balance of torques: the given one is far off".into(),
-        });
+        remarks.push(start.says().into());
         data = DiagnosisData::new(&start.plant, data.runs, sample_time_s, case.spindle_hz)?;
-        if !data.noise_known {
+        if !data.noise_known && start.bends() {
             data = data.with_noise(start.left);
         }
         data.foretold = start.law;

@@ -39,6 +39,28 @@ pub(in crate::diagnose) struct Cleared {
     pub left: Vec<Vec<f64>>,
 }
 
+impl Cleared {
+    /// Whether a law or a curve stands beside the plant: what both leave is noise, what a plant leaves alone may be anything.
+    pub fn bends(&self) -> bool {
+        self.law.is_some() || self.curve
+    }
+
+    /// The remark about it.
+    pub fn says(&self) -> &'static str {
+        match (&self.law, self.curve) {
+            (Some(_), _) => {
+                "the search set out from a plant fitted together with a law: the given one conceals what acts"
+            }
+            (None, true) => {
+                "the search set out from a plant fitted together with a curve without a name: the given one conceals what acts"
+            }
+            (None, false) => {
+                "the search set out from a plant fitted to the balance of torques: the given one is far off"
+            }
+        }
+    }
+}
+
 /// What plants and laws are tried on.
 struct Tried<'a> {
     own: &'a DiagnosisData,

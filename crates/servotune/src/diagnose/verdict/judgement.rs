@@ -5,16 +5,16 @@ use super::finding::{Finding, FitFigures, Verdict};
 use super::gain_modulation::gain_modulation;
 use super::held_out::{HeldOut, astray, contradicts, unseen};
 use super::line_finding::{line_findings, same_line};
-use super::linear_verdict::linear_verdict;
+use super::linear_verdict::{coloured, linear_verdict};
 use super::naming::{finding, unexplained};
 use super::offered_models::Reported;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::simulation::Simulation;
 use crate::diagnose::rules::{
-    BELOW_NOISE, BOOTSTRAP_CHANCE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, COLOURED, DECISIVE_RIVAL, DECISIVE_SHARE,
-    GIVEN_FAR, HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER, LOOP_EXPLAINS, LOOP_LEFT,
-    NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE, WIND_LEFT,
+    BELOW_NOISE, BOOTSTRAP_CHANCE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, DECISIVE_RIVAL, DECISIVE_SHARE, GIVEN_FAR,
+    HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER, LOOP_EXPLAINS, LOOP_LEFT, NAMED_SHARE,
+    NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE, WIND_LEFT,
 };
 use crate::diagnose::search::selection::Selection;
 use crate::diagnose::search::shortlist::same_drag;
@@ -290,11 +290,6 @@ fn believed(d: &mut Diagnosis, selection: &Selection) -> bool {
         ));
     }
     selection.bootstrap.as_ref().is_none_or(|b| b.p_value <= BOOTSTRAP_CHANCE.max(1.0 / (b.draws + 1) as f64))
-}
-
-/// Whether, no record being repeated, the simulation leaves far more than a noise of the sensor: noise of torque, or missing physics.
-fn coloured(d: &Diagnosis, data: &DiagnosisData, noise: f64) -> bool {
-    !data.levels.from_repeats && d.fit.open_loop.is_some_and(|o| o.rms_after > COLOURED * noise)
 }
 
 /// Findings of the noise beside those of the search. What is left without a name is theirs where the linear refit comes down to their noise:

@@ -11,7 +11,7 @@ use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_fit::simulated_with;
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::noise::chance::log_tail;
-use crate::diagnose::rules::{FAMILY, LAGS_ALIKE, ONE_NUMBER};
+use crate::diagnose::rules::{COLOURED, FAMILY, LAGS_ALIKE, ONE_NUMBER};
 use crate::diagnose::search::selection::Selection;
 use crate::lti::Plant;
 use crate::physics::amplifier_lag::AmplifierLag;
@@ -147,6 +147,11 @@ impl Lag {
     }
 }
 
+/// Whether, no record being repeated, the simulation leaves far more than a noise of the sensor: noise of torque, or missing physics.
+pub(super) fn coloured(d: &Diagnosis, data: &DiagnosisData, noise: f64) -> bool {
+    !data.levels.from_repeats && d.fit.open_loop.is_some_and(|o| o.rms_after > COLOURED * noise)
+}
+
 /// What happened to the linear parameters of the `given` plant: nothing, the delay alone, one mode alone, or a refit.
 pub(super) fn linear_verdict(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection, given: &Plant) {
     if d.verdict == Verdict::LocatedUnexplained || d.verdict == Verdict::DataFault {
@@ -239,7 +244,8 @@ fn simple_story(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection) 
             return true;
         }
     }
-    if d.findings.is_empty() && selection.model.chosen.is_empty() {
+    // Where a coloured rest hides what tells gain, damping and frequency apart, one number does as well as all of them by chance.
+    if d.findings.is_empty() && selection.model.chosen.is_empty() && !coloured(d, data, data.levels.sensor_rms) {
         let clock = Clock::of(data, fixed[0]);
         if clock.sure() && clock.cost - selection.model.cost < allowed(1) {
             d.verdict = Verdict::DataFault;
