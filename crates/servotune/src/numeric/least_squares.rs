@@ -5,7 +5,7 @@
 //! (van der Sluis, Numer. Math. 14, 1969). Sources: Golub & Van Loan, Matrix Computations, ch. 5.
 
 use super::dense::singular_values;
-use super::wide::wide;
+use super::wide::{Wide, widest};
 use nalgebra::DMatrix;
 
 /// The factors of a tall matrix, reusable without allocation.
@@ -37,6 +37,18 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     ((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7])) + rest
 }
 
+/// All reflections of a matrix, compiled for the processor as a whole.
+struct Reflections<'a>(&'a mut Qr);
+
+impl Wide for Reflections<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        self.0.reflections();
+    }
+}
+
 impl Qr {
     /// Factorises a matrix given by columns; `rows >= cols`.
     ///
@@ -55,7 +67,7 @@ impl Qr {
             column.iter_mut().for_each(|v| *v *= inverse);
             self.scale.push(length);
         }
-        wide(|| self.reflections());
+        widest(Reflections(self));
     }
 
     #[inline(always)]
