@@ -50,7 +50,7 @@ fn weights(data: &DiagnosisData, port: CurvePort, at: &[f64]) -> Vec<f64> {
     count.iter().map(|c| (c + LEAST * mean) / all).collect()
 }
 
-/// What a curve's line may move in the plant: free_parameter and its change per slope.
+/// What a curve's line may move in the plant: free parameter and its change per slope.
 fn free_parameter(form: &LinearForm, p: &[f64], port: CurvePort) -> Option<(usize, f64)> {
     let (b, k, _) = body_numbers(&form.given.body);
     let ratio =
@@ -168,7 +168,7 @@ fn give_spring(out: &mut Plain, map: &mut DMatrix<f64>, data: &DiagnosisData, (a
     }
 }
 
-/// Least value of the damping's free_parameter.
+/// Least value of the damping's free parameter.
 fn least_damping(data: &DiagnosisData) -> f64 {
     let (_, _, c) = body_numbers(&data.form.given.body);
     -c / rate_of(&data.form.given.body) + LEFT * f64::from(u8::from(c > 0.0)) * c / rate_of(&data.form.given.body)
