@@ -4,7 +4,8 @@
 use crate::physics_common::runge_kutta;
 use servotune::document::parse_toml;
 use servotune::lti::{Plant, PlantFile};
-use servotune::physics::{Context, Machine, Restored};
+use servotune::numeric::random::Random;
+use servotune::physics::{Context, Machine, PlayObserver, Readings, Restored};
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -65,6 +66,57 @@ fn two_masses_with_play_between_them_are_read_on_either_side() {
         let play = rms(rigid.iter().zip(&truth).map(|(a, s)| a[0] - s[place]));
         // The error of the law beside what the play does: its steps are a sixtieth of the contact's period.
         assert!(off < 0.05 * play, "encoder_behind = {behind}: {off} of {play}");
+    }
+}
+
+#[test]
+fn an_observer_follows_masses_that_rattle_and_tells_gap_and_contact() {
+    let (hz, damping, share, noise) = (2000.0, 0.03, 0.25, 0.003);
+    let tones: Vec<[f64; 2]> = (0..40).map(|k| [20.0 * 1.11f64.powi(k), 2.4 * f64::from(k * k)]).collect();
+    let u: Vec<f64> = (0..4000)
+        .map(|k| tones.iter().map(|[f, p]| 0.025 * (TAU * f * T * f64::from(k) + p).sin() * (f / 300.0).min(1.0)).sum())
+        .collect();
+    let w = TAU * hz;
+    let stiff = w * w * share * (1.0 - share);
+    for (behind, gap) in [(false, 0.06), (true, 0.03)] {
+        let slope = |u: f64, s: [f64; 4]| {
+            let [x1, v1, x2, v2] = s;
+            let apart: f64 = x1 - x2;
+            let over = apart - apart.clamp(-0.5 * gap, 0.5 * gap);
+            let damped = if over == 0.0 { 0.0 } else { 2.0 * damping / w * stiff * (v1 - v2) };
+            let force = stiff * over + damped;
+            [v1, (GAIN * u - force) / (1.0 - share), v2, force / share]
+        };
+        let mut random = Random::stream(3, 0);
+        let rest = |s: &[f64; 4]| s[if behind { 2 } else { 0 }] - (1.0 - share) * s[0] - share * s[2];
+        let readings = Readings {
+            rest: runge_kutta(&u, T, STEPS, slope).iter().map(|s| rest(s) + noise * random.normal()).collect(),
+            acceleration: u.iter().map(|u| GAIN * u).collect(),
+        };
+        let read = if behind { 1.0 - share } else { share };
+        let drive = if behind { -1.0 } else { share / (1.0 - share) };
+        let shakes = [0.03, 0.1, 0.3, 1.0].map(|s| s * noise / T.powf(1.5));
+        let best = |gap: f64, hz: f64, drive: f64| {
+            let of = |process| PlayObserver {
+                gap,
+                contact_hz: hz,
+                damping_ratio: damping,
+                drive,
+                process,
+                sensor_rms: noise,
+            };
+            shakes.into_iter().map(|p| of(p).deviance(&readings, T)).fold(f64::INFINITY, f64::min)
+        };
+        let truth = best(read * gap, hz, drive);
+        for (by_gap, by_hz) in [(1.3, 1.0), (0.7, 1.0), (1.0, 1.5), (1.0, 0.6)] {
+            let off = best(by_gap * read * gap, by_hz * hz, drive);
+            assert!(off > truth + 10.0, "behind {behind}: {off} at {by_gap}, {by_hz}; {truth} at the truth");
+        }
+        let rates = (0..30).map(|k| 200.0 * 1.14f64.powi(k));
+        let resonance = rates.flat_map(|hz| [-1.0, 0.15, 0.4].map(|d| best(0.0, hz, d))).fold(f64::INFINITY, f64::min);
+        assert!(resonance > truth + 100.0, "behind {behind}: a resonance {resonance}, the truth {truth}");
+        // White within a few per cent: what an observer of the right machine leaves is as large as it says.
+        assert!(truth < 4000.0 * (2.0 * noise.ln() + 1.6), "behind {behind}: {truth}");
     }
 }
 

@@ -4,10 +4,10 @@ use super::diagnose_error::DiagnoseError;
 use super::settings::DiagnoseSettings;
 use crate::controller::Law;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::corrected_model::corrected;
+use crate::diagnose::fit::corrected_model::{Corrected, corrected};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::shock::{DetectedShock, beyond};
-use crate::diagnose::fit::simulation::SimulatedModel;
+use crate::diagnose::fit::simulation::{SimulatedModel, errors, rms};
 use crate::diagnose::noise::torque_noise::torque_noise;
 use crate::diagnose::search::select::select;
 use crate::diagnose::search::select_settings::SelectSettings;
@@ -20,9 +20,10 @@ use crate::diagnose::verdict::fit_report::{Errors, figures_of, fit_report};
 use crate::diagnose::verdict::held_out::{held_out, mean};
 use crate::diagnose::verdict::judgement::{ByOthers, judge};
 use crate::diagnose::verdict::log_checks::LogChecks;
-use crate::diagnose::verdict::missing_curve::{Standing, enter, stand_in};
+use crate::diagnose::verdict::missing_curve::{Standing, enter, judged_runs, stand_in};
 use crate::diagnose::verdict::next_experiment::propose;
 use crate::diagnose::verdict::noise_finding::noise_findings;
+use crate::diagnose::verdict::observed_play::{observed_play, open_to_play};
 use crate::diagnose::verdict::offered_models::Reporting;
 use crate::lti::Plant;
 use crate::physics::library;
@@ -51,13 +52,48 @@ impl Trial<'_> {
     /// The search, with a curve where it ends without a name, or cannot tell what is left from noise, and one is worth it.
     pub fn best(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
         let cut = data.runs.clone();
-        let (first, open) = self.made(data, progress)?;
-        if settled(&first.diagnosis) {
+        let (mut first, open) = self.made(data, progress)?;
+        // Curves and observers take whole records only: excerpts of very long ones end without.
+        let whole = cut.iter().map(Run::len).eq(self.whole.iter().map(Run::len));
+        if whole && open_to_play(&first.diagnosis) {
+            progress("a play under an observer");
+            let (data, iterations) = (&first.data, self.settings.select.iterations);
+            let beside_laws = data.form.plant(&first.selection.last().refitted.p);
+            let plants = [self.given.clone(), first.refitted.clone(), data.form.given.clone(), beside_laws];
+            if let Some(play) = observed_play(data, &plants, iterations) {
+                play.enter(&mut first.diagnosis);
+                self.offer(&mut first, open, play.corrected);
+                propose(&mut first.diagnosis, &first.data, &first.selection);
+                return Ok(first);
+            }
+        }
+        if settled(&first.diagnosis) || !whole {
             return Ok(first);
         }
-        // A curve is fitted to whole records only: excerpts of very long ones end without.
-        let whole = cut.iter().map(Run::len).eq(self.whole.iter().map(Run::len));
-        Ok(if whole { self.with_curve(first, open, progress) } else { first })
+        Ok(self.with_curve(first, open, progress))
+    }
+
+    /// Offers another model where it simulates no record that was not used worse than the one that is offered.
+    fn offer(&self, made: &mut Diagnosed, mut open: Errors, model: Corrected) {
+        let every: Vec<&Run> = made.data.runs.iter().collect();
+        let which = judged_runs(&made.data);
+        let of = |e: &[Vec<f64>]| rms(&which.iter().map(|&i| e[i].clone()).collect::<Vec<_>>());
+        let simulated = |closed: Option<&Law>| {
+            let judged = model.judged(&made.data, &made.selection);
+            errors(&SimulatedModel { own: vec![], lines: &made.data.lines, fit: None, ..judged }, &every, closed)
+        };
+        let shown = simulated(self.closed);
+        let (offered, after) = (of(&made.errors[2]), of(&shown));
+        if after.is_nan() || after > offered {
+            made.diagnosis.remarks.push(
+                "the corrected plant carries what stood in for the play before: a free simulation of it is no nearer to the records"
+                    .into(),
+            );
+            return;
+        }
+        [open[2], made.errors[2]] = [simulated(None), shown];
+        made.diagnosis.fit = figures_of(&made.data, &every, [&open, &made.errors], self.closed.is_some());
+        made.corrected = model;
     }
 
     /// The same with a curve in the place of the law that has no name, where one is worth it.

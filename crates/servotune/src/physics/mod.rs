@@ -11,6 +11,7 @@ mod machine;
 mod oscillator;
 mod pair;
 mod parameter;
+mod play_observer;
 mod restored;
 mod sample;
 mod share;
@@ -66,6 +67,7 @@ pub use library::{AnyLaw, Effect, Setting, curves, data_facts, effect, facts, li
 pub use machine::{Machine, Reading};
 pub use parameter::{Parameter, Unit};
 pub(crate) use pivot_friction::shortest_loop;
+pub use play_observer::{Followed, PlayObserver, Readings};
 pub use restored::{Context, Restored};
 pub use sample::{Sample, Scene, logarithmic};
 pub use share::Share;

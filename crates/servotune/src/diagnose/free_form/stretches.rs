@@ -16,6 +16,9 @@ const MANY: usize = 12;
 /// Parts that are left out in turn, and stretches of a record that are: a move is over such a place in a twentieth of its record.
 const FOLDS: usize = 4;
 const IN_TURN: usize = 32;
+/// Shortest of the short pieces (samples), and how many of them a record gives at most.
+const BRIEF: usize = 100;
+const BRIEF_PIECES: usize = 24;
 
 /// What a curve is fitted to.
 pub(in crate::diagnose) struct Stretches {
@@ -60,6 +63,23 @@ impl Stretches {
             }
         }
         Stretches { runs, blocks }
+    }
+
+    /// The same in short pieces, each with a start of its own: a law that drives motions apart is followed over as long as they stay
+    /// together. None where records are short already.
+    pub fn in_short_pieces(&self, sample_time_s: f64) -> Option<Stretches> {
+        let cut = |run: &Run| -> Vec<Run> {
+            let pieces = (run.len() / BRIEF).clamp(1, BRIEF_PIECES);
+            let edge = |k: usize| run.len() * k / pieces;
+            let each = |k: usize| match pieces {
+                1 => run.clone(),
+                _ => piece(run, edge(k), edge(k + 1), sample_time_s),
+            };
+            (0..pieces).map(each).collect()
+        };
+        let runs: Vec<Run> = self.runs.iter().flat_map(cut).collect();
+        let blocks = runs.iter().enumerate().map(|(i, r)| (r.len(), i % FOLDS)).collect();
+        (runs.len() > self.runs.len()).then_some(Stretches { runs, blocks })
     }
 
     /// The same for a sensor whose curve is asked for: where the arm stands is not known from what it reads, but all records share

@@ -70,6 +70,9 @@ rules! {
     NOISE_SLOPE: f64 = 7.0, "standard deviations",
         "growth of the noise with the speed from which it is no chance",
         "judgement: a normal number never does";
+    NOISE_SHARED: f64 = 0.3, "share",
+        "growth that neighbouring readings have in common, up to which it is the noise of readings",
+        "judgement: 0 where each scatters on its own";
     NOISE_DEPARTED: f64 = 1.3, "ratio",
         "level over the stated one from which noise has departed",
         "judgement: levels from a few repeats err by a tenth";

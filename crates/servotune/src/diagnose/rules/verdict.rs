@@ -91,6 +91,9 @@ rules! {
     DECISIVE_RIVAL: f64 = 0.8, "share",
         "gain of the first finding that its best rival must stay below then",
         "what the library lacks is near to several of its laws";
+    DECISIVE_LEFT: f64 = 2.0, "noise",
+        "error on held-out records up to which such a name may be given",
+        "as for curves: a name leaves no several times the noise";
     BOOTSTRAP_CHANCE: f64 = 0.01, "probability",
         "chance by the bootstrap up to which findings stand",
         "judgement: one draw in a hundred as strong as the records";
@@ -140,4 +143,16 @@ rules! {
     ASTRAY_SHARE: f64 = 0.3, "share",
         "the same as a share of noise",
         "as before";
+    PLAY_CLEARLY: f64 = 0.012, "per sample",
+        "deviance of the fitted records under an observer of a play, below that of a resonance under the same observer, from which the play is named",
+        "0.02 to 0.5 where a play acts, 12 machines of another program";
+    PLAY_LEAST: f64 = 60.0, "twice log-likelihood",
+        "the same over all samples",
+        "judgement: odds of e^30";
+    PLAY_HELD_OUT: f64 = 0.15, "share",
+        "gain per sample on held-out records over that on fitted ones from which they agree",
+        "judgement: other motions meet the contact less often";
+    PLAY_TOUCHES: f64 = 0.02, "share",
+        "samples in contact, and out of it, from which a gap is seen",
+        "a gap that is never crossed, or never met, is no play";
 }

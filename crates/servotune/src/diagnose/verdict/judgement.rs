@@ -12,9 +12,10 @@ use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::simulation::Simulation;
 use crate::diagnose::rules::{
-    BELOW_NOISE, BOOTSTRAP_CHANCE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, DECISIVE_RIVAL, DECISIVE_SHARE, GIVEN_FAR,
-    HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER, LOOP_EXPLAINS, LOOP_LEFT, NAMED_SHARE,
-    NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE, WIND_LEFT,
+    BELOW_NOISE, BOOTSTRAP_CHANCE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, DECISIVE_LEFT, DECISIVE_RIVAL,
+    DECISIVE_SHARE, GIVEN_FAR, HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER,
+    LOOP_EXPLAINS, LOOP_LEFT, NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE,
+    WIND_LEFT,
 };
 use crate::diagnose::search::selection::Selection;
 use crate::diagnose::search::shortlist::same_drag;
@@ -74,7 +75,8 @@ impl<'a> Evidence<'a> {
     /// Whether the laws of the model may be named; what speaks against it is said.
     fn names(&self, d: &mut Diagnosis) -> bool {
         let Evidence { selection, model, explained, .. } = *self;
-        let decisive = explained >= DECISIVE_SHARE && rival_share(selection) < DECISIVE_RIVAL;
+        let near = d.fit.holdout.is_none_or(|h| h.rms_after <= DECISIVE_LEFT * h.noise_floor);
+        let decisive = near && explained >= DECISIVE_SHARE && rival_share(selection) < DECISIVE_RIVAL;
         if let Some(h) = &self.against {
             d.remarks.push(format!(
                 "the nearest law holds on the records that it was fitted to, but not on {}, which {}: whitened error {:.3} after {:.3} under the linear refit, 1 being noise",

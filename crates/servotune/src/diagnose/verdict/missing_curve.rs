@@ -51,7 +51,8 @@ pub(in crate::diagnose) struct Standing<'a> {
     pub floor: f64,
 }
 
-/// Looks for a curve and takes it where it is worth it.
+/// Looks for a curve and takes it where it is worth it: on whole records, then on short pieces of them, for a law under which simulations of
+/// whole records part.
 pub(in crate::diagnose) fn stand_in(
     data: &DiagnosisData,
     selection: &Selection,
@@ -59,10 +60,19 @@ pub(in crate::diagnose) fn stand_in(
     progress: &mut dyn FnMut(&str),
 ) -> Option<StandIn> {
     let [ground, one_place] = grounds(data);
-    let found = estimated(data, [&ground, &one_place], &starts(data, selection), &balanced(data), progress)?;
-    let best = taken(&found)?;
+    let (starts, balanced) = (starts(data, selection), balanced(data));
+    let on = |ground: &Stretches, progress: &mut dyn FnMut(&str)| {
+        let found = estimated(data, [ground, &one_place], &starts, &balanced, progress)?;
+        stands(data, &found, &one_place, standing)
+    };
+    on(&ground, progress).or_else(|| on(&ground.in_short_pieces(data.scene.sample_time_s)?, progress))
+}
+
+/// What was estimated, where it is worth it.
+fn stands(data: &DiagnosisData, found: &Estimated, one_place: &Stretches, standing: &Standing) -> Option<StandIn> {
+    let best = taken(found)?;
     let model = model(data, best, &found.plain);
-    let errors = [standing.closed, None].map(|closed| shown(data, &model, best, &one_place, closed));
+    let errors = [standing.closed, None].map(|closed| shown(data, &model, best, one_place, closed));
     let which = judged_runs(data);
     let of = |e: &[Vec<f64>]| rms(&which.iter().map(|&i| e[i].clone()).collect::<Vec<_>>());
     let [given, refit, laws] = [0, 1, 2].map(|m| of(&standing.errors[m]));
@@ -73,12 +83,12 @@ pub(in crate::diagnose) fn stand_in(
     let floor = standing.floor.min(after);
     let explained_share =
         1.0 - (after * after - floor * floor) / (linear * linear - floor * floor).max(f64::MIN_POSITIVE);
-    let reading = found.reading.as_ref().map(|_| reading_finding(data, best, &found));
+    let reading = found.reading.as_ref().map(|_| reading_finding(data, best, found));
     let near = explained_share >= NAMED_SHARE && after <= CURVE_NAMED * standing.floor;
-    let finding = reading.or_else(|| bearing_finding(data, best, &found).filter(|_| near));
+    let finding = reading.or_else(|| bearing_finding(data, best, found).filter(|_| near));
     let curved = matches!(best.trial.shape, Shape::Curve(..));
     let named = finding.is_some();
-    let curve = curved.then(|| described(data, &found, explained_share.clamp(-1.0, 1.0), named));
+    let curve = curved.then(|| described(data, found, explained_share.clamp(-1.0, 1.0), named));
     Some(StandIn { corrected: model, errors, curve, finding })
 }
 
@@ -96,7 +106,7 @@ fn taken<'e, 'a>(found: &'e Estimated<'a>) -> Option<&'e Foretelling<'a>> {
 }
 
 /// The runs that judge: those that were not used, else those that were.
-fn judged_runs(data: &DiagnosisData) -> Vec<usize> {
+pub(in crate::diagnose) fn judged_runs(data: &DiagnosisData) -> Vec<usize> {
     let role = |role: Role| -> Vec<usize> {
         (0..data.runs.len()).filter(|&i| data.runs[i].role == role && !data.runs[i].shocked).collect()
     };

@@ -18,5 +18,6 @@ pub(super) mod missing_curve;
 pub(super) mod naming;
 pub(super) mod next_experiment;
 pub(super) mod noise_finding;
+pub(super) mod observed_play;
 pub(super) mod offered_models;
 mod shock_finding;

@@ -9,7 +9,7 @@ use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::noise::torque_noise::TorqueNoise;
-use crate::diagnose::rules::{NOISE_DEPARTED, NOISE_LARGER, NOISE_SLOPE, NOISE_WITH_SPEED};
+use crate::diagnose::rules::{NOISE_DEPARTED, NOISE_LARGER, NOISE_SHARED, NOISE_SLOPE, NOISE_WITH_SPEED};
 use crate::physics::{Facts, broadband_disturbance, encoder_noise, jitter, quantisation};
 use crate::recording::NominalNoise;
 
@@ -89,12 +89,17 @@ fn fitted(data: &DiagnosisData) -> Vec<&Run> {
 
 /// Noise that grows with the speed: a clock that trembles, or an encoder that does.
 fn faster(data: &DiagnosisData) -> Option<Finding> {
-    // Squares of the whitened repeats against the square of the speed.
+    // Squares of the whitened repeats, and products of neighbours, against the square of the speed.
     let (mut n, mut sx, mut sy, mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    let (mut sz, mut sxz) = (0.0, 0.0);
     for (run, series) in &data.repeats {
         let Some(segment) = data.stack.segments.iter().position(|s| s.runs.contains(run)) else { continue };
+        let mut last = 0.0;
         for (e, m) in series.iter().zip(&data.trajectories[segment].samples) {
-            let (x, y) = ((m.v / data.scene.speed).powi(2), e * e);
+            let (x, y, z) = ((m.v / data.scene.speed).powi(2), e * e, e * last);
+            last = *e;
+            sz += z;
+            sxz += x * z;
             n += 1.0;
             sx += x;
             sy += y;
@@ -116,6 +121,10 @@ fn faster(data: &DiagnosisData) -> Option<Finding> {
         return None;
     }
     let seconds = (slope * data.levels.sensor_rms.powi(2)).sqrt() / data.scene.speed;
+    // Each reading scatters on its own; what neighbours share is a motion: a limit or a gap answers the noise as the motion has it.
+    if (sxz - sx * sz / n) / spread > NOISE_SHARED * slope {
+        return None;
+    }
     let z = slope / sigma;
     // Half the slope's relative error, the value being its root.
     let off = 0.5 * 1.96 * seconds / z;
