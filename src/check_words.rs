@@ -257,6 +257,9 @@ fn case(file: &Path) -> Result<Meaning, Failure> {
     let c = Case::read(folder, &RecordSettings::default())?;
     let of = |role: Role| c.records.iter().filter(|(e, _)| e.role == role).count();
     let mut says = vec![format!("case {}: {} records to fit, {} held out", c.id, of(Role::Fit), of(Role::Holdout))];
+    if !c.further_inputs.is_empty() {
+        says.push(format!("further inputs that may act on the position: {}", c.further_inputs.join(", ")));
+    }
     let read = load::plant(&c.plant)?;
     says.extend(plant(read).says.into_iter().map(|line| format!("its plant: {line}")));
     match &c.controller {

@@ -2,7 +2,7 @@
 
 use super::diagnose_arguments::DiagnoseArguments;
 use super::{Ending, Failure, Screen, diagnose_rules, load};
-use servotune::diagnose::{DiagnoseSettings, Diagnosis, Rule, decision_rules, diagnose};
+use servotune::diagnose::{Coupling, DiagnoseSettings, Diagnosis, Rule, decision_rules, diagnose};
 use servotune::document::{FileSet, check_target};
 use servotune::recording::{Case, NominalNoise, Record, RecordEntry, Role};
 use servotune_answer::{case_provenance, conclude, sure};
@@ -13,12 +13,33 @@ use std::path::PathBuf;
 
 /// The file of the corrected model, in the output folder.
 const CORRECTED: &str = "plant_corrected.toml";
+/// Impulse responses of further inputs, beside it.
+const COUPLING: &str = "coupling.csv";
 /// The page for people, beside it.
 pub(super) const REPORT: &str = "report.html";
 
 /// Three digits.
 fn three(value: f64) -> String {
     NumberFormat::Significant(3).text(value)
+}
+
+/// The impulse responses as comma-separated columns over time, each headed by its input and its unit.
+fn coupling_table(couplings: &[Coupling], sample_time_s: f64, unit: &str) -> String {
+    let heading = |c: &Coupling| {
+        let name = format!("{}_{unit}_per_unit", c.input);
+        // What a spreadsheet would take for a formula is shown as the text that it is.
+        let shown = if name.starts_with(['=', '+', '-', '@']) { format!("'{name}") } else { name };
+        if shown.contains([',', '"']) { format!("\"{}\"", shown.replace('"', "\"\"")) } else { shown }
+    };
+    let mut text = format!("time_s,{}\n", couplings.iter().map(heading).collect::<Vec<_>>().join(","));
+    for k in 0..couplings.iter().map(|c| c.response.len()).max().unwrap_or(0) {
+        let _ = write!(text, "{}", k as f64 * sample_time_s);
+        for c in couplings {
+            let _ = write!(text, ",{}", c.response.get(k).copied().unwrap_or(0.0));
+        }
+        text.push('\n');
+    }
+    text
 }
 
 fn case(a: &DiagnoseArguments) -> Result<Case, Failure> {
@@ -49,6 +70,7 @@ fn case(a: &DiagnoseArguments) -> Result<Case, Failure> {
         plant: a.plant.clone().unwrap_or_default(),
         controller: a.controller.clone(),
         spindle_hz: a.spindle_hz,
+        further_inputs: vec![],
         records,
     };
     let first = a.record.first().cloned().unwrap_or_default();
@@ -92,6 +114,10 @@ pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagno
     let diagnosis = made.diagnosis;
     let json = serde_json::to_string_pretty(&diagnosis).map_err(|source| Failure::Json { source })?;
     files.write(&a.out.join("diagnosis.json"), format!("{json}\n"));
+    if !diagnosis.coupling.is_empty() {
+        let responses = coupling_table(&diagnosis.coupling, made.data.scene.sample_time_s, &plant.position_unit);
+        files.write(&a.out.join(COUPLING), responses);
+    }
     files.commit()?;
     let verdict = serde_json::to_string(&diagnosis.verdict).unwrap_or_default();
     let mut text = format!("{}: {}\n{sentence}\n", diagnosis.id, verdict.trim_matches('"'));
@@ -126,6 +152,9 @@ pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagno
     }
     for r in &diagnosis.remarks {
         let _ = writeln!(text, "  {r}");
+    }
+    if !diagnosis.coupling.is_empty() {
+        let _ = writeln!(text, "  impulse responses of the further inputs: {}", a.out.join(COUPLING).display());
     }
     let next = &diagnosis.next_experiment;
     // Without a rival there is nothing to separate.

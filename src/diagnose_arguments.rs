@@ -14,7 +14,8 @@ use std::path::PathBuf;
   servotune diagnose --plant box.toml --record box.csv.gz --columns position=V2_V,command=V1_V --sample-rate-hz 610.35 --rows 40650:105712 --holdout-rows 105712:127400 --out box
   servotune diagnose --rules
 
-CASE_DIR holds case.toml. Written: diagnosis.json, plant_corrected.toml where the model changed, report.html.
+CASE_DIR holds case.toml. Written: diagnosis.json, plant_corrected.toml where the model changed, report.html,
+coupling.csv where `further_inputs` of case.toml move the position (impulse responses over time).
 Ends with 1 where the verdict is data_fault, located_unexplained or undecidable.")]
 pub(super) struct DiagnoseArguments {
     /// Folder with case.toml
@@ -95,6 +96,7 @@ impl DiagnoseArguments {
             names: self.columns.clone().unwrap_or_default(),
             sample_time_s: self.sample_rate_hz.map(f64::recip),
             rows,
+            further: vec![],
         }
     }
 }

@@ -96,6 +96,7 @@ fn described(kind: &str, about: &str) -> Value {
         "text" | "path" => json!({ "type": "string" }),
         "bool" => json!({ "type": "boolean" }),
         "numbers" => of("number"),
+        "texts" => of("string"),
         "range" => json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }),
         "range of integers" => json!({ "type": "array", "items": { "type": "integer" }, "minItems": 2, "maxItems": 2 }),
         "ranges" | "matrix" => json!({ "type": "array", "items": of("number") }),

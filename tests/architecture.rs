@@ -35,7 +35,7 @@ const FLOORS: [&str; 7] = ["rules", "data", "noise", "fit", "free_form", "search
 /// Outside crates and the places where they may be named.
 const HOMES: [(&str, &[&str]); 12] = [
     ("clarabel", &["crates/servotune/src/tune/feedforward.rs"]),
-    ("argmin", &["crates/servotune/src/tune/simplex.rs"]),
+    ("argmin", &["crates/servotune/src/numeric/simplex.rs"]),
     ("rustfft", &["crates/servotune/src/numeric/spectrum.rs"]),
     (
         "rayon",

@@ -64,7 +64,14 @@ fn a_line_whose_phase_differs_between_repeats_is_a_finding_and_no_noise() {
             .enumerate()
             .for_each(|(k, y)| *y += amplitude * (std::f64::consts::TAU * hz * k as f64 * T + p).cos());
     }
-    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
+    let case = Case {
+        id: "test".into(),
+        plant: PathBuf::new(),
+        controller: None,
+        spindle_hz: None,
+        further_inputs: vec![],
+        records,
+    };
     let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
     assert_eq!(d.findings[0].effect, "line_disturbance", "{:?}", d.verdict);
     let p = &d.findings[0].parameters;
@@ -91,7 +98,14 @@ fn a_narrow_band_of_noise_is_no_hum() {
         let rms = (late.iter().map(|v| v * v).sum::<f64>() / N as f64).sqrt();
         record.position.iter_mut().zip(late).for_each(|(y, v)| *y += amplitude * v / rms);
     }
-    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
+    let case = Case {
+        id: "test".into(),
+        plant: PathBuf::new(),
+        controller: None,
+        spindle_hz: None,
+        further_inputs: vec![],
+        records,
+    };
     let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
     assert!(d.findings.iter().all(|f| f.effect != "line_disturbance"), "{:?}", d.findings);
 }
@@ -111,7 +125,14 @@ fn a_push_into_one_repeat_is_found_where_it_fell() {
         push + if t < 0.0 { 0.0 } else { u[(t / T).floor() as usize] }
     };
     records[1].1.position = respond_to(&GIVEN, &held, 101);
-    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
+    let case = Case {
+        id: "test".into(),
+        plant: PathBuf::new(),
+        controller: None,
+        spindle_hz: None,
+        further_inputs: vec![],
+        records,
+    };
     let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
     assert_eq!((d.verdict, d.findings.len()), (Verdict::Named, 1), "{:?}", d.findings);
     let f = &d.findings[0];
@@ -135,6 +156,7 @@ fn the_bootstrap_believes_friction_and_sees_nothing_in_noise() {
             plant: PathBuf::new(),
             controller: None,
             spindle_hz: None,
+            further_inputs: vec![],
             records: records(truth),
         };
         diagnose(&case, &plant(), None, &settings(9), |_| {}).unwrap().diagnosis

@@ -62,7 +62,14 @@ impl Machine {
                 records.push((entry, record(file, &u, position)));
             }
         }
-        Case { id: "curve".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records }
+        Case {
+            id: "curve".into(),
+            plant: PathBuf::new(),
+            controller: None,
+            spindle_hz: None,
+            further_inputs: vec![],
+            records,
+        }
     }
 
     fn diagnosed(&self) -> Diagnosed {
@@ -82,6 +89,7 @@ fn record(file: PathBuf, command: &[f64], position: Vec<f64>) -> Record {
         pes: None,
         spindle_rad: None,
         temperature_c: None,
+        further: vec![],
     }
 }
 

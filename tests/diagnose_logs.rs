@@ -70,8 +70,14 @@ fn laps_of_one_drive_stand_for_repeats() {
     let u: Vec<f64> = excitation(0.04, 3).iter().take(N / 2).copied().cycle().take(N).collect();
     let mut one = record("laps.csv", Role::Fit, "only", &u, respond(&GIVEN, &u, 8));
     one.0.repeat_group = None;
-    let case =
-        Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records: vec![one] };
+    let case = Case {
+        id: "test".into(),
+        plant: PathBuf::new(),
+        controller: None,
+        spindle_hz: None,
+        further_inputs: vec![],
+        records: vec![one],
+    };
     let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
     assert!(d.noise.from_repeats);
     // 1000 independent differences: 2.2 % standard error, times three.
@@ -88,7 +94,14 @@ fn a_command_that_was_measured_and_not_held_is_seen() {
     let records = (0..3)
         .map(|i| record(&format!("m{i}.csv"), Role::Fit, "m", &u, respond_to(&prompt, &command, 40 + i)))
         .collect();
-    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
+    let case = Case {
+        id: "test".into(),
+        plant: PathBuf::new(),
+        controller: None,
+        spindle_hz: None,
+        further_inputs: vec![],
+        records,
+    };
     let given = Plant { delay_s: 0.0, ..plant() };
     let d = diagnose(&case, &given, None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
     assert!(d.remarks.iter().any(|r| r.contains("as measured")), "{:?}", d.remarks);
@@ -162,8 +175,14 @@ fn law() -> Controller {
 }
 
 fn replayed(records: Vec<(RecordEntry, Record)>) -> Diagnosis {
-    let case =
-        Case { id: "test".into(), plant: PathBuf::new(), controller: Some("c.toml".into()), spindle_hz: None, records };
+    let case = Case {
+        id: "test".into(),
+        plant: PathBuf::new(),
+        controller: Some("c.toml".into()),
+        spindle_hz: None,
+        further_inputs: vec![],
+        records,
+    };
     diagnose(&case, &plant(), Some(&law()), &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
 }
 

@@ -9,7 +9,14 @@ use servotune::recording::{Case, NominalNoise, Record, RecordEntry};
 use std::path::PathBuf;
 
 fn of(records: Vec<(RecordEntry, Record)>, given: &Plant, noise: NominalNoise) -> Diagnosis {
-    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
+    let case = Case {
+        id: "test".into(),
+        plant: PathBuf::new(),
+        controller: None,
+        spindle_hz: None,
+        further_inputs: vec![],
+        records,
+    };
     let settings = DiagnoseSettings { noise, ..DiagnoseSettings::default() };
     diagnose(&case, given, None, &settings, |_| {}).unwrap().diagnosis
 }

@@ -58,6 +58,7 @@ fn record(role: Role, group: Option<&str>, phase: f64, seed: u64, limit: f64) ->
         pes: None,
         spindle_rad: None,
         temperature_c: None,
+        further: vec![],
     };
     (RecordEntry { file, role, repeat_group: group.map(str::to_owned) }, record)
 }
@@ -72,6 +73,7 @@ fn made_of(given: &Plant, limit: f64) -> Diagnosed {
         plant: PathBuf::new(),
         controller: None,
         spindle_hz: None,
+        further_inputs: vec![],
         records: vec![
             record(Role::Fit, Some("a"), 1.7, 1, limit),
             record(Role::Fit, Some("a"), 1.7, 2, limit),

@@ -7,6 +7,7 @@ mod architecture;
 mod command_line;
 mod diagnose_cases;
 mod diagnose_common;
+mod diagnose_coupling;
 mod diagnose_free_form;
 mod diagnose_logs;
 mod diagnose_offered;

@@ -60,8 +60,14 @@ pub fn diagnose_records(
     bootstrap: usize,
 ) -> PyResult<Said> {
     let records = records.into_iter().map(record).collect::<PyResult<Vec<_>>>()?;
-    let case =
-        Case { id, plant: plant.file.clone(), controller: controller.map(|c| c.file.clone()), spindle_hz, records };
+    let case = Case {
+        id,
+        plant: plant.file.clone(),
+        controller: controller.map(|c| c.file.clone()),
+        spindle_hz,
+        further_inputs: vec![],
+        records,
+    };
     let case = case.checked(Path::new("records")).map_err(raise)?;
     made(py, &case, &plant.plant, controller.map(|c| &c.controller), bootstrap)
 }

@@ -111,6 +111,7 @@ pub fn record(name: &str, role: Role, group: &str, command: &[f64], position: Ve
         pes: None,
         spindle_rad: None,
         temperature_c: None,
+        further: vec![],
     };
     (entry, record)
 }
@@ -122,7 +123,14 @@ pub fn diagnosed(truth: &Truth) -> Diagnosis {
 
 /// The diagnosis of these records.
 pub fn diagnosed_from(records: Vec<(RecordEntry, Record)>) -> Diagnosis {
-    let case = Case { id: "test".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records };
+    let case = Case {
+        id: "test".into(),
+        plant: PathBuf::new(),
+        controller: None,
+        spindle_hz: None,
+        further_inputs: vec![],
+        records,
+    };
     diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
 }
 

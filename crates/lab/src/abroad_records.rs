@@ -35,12 +35,13 @@ fn record(name: &str, role: Role, sample_time_s: f64, command: Vec<f64>, positio
         pes: None,
         spindle_rad: None,
         temperature_c: None,
+        further: vec![],
     };
     (RecordEntry { file, role, repeat_group: None }, record)
 }
 
 fn of_records(id: &str, records: Vec<(RecordEntry, Record)>) -> Case {
-    Case { id: id.into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records }
+    Case { id: id.into(), plant: PathBuf::new(), controller: None, spindle_hz: None, further_inputs: vec![], records }
 }
 
 /// The guide with two masses: first file fitted, second held out; the model from the response of the first file.

@@ -128,13 +128,20 @@ impl Stage {
                     pes: None,
                     spindle_rad: None,
                     temperature_c: None,
+                    further: vec![],
                 };
                 records.push((entry, record));
             }
         }
         let controller_file = Some(PathBuf::from("controller.toml"));
-        let case =
-            Case { id: id.into(), plant: PathBuf::new(), controller: controller_file, spindle_hz: None, records };
+        let case = Case {
+            id: id.into(),
+            plant: PathBuf::new(),
+            controller: controller_file,
+            spindle_hz: None,
+            further_inputs: vec![],
+            records,
+        };
         let [kp, ki_per_s, kd_s, derivative_filter_s] = GAINS;
         let controller = Controller {
             sample_time_s: T,

@@ -154,6 +154,7 @@ impl Trial {
                     pes: None,
                     spindle_rad: None,
                     temperature_c: None,
+                    further: vec![],
                 };
                 (entry, record)
             })
@@ -163,6 +164,7 @@ impl Trial {
             plant: PathBuf::new(),
             controller: Some(PathBuf::from("controller.toml")),
             spindle_hz: (self.machine.runout[0] > 0.0).then_some(self.machine.runout[1]),
+            further_inputs: vec![],
             records,
         }
     }

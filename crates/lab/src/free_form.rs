@@ -33,7 +33,7 @@ fn pulley(data: &Path) -> Result<(Case, Plant), StudyError> {
                 position: format!("z_{size}"),
                 ..ColumnNames::default()
             };
-            let settings = RecordSettings { names, sample_time_s: None, rows: Some(rows) };
+            let settings = RecordSettings { names, sample_time_s: None, rows: Some(rows), further: vec![] };
             let entry = RecordEntry { file: PathBuf::from(format!("{size}_{part}")), role, repeat_group: None };
             records.push((entry, Record::read(&file, &settings)?));
         }
@@ -47,7 +47,17 @@ fn pulley(data: &Path) -> Result<(Case, Plant), StudyError> {
         modes: vec![],
         physics: vec![],
     };
-    Ok((Case { id: "Pulley drive".into(), plant: PathBuf::new(), controller: None, spindle_hz: None, records }, plant))
+    Ok((
+        Case {
+            id: "Pulley drive".into(),
+            plant: PathBuf::new(),
+            controller: None,
+            spindle_hz: None,
+            further_inputs: vec![],
+            records,
+        },
+        plant,
+    ))
 }
 
 /// Root mean square behind the first samples.

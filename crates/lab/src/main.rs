@@ -43,7 +43,7 @@ struct StudyArguments {
     /// Lines that a run printed: the page is of these cases, and nothing is run (study `sealed`)
     #[arg(long, value_name = "FILE")]
     lines: Option<PathBuf>,
-    /// Folder with the measured records (studies `mirror`, `motor`, `hdd`)
+    /// Folder with the measured records (studies `mirror`, `mirror-inputs`, `motor`, `hdd`)
     #[arg(long, value_name = "DIR", default_value = "../shared/data")]
     data: PathBuf,
 }
@@ -75,6 +75,8 @@ enum StudyName {
     Plants,
     /// The nine measured responses of a fast steering mirror
     Mirror,
+    /// The same mirror with its three inputs at once, each axis diagnosed
+    MirrorInputs,
     /// 64 testers of 16 slots from raw files, three times
     Fleet,
     /// A run killed 500 times
@@ -168,6 +170,7 @@ fn run(a: &StudyArguments, say: &mut (dyn FnMut(&str) + Send)) -> Result<Vec<Pat
         StudyName::Prediction => Pages(study::prediction()?),
         StudyName::Plants => Pages(study::plants()?),
         StudyName::Mirror => Pages(study::mirror(&a.data)?),
+        StudyName::MirrorInputs => Pages(study::mirror_inputs(&a.data, say)?),
         StudyName::FalseAlarms => Pages(study::false_alarms(&a.data)?),
         StudyName::Mismatch => Pages(study::mismatch(&a.data)?),
         StudyName::Recordings => Pages(study::recordings(&a.data)?),

@@ -129,7 +129,12 @@ pub(super) fn case(r: &Recording, data: &Path) -> Result<Case, StudyError> {
         return Err(StudyError::Absent { file });
     }
     let read = |rows: [usize; 2]| {
-        let settings = RecordSettings { names: r.names.clone(), sample_time_s: r.sample_time_s, rows: Some(rows) };
+        let settings = RecordSettings {
+            names: r.names.clone(),
+            sample_time_s: r.sample_time_s,
+            rows: Some(rows),
+            further: vec![],
+        };
         Record::read(&file, &settings)
     };
     let entry = |name: &str, role| RecordEntry { file: PathBuf::from(name), role, repeat_group: None };
@@ -138,6 +143,7 @@ pub(super) fn case(r: &Recording, data: &Path) -> Result<Case, StudyError> {
         plant: PathBuf::new(),
         controller: None,
         spindle_hz: None,
+        further_inputs: vec![],
         records: vec![(entry("fit", Role::Fit), read(r.fit)?), (entry("holdout", Role::Holdout), read(r.holdout)?)],
     })
 }
@@ -192,7 +198,7 @@ fn mirror(data: &Path) -> Result<String, StudyError> {
         return Err(StudyError::Absent { file });
     }
     let mut text = String::from(
-        "## Fine steering mirror\n\nNo diagnosis: three inputs act at once, and a case has one. What the response file tells: nonlinear distortion of a random excitation scatters \
+        "## Fine steering mirror\n\nNo diagnosis here: three inputs act at once, and `mirror_inputs.md` takes them together. What the response file tells: nonlinear distortion of a random excitation scatters \
          from realisation to realisation beyond the noise between periods. Medians over 10 to 2900 Hz, two realisations only.\n\n| entry | noise over response (%) | total scatter over \
          response (%) | nonlinear share of the power at most (%) |\n|---|---|---|---|\n",
     );

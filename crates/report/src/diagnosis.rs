@@ -83,6 +83,11 @@ fn verdict(made: &Diagnosed, unit: &str) -> (Badge, String) {
         Verdict::NoMismatch => {
             (Badge::Ok, "The model agrees with the machine down to the noise: nothing is missing.".into())
         }
+        Verdict::Refit if !d.coupling.is_empty() => {
+            let inputs: Vec<&str> = d.coupling.iter().map(|c| c.input.as_str()).collect();
+            let text = format!("The linear model lacked what {} move, or numbers of it were off", inputs.join(" and "));
+            (Badge::Warn, format!("{text}; no physics is missing. {falls}"))
+        }
         Verdict::Refit => (
             Badge::Warn,
             format!("Numbers of the linear model were off and have been refitted; no physics is missing. {falls}"),

@@ -49,7 +49,14 @@ pub fn main() -> Result<(), Box<dyn Error>> {
         let read = Record::of(&file, columns, None, 1)?;
         records.push((RecordEntry { file, role, repeat_group: None }, read));
     }
-    let case = Case { id: "example".into(), plant: machine, controller: Some(gains), spindle_hz: None, records };
+    let case = Case {
+        id: "example".into(),
+        plant: machine,
+        controller: Some(gains),
+        spindle_hz: None,
+        further_inputs: vec![],
+        records,
+    };
 
     let found = diagnose(&case, &plant, Some(&controller), &DiagnoseSettings::default(), |_| ())?.diagnosis;
     let held_out = found.fit.holdout.ok_or("no record to judge by")?;

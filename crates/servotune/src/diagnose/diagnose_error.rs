@@ -37,6 +37,11 @@ pub enum DiagnoseError {
         "{what} comes out as {found}: these records cannot be diagnosed under this plant; check the sample rate, the units, and the modes of the plant against half the sample rate"
     )]
     NotFinite { what: &'static str, found: f64 },
+    /// Further inputs are not those that the case names.
+    #[error(
+        "record `{record}`: {found} further inputs of finite numbers as long as the position; expected {expected}, one for each name in `further_inputs`"
+    )]
+    Further { record: String, found: usize, expected: usize },
     /// Nothing moves.
     #[error("record `{record}`: the command never changes; expected a record in which the machine is driven")]
     Still { record: String },

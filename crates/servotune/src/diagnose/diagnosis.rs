@@ -9,13 +9,14 @@ use super::trial::Trial;
 use crate::controller::{Controller, Law};
 use crate::diagnose::data::excerpt::excerpts;
 use crate::diagnose::data::run::{Run, runs};
+use crate::diagnose::fit::coupling::Decoupled;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
 use crate::diagnose::fit::shock::set_aside;
 use crate::diagnose::fit::simulation::rms;
 use crate::diagnose::search::cleared_plant::cleared;
 use crate::diagnose::verdict::diagnosed::Diagnosed;
-use crate::diagnose::verdict::log_checks::check;
+use crate::diagnose::verdict::log_checks::{LogChecks, check};
 use crate::lti::{Body, Plant};
 use crate::recording::{Case, Role};
 
@@ -43,18 +44,15 @@ pub fn diagnose(
         return Err(DiagnoseError::Body { poles: r.poles.len() });
     }
     let mut all = runs(case);
-    for run in &all {
-        if run.input.iter().all(|u| *u == run.input[0]) {
-            return Err(DiagnoseError::Still { record: run.name.clone() });
-        }
-    }
+    driven(&all, case)?;
     // Digits of the printed clock do not matter once a controller says what the sample time is.
     let sample_time_s = controller.map_or(sample_time_s, |c| c.sample_time_s);
     progress("checking the logs");
     let law = controller.map(Law::new).transpose()?;
     let log_checks = check(case, &mut all, given, law.as_ref(), sample_time_s)?;
-    let mut remarks = Vec::new();
-    let mut whole = all;
+    let mut decoupled = decoupled(all, case, given, &log_checks, sample_time_s, &mut progress);
+    let mut remarks = std::mem::take(&mut decoupled.remarks);
+    let mut whole = std::mem::take(&mut decoupled.runs);
     let cut = excerpts(&whole, sample_time_s);
     if let Some(cut) = &cut {
         let kept: usize = cut.iter().filter(|r| r.role == Role::Fit).map(Run::len).sum();
@@ -87,6 +85,7 @@ pub fn diagnose(
         case,
         given,
         whole: &whole,
+        decoupled: &decoupled.recorded_as(&whole),
         closed,
         settings,
         log_checks: &log_checks,
@@ -94,6 +93,40 @@ pub fn diagnose(
         remarks: &remarks,
     };
     trial.best(data, &mut progress)
+}
+
+/// Refuses runs that are not driven, and such whose further inputs are not those of the case.
+fn driven(all: &[Run], case: &Case) -> Result<(), DiagnoseError> {
+    let expected = case.further_inputs.len();
+    for run in all {
+        if run.input.iter().all(|u| *u == run.input[0]) {
+            return Err(DiagnoseError::Still { record: run.name.clone() });
+        }
+        let sound = run.further.iter().filter(|x| x.len() == run.len() && x.iter().all(|v| v.is_finite())).count();
+        if run.further.len() != expected || sound != expected {
+            return Err(DiagnoseError::Further { record: run.name.clone(), found: sound, expected });
+        }
+    }
+    Ok(())
+}
+
+/// The runs without what further inputs move, where the logs are sound and there are any.
+fn decoupled(
+    all: Vec<Run>,
+    case: &Case,
+    given: &Plant,
+    log_checks: &LogChecks,
+    sample_time_s: f64,
+    progress: &mut dyn FnMut(&str),
+) -> Decoupled {
+    if case.further_inputs.is_empty() {
+        return Decoupled::untouched(all, Vec::new());
+    }
+    if log_checks.finding.is_some() {
+        return Decoupled::untouched(all, vec!["the further inputs are left alone: the log is at fault".into()]);
+    }
+    progress("what further inputs move");
+    Decoupled::of(all, given, &case.further_inputs, sample_time_s)
 }
 
 /// The diagnosis data with the command as it fits better: held between samples, or measured at them; and whether it is the latter.

@@ -28,6 +28,7 @@ pub use data::stacked_records::{Segment, StackedRecords};
 pub use diagnose_error::DiagnoseError;
 pub use diagnosis::diagnose;
 pub use fit::corrected_model::Corrected;
+pub use fit::coupling::Coupling;
 pub use fit::diagnosis_data::DiagnosisData;
 pub use fit::equation_error_fit::Refitted;
 pub use fit::fit_inputs::Fit;

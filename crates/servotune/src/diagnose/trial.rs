@@ -5,6 +5,7 @@ use super::settings::DiagnoseSettings;
 use crate::controller::Law;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, corrected};
+use crate::diagnose::fit::coupling::Decoupled;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::shock::{DetectedShock, beyond};
 use crate::diagnose::fit::simulation::{SimulatedModel, errors, rms};
@@ -36,6 +37,8 @@ pub(super) struct Trial<'a> {
     pub given: &'a Plant,
     /// All runs, whole; the diagnosis data may hold excerpts of them.
     pub whole: &'a [Run],
+    /// The same as recorded, and what further inputs move.
+    pub decoupled: &'a Decoupled,
     pub closed: Option<&'a Law<'a>>,
     pub settings: &'a DiagnoseSettings,
     pub log_checks: &'a LogChecks,
@@ -128,7 +131,10 @@ impl Trial<'_> {
         // What the search found, whether or not it is offered.
         let fixed = corrected(&data.form, &last.refitted.p, &last.chosen, &data.scene);
         let refitted = corrected(&data.form, &selection.baseline.refitted.p, &[], &data.scene);
-        let reporting = Reporting { data: &data, selection: &selection, runs: self.whole, closed: self.closed, sound };
+        let couplings = &self.decoupled.couplings;
+        let recorded = if couplings.is_empty() { self.whole } else { &self.decoupled.recorded };
+        let reporting =
+            Reporting { data: &data, selection: &selection, runs: self.whole, recorded, closed: self.closed, sound };
         let reported = reporting.offered(self.given);
         let (figures, errors, open) = fit_report(&data, self.given, &reporting, &reported);
         remarks.extend(reported.remarks.iter().cloned());
@@ -152,6 +158,7 @@ impl Trial<'_> {
             confirmed: confirm(&data, &selection, &fixed, &held_out, self.settings.select.iterations)?,
             held_out,
             leftover: selection.leftover.clone(),
+            coupling: couplings.clone(),
             remarks,
             search: search(&selection),
             bootstrap: selection.bootstrap.clone(),
@@ -162,6 +169,9 @@ impl Trial<'_> {
         let noise = noise_findings(&data, torque_noise.as_ref(), &self.settings.noise, diagnosis.fit.fit);
         let by_others = ByOthers { logs: self.log_checks.finding.clone(), shocks, noise };
         judge(&mut diagnosis, &data, &selection, self.given, &reported, by_others);
+        if diagnosis.verdict == Verdict::NoMismatch && !couplings.is_empty() {
+            diagnosis.verdict = Verdict::Refit;
+        }
         propose(&mut diagnosis, &data, &selection);
         // Pictures are of the whole records.
         let data = DiagnosisData { runs: self.whole.to_vec(), ..data };

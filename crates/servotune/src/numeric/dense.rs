@@ -3,7 +3,8 @@
 //! In: matrices of nalgebra, which stays for small fixed sizes and in signatures; the algorithms are faer's, on one thread, so that the bytes
 //! do not depend on the number of threads. `None` where an entry is not finite or the iteration does not end.
 
-use faer::MatRef;
+use faer::linalg::solvers::Solve;
+use faer::{MatRef, Side};
 use nalgebra::{Complex, DMatrix, DVector};
 
 fn view(a: &DMatrix<f64>) -> Option<MatRef<'_, f64>> {
@@ -32,6 +33,15 @@ pub fn least_squares(a: &DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<D
         x.iter_mut().zip(v.col(k).iter()).for_each(|(x, v)| *x += part * v);
     }
     Some(x)
+}
+
+/// x of A x = b for a symmetric positive definite A (its lower triangle is read), by Cholesky's factor, and the smallest square of the factor's
+/// diagonal; `None` also where A is not positive definite.
+pub fn positive_solve(a: &DMatrix<f64>, b: &DVector<f64>) -> Option<(DVector<f64>, f64)> {
+    let factor = view(a)?.llt(Side::Lower).ok()?;
+    let least = factor.L().diagonal().column_vector().iter().fold(f64::INFINITY, |m: f64, d| m.min(d * d));
+    let x = factor.solve(MatRef::from_column_major_slice(b.as_slice(), b.len(), 1));
+    Some((DVector::from_iterator(b.len(), x.col(0).iter().copied()), least))
 }
 
 #[cfg(test)]

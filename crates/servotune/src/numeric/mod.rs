@@ -13,6 +13,7 @@ pub mod polynomial;
 pub mod powers;
 pub mod random;
 pub mod root;
+pub mod simplex;
 pub mod spectrum;
 pub mod spline;
 pub mod statistics;

@@ -1,6 +1,7 @@
 //! A case: a plant model, a controller, and records with their roles; `case.toml` of the contract.
 
-use super::{Record, RecordSettings, RecordingError};
+use super::{ColumnNames, Record, RecordSettings, RecordingError};
+use crate::document::size_limits::quoted as cut;
 use crate::document::{A_NAME, check_name, printable, read_toml};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -37,6 +38,8 @@ struct CaseFile {
     spindle_hz: Option<f64>,
     #[serde(default)]
     noise: NominalNoise,
+    #[serde(default)]
+    further_inputs: Vec<String>,
     records: Vec<RecordEntry>,
 }
 
@@ -76,6 +79,38 @@ impl CaseFile {
     }
 }
 
+/// What `further_inputs` must hold.
+const FURTHER_INPUTS: &str =
+    "up to 8 names of further columns of every record, each once, none of them a column of the contract";
+/// Most further inputs of a case.
+const MOST_INPUTS: usize = 8;
+/// Columns that have a meaning in every record.
+const CONTRACT: [&str; 8] =
+    ["time_s", "reference", "excitation", "command", "position", "pes", "spindle_rad", "temperature_c"];
+
+/// The first name that cannot be a further input, as a refusal says it.
+fn wrong_input(names: &[String], settings: &RecordSettings) -> Option<String> {
+    if names.len() > MOST_INPUTS {
+        return Some(format!("{} names", names.len()));
+    }
+    let ColumnNames { time, reference, excitation, command, position } = &settings.names;
+    let own = [time, reference, excitation, command, position];
+    let taken = |name: &str| CONTRACT.contains(&name) || own.iter().any(|n| *n == name);
+    for (i, name) in names.iter().enumerate() {
+        let shown = format!("`{}`", cut(&printable(name)));
+        if name.trim().is_empty() || name.trim() != name {
+            return Some(format!("{shown}, a name that is empty or begins or ends with a blank"));
+        }
+        if taken(name) {
+            return Some(format!("{shown}, which has a meaning of its own"));
+        }
+        if names[..i].contains(name) {
+            return Some(format!("{shown} twice"));
+        }
+    }
+    None
+}
+
 /// A case with its records read. Plant and controller are paths: their rooms read them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
@@ -87,6 +122,8 @@ pub struct Case {
     pub controller: Option<PathBuf>,
     /// Spindle frequency (Hz).
     pub spindle_hz: Option<f64>,
+    /// Names of further columns of every record that act on its position, in the order of [`Record::further`].
+    pub further_inputs: Vec<String>,
     /// Entries and records, in the order of the file.
     pub records: Vec<(RecordEntry, Record)>,
 }
@@ -118,6 +155,10 @@ impl Case {
         {
             return Err(refuse("spindle_hz", hz.to_string(), "a finite number above 0"));
         }
+        if let Some(found) = wrong_input(&read.further_inputs, settings) {
+            return Err(refuse("further_inputs", found, FURTHER_INPUTS));
+        }
+        let settings = &RecordSettings { further: read.further_inputs.clone(), ..settings.clone() };
         let records = read
             .records
             .into_iter()
@@ -128,12 +169,14 @@ impl Case {
             plant: folder.join(read.plant),
             controller: read.controller.map(|c| folder.join(c)),
             spindle_hz: read.spindle_hz,
+            further_inputs: read.further_inputs,
             records,
         }
         .checked(&file)
     }
 
-    /// Refuses a case that cannot be diagnosed: nothing to fit, unequal sample times, a record listed twice.
+    /// Refuses a case that cannot be diagnosed: nothing to fit, unequal sample times, a record listed twice, one whose further inputs are not
+    /// those of the case.
     pub fn checked(self, file: &Path) -> Result<Case, RecordingError> {
         let refuse = |found: String, expected: &'static str| {
             Err(RecordingError::Case { file: file.into(), key: "records", found, expected })
@@ -151,6 +194,18 @@ impl Case {
             }
             if self.records[..i].iter().any(|(e, _)| e.file == entry.file) {
                 return refuse(format!("{} twice", entry.file.display()), "each file once");
+            }
+            if record.further.len() != self.further_inputs.len() {
+                let (name, found) = (entry.file.display(), record.further.len());
+                let found =
+                    format!("{name} with {found} further inputs, `further_inputs` with {}", self.further_inputs.len());
+                return refuse(found, "one column for each name in `further_inputs`");
+            }
+            let wrong = |column: &Vec<f64>| column.len() != record.len() || column.iter().any(|v| !v.is_finite());
+            if let Some(k) = record.further.iter().position(wrong) {
+                let (name, input) = (entry.file.display(), &self.further_inputs[k]);
+                let found = format!("{name}, column `{}`", printable(input));
+                return refuse(found, "finite numbers in every further input, as many as in the position");
             }
         }
         Ok(self)

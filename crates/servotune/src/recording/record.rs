@@ -40,6 +40,8 @@ pub struct RecordSettings {
     pub sample_time_s: Option<f64>,
     /// First row (included) and last row (excluded), counted from 0 behind the header; the whole file where absent.
     pub rows: Option<[usize; 2]>,
+    /// Names of further columns that every record must have, `further_inputs` of case.toml.
+    pub further: Vec<String>,
 }
 
 /// A step of the clock that is not one sample.
@@ -74,6 +76,9 @@ pub struct Record {
     pub spindle_rad: Option<Vec<f64>>,
     /// Temperature (°C).
     pub temperature_c: Option<Vec<f64>>,
+    /// Further inputs that act on the position, in the order of the case's `further_inputs`, each as long as the position; in the unit of
+    /// their column.
+    pub further: Vec<Vec<f64>>,
 }
 
 /// Columns of a record, each as long as the position or empty where it is absent.
@@ -88,10 +93,13 @@ pub struct RecordColumns {
     pub pes: Vec<f64>,
     pub spindle_rad: Vec<f64>,
     pub temperature_c: Vec<f64>,
+    pub further: Vec<Vec<f64>>,
 }
 
 /// Shortest record that can be judged.
 const LEAST_ROWS: usize = 64;
+/// Columns that a record may have by the contract.
+const FIXED: usize = 8;
 
 impl Record {
     /// Samples in the record.
@@ -112,8 +120,8 @@ impl Record {
             Some(_) => rows.place(&names.time)?,
             None => Some(rows.need(&names.time)?),
         };
-        // Order of the columns below; the last three may be absent, and PES may be blank.
-        let wanted: [(&str, Option<usize>); 8] = [
+        // Order of the columns below; the three behind the excitation may be absent, and PES may be blank.
+        let mut wanted: Vec<(&str, Option<usize>)> = vec![
             (&names.time, clock),
             (&names.command, Some(rows.need(&names.command)?)),
             (&names.position, Some(rows.need(&names.position)?)),
@@ -123,7 +131,10 @@ impl Record {
             ("spindle_rad", rows.place("spindle_rad")?),
             ("temperature_c", rows.place("temperature_c")?),
         ];
-        let mut values: [Vec<f64>; 8] = std::array::from_fn(|_| Vec::new());
+        for name in &settings.further {
+            wanted.push((name, Some(rows.need(name)?)));
+        }
+        let mut values: Vec<Vec<f64>> = vec![Vec::new(); wanted.len()];
         let [first, last] = settings.rows.unwrap_or([0, usize::MAX]);
         let mut index = 0;
         while let Some(row) = rows.next()? {
@@ -149,8 +160,11 @@ impl Record {
             }
             rows.fits(values[2].len())?;
         }
-        let [time, command, position, reference, excitation, pes, spindle_rad, temperature_c] = values;
-        let columns = RecordColumns { time, command, position, reference, excitation, pes, spindle_rad, temperature_c };
+        let further = values.split_off(FIXED);
+        let [time, command, position, reference, excitation, pes, spindle_rad, temperature_c] =
+            std::array::from_fn(|k| std::mem::take(&mut values[k]));
+        let columns =
+            RecordColumns { time, command, position, reference, excitation, pes, spindle_rad, temperature_c, further };
         Record::of(file, columns, settings.sample_time_s, first)
     }
 
@@ -161,7 +175,8 @@ impl Record {
         sample_time_s: Option<f64>,
         first: usize,
     ) -> Result<Record, RecordingError> {
-        let RecordColumns { time, command, position, reference, excitation, pes, spindle_rad, temperature_c } = columns;
+        let RecordColumns { time, command, position, reference, excitation, pes, spindle_rad, temperature_c, further } =
+            columns;
         if position.len() < LEAST_ROWS {
             return Err(RecordingError::Short { file: file.into(), rows: position.len(), needed: LEAST_ROWS });
         }
@@ -179,6 +194,7 @@ impl Record {
             pes: (!pes.is_empty()).then_some(pes),
             spindle_rad: (!spindle_rad.is_empty()).then_some(spindle_rad),
             temperature_c: (!temperature_c.is_empty()).then_some(temperature_c),
+            further,
             command,
             position,
         })

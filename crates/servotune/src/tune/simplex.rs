@@ -4,9 +4,7 @@
 
 use super::score::UNSTABLE;
 use super::{TuningProblem, TuningWork};
-use argmin::core::{CostFunction, Error, Executor};
-use argmin::solver::neldermead::NelderMead;
-use std::cell::RefCell;
+use crate::numeric::simplex::simplex as nelder_mead;
 
 /// Edge of the first simplex (ln of a parameter).
 pub(super) const EDGE: f64 = 0.25;
@@ -29,32 +27,6 @@ pub(super) fn best_of(problem: &TuningProblem, starts: Vec<Vec<f64>>, work: &mut
     best.map(|(_, x)| x)
 }
 
-/// The merit as argmin wants it. It offers no bounds: a point outside is scored on the box and pays for its distance.
-pub(super) struct Merit<'a> {
-    problem: &'a TuningProblem,
-    work: RefCell<&'a mut TuningWork>,
-}
-
-impl CostFunction for Merit<'_> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
-        let mut outside = 0.0;
-        let on_box: Vec<f64> = x
-            .iter()
-            .zip(self.problem.parameters().bounds())
-            .map(|(x, [from, to])| {
-                let inside = x.clamp(*from, *to);
-                outside += (x - inside).abs();
-                inside
-            })
-            .collect();
-        let score = self.problem.score(&on_box, &mut self.work.borrow_mut());
-        Ok(score.merit(PRICE).min(1e9) + outside)
-    }
-}
-
 /// A simplex around `x`; the best vertex, moved into the bounds.
 pub(super) fn simplex(problem: &TuningProblem, x: Vec<f64>, steps: u64, work: &mut TuningWork) -> Vec<f64> {
     let x = walk_back(problem, x, work);
@@ -70,11 +42,21 @@ pub(super) fn simplex(problem: &TuningProblem, x: Vec<f64>, steps: u64, work: &m
         vertex[j] += sign * EDGE.min(0.5 * (to - from));
         vertices.push(vertex);
     }
-    let merit = Merit { problem, work: RefCell::new(work) };
-    let Ok(solver) = NelderMead::new(vertices).with_sd_tolerance(SPREAD) else { return x };
-    let run = Executor::new(merit, solver).configure(|s| s.max_iters(steps)).timer(false).run();
-    let found = run.ok().and_then(|r| r.state.best_param);
-    let mut found = found.unwrap_or(x);
+    // A simplex knows no bounds: a point outside is scored on the box and pays for its distance.
+    let merit = |x: &[f64]| {
+        let mut outside = 0.0;
+        let on_box: Vec<f64> = x
+            .iter()
+            .zip(bounds)
+            .map(|(x, [from, to])| {
+                let inside = x.clamp(*from, *to);
+                outside += (x - inside).abs();
+                inside
+            })
+            .collect();
+        problem.score(&on_box, work).merit(PRICE).min(1e9) + outside
+    };
+    let mut found = nelder_mead(vertices, SPREAD, steps, merit).unwrap_or(x);
     for (x, [from, to]) in found.iter_mut().zip(bounds) {
         *x = x.clamp(*from, *to);
     }

@@ -41,6 +41,10 @@ pub struct Run {
     pub spindle_rad: Option<Vec<f64>>,
     /// Temperature above the record's first (°C), where recorded.
     pub temperature: Option<Vec<f64>>,
+    /// Further inputs that act on the position, in the order of the case, each as long as the position (unit of their column).
+    pub further: Vec<Vec<f64>>,
+    /// What further inputs move the position by, where that was taken out of it (position_unit); empty where nothing was.
+    pub coupled: Vec<f64>,
 }
 
 impl Run {
@@ -74,6 +78,8 @@ impl Run {
             pes: may(&self.pes),
             spindle_rad: may(&self.spindle_rad),
             temperature: may(&self.temperature),
+            further: self.further.iter().map(|x| cut(x)).collect(),
+            coupled: if self.coupled.is_empty() { Vec::new() } else { cut(&self.coupled) },
             name: self.name.clone(),
             role: self.role,
             group: self.group,
@@ -122,6 +128,11 @@ fn still(series: &[f64]) -> usize {
     series.iter().take(AT_REST).take_while(|v| **v == series[0]).count()
 }
 
+/// Samples from the start for which reference and excitation stand still; at least one.
+pub fn quiet(reference: &[f64], excitation: &[f64]) -> usize {
+    still(reference).min(still(excitation)).max(1).min(excitation.len())
+}
+
 /// Position and command before a record began.
 ///
 /// Their means as long as reference and excitation stand still: what the controller held against springs and cables. An excitation that sets in
@@ -129,7 +140,7 @@ fn still(series: &[f64]) -> usize {
 /// never moves.
 fn stood(record: &Record) -> [f64; 2] {
     let reference = record.reference.as_deref().unwrap_or_default();
-    let quiet = still(reference).min(still(&record.excitation)).max(1).min(record.len());
+    let quiet = quiet(reference, &record.excitation);
     let origin = mean(&record.position[..quiet]);
     let held = still(reference) >= AT_REST && quiet < AT_REST && reference.iter().all(|r| *r == reference[0]);
     let before = if held { mean(&record.command) + mean(&record.excitation) } else { mean(&record.command[..quiet]) };
@@ -171,6 +182,8 @@ pub fn runs(case: &Case) -> Vec<Run> {
                 pes: record.pes.clone(),
                 spindle_rad: record.spindle_rad.clone(),
                 temperature: record.temperature_c.as_ref().map(|t| t.iter().map(|x| x - t[0]).collect()),
+                further: record.further.clone(),
+                coupled: Vec::new(),
             }
         })
         .collect()
@@ -186,6 +199,9 @@ pub fn mean_run(runs: &[Run], repeats: &[usize]) -> Run {
     };
     let (command, excitation, input, position) =
         (average(|r| &r.command), average(|r| &r.excitation), average(|r| &r.input), average(|r| &r.position));
+    if !mean.coupled.is_empty() {
+        mean.coupled = average(|r| &r.coupled);
+    }
     (mean.command, mean.excitation, mean.input, mean.position) = (command, excitation, input, position);
     mean.began_s = scale * repeats.iter().map(|&r| runs[r].began_s).sum::<f64>();
     mean.before = scale * repeats.iter().map(|&r| runs[r].before).sum::<f64>();

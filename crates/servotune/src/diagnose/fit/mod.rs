@@ -1,14 +1,17 @@
 //! Third floor of the diagnosis: motion, regressors, and models fitted by equation error and by output error.
 
 pub(super) mod corrected_model;
+pub(super) mod coupling;
 pub(super) mod diagnosis_data;
 mod differing_repeats;
 pub(super) mod equation_error_fit;
 pub(super) mod fit_inputs;
 pub(super) mod fitted_model;
+mod lagged_regression;
 pub(super) mod model;
 pub(super) mod output_error_fit;
 pub(super) mod output_error_problem;
+pub(super) mod play_ground;
 mod quantisation;
 pub(super) mod regressors;
 pub(super) mod selected_effect;

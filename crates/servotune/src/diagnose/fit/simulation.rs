@@ -308,16 +308,18 @@ fn simulate(
     let mut machine = machine.carried_by(free);
     let t = model.scene.sample_time_s;
     let spindle = model.scene.spindle_hz.unwrap_or(0.0) * TAU;
+    // The controller hears what further inputs move, too.
+    let beside = |k: usize| run.coupled.get(k).copied().unwrap_or(0.0);
     let mut out = Vec::with_capacity(run.len());
     let mut loops = closed.zip(run.reference.as_deref()).map(|(law, reference)| {
-        let recorded: Vec<f64> = reference.iter().zip(&run.position).map(|(r, y)| r - y).collect();
+        let recorded: Vec<f64> = (0..run.len()).map(|k| reference[k] - run.position[k] - beside(k)).collect();
         (law, reference, law.memory(reference, &recorded, &run.command))
     });
     for k in 0..run.len() {
         let angle = run.spindle_rad.as_ref().map_or(spindle * k as f64 * t, |s| s[k]);
         let y = machine.measure(angle, run.temperature.as_ref().map_or(0.0, |c| c[k]));
         out.push(run.position[k] - y);
-        let heard = y + noise.as_mut().map_or(0.0, |n| model.scene.noise * n.normal());
+        let heard = y + beside(k) + noise.as_mut().map_or(0.0, |n| model.scene.noise * n.normal());
         let u = match &mut loops {
             Some((law, reference, memory)) => {
                 let sum = step_chain(&law.chain, memory, reference[k] - heard) + law.ahead(reference, k);

@@ -173,6 +173,8 @@ mod tests {
             pes: None,
             spindle_rad: None,
             temperature: None,
+            further: vec![],
+            coupled: vec![],
         }
     }
 

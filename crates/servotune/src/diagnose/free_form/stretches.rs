@@ -44,6 +44,8 @@ fn piece(run: &Run, from: usize, to: usize, sample_time_s: f64) -> Run {
         pes: None,
         spindle_rad: run.spindle_rad.as_ref().map(cut),
         temperature: run.temperature.as_ref().map(cut),
+        further: run.further.iter().map(cut).collect(),
+        coupled: if run.coupled.is_empty() { Vec::new() } else { cut(&run.coupled) },
         ..run.clone()
     }
 }

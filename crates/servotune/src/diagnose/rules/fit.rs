@@ -10,6 +10,15 @@ rules! {
     MEASURED_COMMAND: f64 = 0.9, "share",
         "error of a held command that a moving one must stay below to count as measured",
         "judgement: another way to hold it moves the error by less";
+    COUPLING_SHORTER: f64 = 0.999, "ratio",
+        "squares left out at the best length of the impulse responses of further inputs over those at a shorter one, from which the shorter one is taken",
+        "judgement: what a short response cuts off is taken for something else; a few numbers too many cost little";
+    COUPLING_CHANCE: f64 = 1e-6, "chance",
+        "chance (Chernoff's bound of chi-square) of as large a fall of the squares by the response of one further input, below which it may move the position",
+        "nominal: what is left is whitened first, and the squares left out decide with it";
+    COUPLING_LEFT_OUT: f64 = 0.998, "ratio",
+        "squares left out with a further input over those without it, below which, and if they fall on both halves, it moves the position",
+        "an input that moves nothing raises them by one over the samples a tap";
     FREE_BODY: f64 = 0.02, "share",
         "stiffness over the given one below which a body counts as free",
         "judgement";

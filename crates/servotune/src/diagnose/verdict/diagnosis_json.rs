@@ -4,6 +4,7 @@ use super::confirmation::Confirmation;
 use super::finding::{Finding, FitReport, NextExperiment, Tried, Verdict};
 use super::held_out::HeldOut;
 use crate::diagnose::data::checks::{Replay, SampleFault};
+use crate::diagnose::fit::coupling::Coupling;
 use crate::diagnose::free_form::curve::FreeForm;
 use crate::diagnose::noise::whitening::NoiseLevels;
 use crate::diagnose::search::bootstrap_chance::Bootstrap;
@@ -47,6 +48,9 @@ pub struct Diagnosis {
     /// What the library still sees in the error of the final model, beyond chance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leftover: Option<ResidualEffect>,
+    /// Further inputs that move the position; what they move is taken out of the records.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub coupling: Vec<Coupling>,
     /// Natural frequency, damping and gain before and after, and other remarks in plain words.
     pub remarks: Vec<String>,
     /// The search.
@@ -61,9 +65,11 @@ impl Diagnosis {
     /// plant does on the records that were not used, or on those of the fit where there are no others.
     pub fn corrects(&self) -> bool {
         let figures = self.fit.holdout.unwrap_or(self.fit.fit);
+        // What further inputs move is no merit of the plant.
+        let given = if self.coupling.is_empty() { figures.rms_before } else { figures.rms_refit_linear };
         match self.verdict {
             Verdict::NoMismatch | Verdict::DataFault => false,
-            Verdict::LocatedUnexplained => figures.rms_after <= figures.rms_before,
+            Verdict::LocatedUnexplained => figures.rms_after <= given,
             _ => true,
         }
     }

@@ -22,8 +22,11 @@ pub(in crate::diagnose) fn fit_report(
     let every: Vec<&Run> = reporting.runs.iter().collect();
     let closed = reporting.closed;
     let given = Offer::of(given);
+    // What further inputs move is an error of the given model, and a linear part of the other two.
+    let recorded: Vec<&Run> = reporting.recorded.iter().collect();
     let three = |closed: Option<&Law>| {
-        [&given, &reported.refitted, &reported.fixed].map(|offer| reporting.errors(offer, &every, closed))
+        let [refit, fixed] = [&reported.refitted, &reported.fixed].map(|offer| reporting.errors(offer, &every, closed));
+        [reporting.errors(&given, &recorded, closed), refit, fixed]
     };
     let open = three(None);
     let chosen = if closed.is_some() { three(closed) } else { open.clone() };

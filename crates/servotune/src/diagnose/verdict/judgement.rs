@@ -217,8 +217,8 @@ pub(in crate::diagnose) fn judge(
     }
     linear_verdict(d, data, selection, given);
     if d.verdict == Verdict::Refit && !reported.refits {
-        // The given plant stands; whether it agrees, its own error says.
-        let far = d.fit.fit.rms_before > GIVEN_FAR * d.fit.fit.noise_floor;
+        // The given plant stands as the refit; whether it agrees, its own error says, what further inputs move apart.
+        let far = d.fit.fit.rms_refit_linear > GIVEN_FAR * d.fit.fit.noise_floor;
         d.verdict = if far { Verdict::LocatedUnexplained } else { Verdict::NoMismatch };
         d.findings.extend(far.then(|| unexplained(data, selection, 0.0)));
     }

@@ -54,6 +54,8 @@ pub(in crate::diagnose) struct Reporting<'a> {
     pub selection: &'a Selection,
     /// All runs, whole.
     pub runs: &'a [Run],
+    /// The same as recorded, what further inputs move included.
+    pub recorded: &'a [Run],
     pub closed: Option<&'a Law<'a>>,
     /// Whether the logs are: nothing is fitted once more to those that are not.
     pub sound: bool,
