@@ -253,10 +253,11 @@ pub(in crate::diagnose) fn grounds(data: &DiagnosisData) -> [Stretches; 2] {
     [plain, one_place]
 }
 
-/// Estimates the curve at every port and takes the best; `curves` are those of the balance of torques.
+/// Estimates the curve at every port and takes the best; `curves` are those of the balance of torques. Without a ground for it the sensor's
+/// curve is not asked for.
 pub(in crate::diagnose) fn estimated<'a>(
     data: &'a DiagnosisData,
-    [ground, one_place]: [&'a Stretches; 2],
+    (ground, one_place): (&'a Stretches, Option<&'a Stretches>),
     starts: &[Vec<f64>],
     curves: &[Curved],
     progress: &mut dyn FnMut(&str),
@@ -286,9 +287,12 @@ pub(in crate::diagnose) fn estimated<'a>(
         let balanced = balanced.and_then(|c| from_balance(data, ground, c, &from));
         taken(port, better(idle, balanced));
     }
-    progress("a curve without a name: sensor over position");
-    let read = readings(data, one_place, starts);
-    taken(CurvePort::SensorOverPosition, sensor(data, one_place, &from, &read));
+    let mut read = Vec::new();
+    if let Some(one_place) = one_place {
+        progress("a curve without a name: sensor over position");
+        read = readings(data, one_place, starts);
+        taken(CurvePort::SensorOverPosition, sensor(data, one_place, &from, &read));
+    }
     let mut curve = best?;
     let Shape::Curve(port, ..) = curve.trial.shape else { return None };
     curve = finer(data, ground, curve);
@@ -300,7 +304,7 @@ pub(in crate::diagnose) fn estimated<'a>(
         .min_by(|a, b| a.left_out.total_cmp(&b.left_out))
         .filter(|_| port == CurvePort::SensorOverPosition);
     let mut reading = reading.filter(|r| r.left_out < SECOND_CURVE * curve.left_out);
-    if let Some(r) = &reading {
+    if let (Some(r), Some(one_place)) = (&reading, one_place) {
         progress("a curve without a name beside the reading that was found");
         let (other, by_port) = beside(r, one_place)?;
         // A name, alone or with a curve at another port, before a sensor bent freely, where it foretells as well.

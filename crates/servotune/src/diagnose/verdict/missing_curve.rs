@@ -61,11 +61,14 @@ pub(in crate::diagnose) fn stand_in(
 ) -> Option<StandIn> {
     let [ground, one_place] = grounds(data);
     let (starts, balanced) = (starts(data, selection), balanced(data));
-    let on = |ground: &Stretches, progress: &mut dyn FnMut(&str)| {
-        let found = estimated(data, [ground, &one_place], &starts, &balanced, progress)?;
+    let on = |ground: &Stretches, sensor: Option<&Stretches>, progress: &mut dyn FnMut(&str)| {
+        let found = estimated(data, (ground, sensor), &starts, &balanced, progress)?;
         stands(data, &found, &one_place, standing)
     };
-    on(&ground, progress).or_else(|| on(&ground.in_short_pieces(data.scene.sample_time_s)?, progress))
+    on(&ground, Some(&one_place), progress).or_else(|| {
+        progress("a curve without a name, on short pieces of the records");
+        on(&ground.in_short_pieces(data.scene.sample_time_s)?, None, progress)
+    })
 }
 
 /// What was estimated, where it is worth it.
@@ -315,7 +318,7 @@ pub struct MissingCurve {
 /// The curve at the port where it foretells best, whatever the verdict; none where it foretells no better than a linear plant.
 pub fn missing_curve(data: &DiagnosisData, selection: &Selection) -> Option<MissingCurve> {
     let [ground, one_place] = grounds(data);
-    let found = estimated(data, [&ground, &one_place], &starts(data, selection), &balanced(data), &mut |_| {})?;
+    let found = estimated(data, (&ground, Some(&one_place)), &starts(data, selection), &balanced(data), &mut |_| {})?;
     let best = taken(&found).filter(|b| matches!(b.trial.shape, Shape::Curve(..)))?;
     let errors = shown(data, &model(data, best, &found.plain), best, &one_place, None);
     let share = 1.0 - best.left_out / found.linear.left_out;
