@@ -244,14 +244,20 @@ fn simple_story(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection) 
             return true;
         }
     }
+    clock_alone(d, data, selection, fixed[0], allowed(1))
+}
+
+/// Whether a clock that runs wrong explains by one number what all linear numbers do; says it.
+fn clock_alone(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection, fixed: f64, allowed: f64) -> bool {
     // Where a coloured rest hides what tells gain, damping and frequency apart, one number does as well as all of them by chance.
-    if d.findings.is_empty() && selection.model.chosen.is_empty() && !coloured(d, data, data.levels.sensor_rms) {
-        let clock = Clock::of(data, fixed[0]);
-        if clock.sure() && clock.cost - selection.model.cost < allowed(1) {
-            d.verdict = Verdict::DataFault;
-            d.findings.push(clock.finding(data));
-            return true;
-        }
+    if !d.findings.is_empty() || !selection.model.chosen.is_empty() || coloured(d, data, data.levels.sensor_rms) {
+        return false;
     }
-    false
+    let clock = Clock::of(data, fixed);
+    let alone = clock.sure() && clock.cost - selection.model.cost < allowed;
+    if alone {
+        d.verdict = Verdict::DataFault;
+        d.findings.push(clock.finding(data));
+    }
+    alone
 }
