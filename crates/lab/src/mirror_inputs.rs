@@ -17,6 +17,8 @@ use std::time::Instant;
 const RATE_HZ: f64 = 6400.0;
 /// Samples of a period; an experiment has two.
 const PERIOD: usize = 8192;
+/// Samples of the first period that a record takes along: the mirror was in full motion before, and what it answered to then dies in them.
+const RUN_IN: usize = 512;
 /// Experiments; those of the first realisation are fitted, those of the second held out.
 const EXPERIMENTS: usize = 6;
 /// Band in which the given model is fitted (Hz), and its resonance pairs.
@@ -50,8 +52,9 @@ pub fn mirror_inputs(data: &Path, mut say: impl FnMut(&str)) -> Result<Study, St
         let column = |name: String, by: f64| c.get(&name).iter().map(|v| by * v).collect::<Vec<f64>>();
         // Millivolts to volts, nanometres to micrometres.
         let inputs: Vec<Vec<f64>> = (1..=3).map(|j| column(format!("u{j}_mV"), 1e-3)).collect();
-        let case = case(number, &inputs, &column(format!("y{number}_nm"), sign * 1e-3), c.get("exp"));
-        let noise = between_periods(&case);
+        let position = column(format!("y{number}_nm"), sign * 1e-3);
+        let case = case(number, &inputs, &position, c.get("exp"));
+        let noise = between_periods(&position, c.get("exp"));
         let began = Instant::now();
         let made =
             diagnose(&case, &plant, None, &DiagnoseSettings::default(), |m| say(&format!("axis {number}: {m}")))?;
@@ -96,7 +99,7 @@ fn given(responses: &Path, number: usize) -> Result<(Plant, f64), StudyError> {
 fn case(number: usize, inputs: &[Vec<f64>], position: &[f64], experiment: &[f64]) -> Case {
     let others: Vec<usize> = (0..3).filter(|j| j + 1 != number).collect();
     let records = (0..EXPERIMENTS).map(|e| {
-        let rows: Vec<usize> = (0..experiment.len()).filter(|&k| experiment[k] == e as f64).collect();
+        let rows = &rows_of(experiment, e)[PERIOD - RUN_IN..];
         let of = |x: &[f64]| rows.iter().map(|&k| x[k]).collect::<Vec<f64>>();
         let file = PathBuf::from(format!("experiment_{e}.csv"));
         let role = if e < EXPERIMENTS / 2 { Role::Fit } else { Role::Holdout };
@@ -125,18 +128,26 @@ fn case(number: usize, inputs: &[Vec<f64>], position: &[f64], experiment: &[f64]
     }
 }
 
-/// Noise of one period of the held-out records, from what their two periods differ by.
-fn between_periods(case: &Case) -> f64 {
-    let held = case.records.iter().filter(|(e, _)| e.role == Role::Holdout);
-    let differences = held.flat_map(|(_, r)| r.position.iter().zip(r.position.iter().skip(PERIOD)).map(|(a, b)| a - b));
+/// Rows of an experiment.
+fn rows_of(experiment: &[f64], number: usize) -> Vec<usize> {
+    (0..experiment.len()).filter(|&k| experiment[k] == number as f64).collect()
+}
+
+/// Noise of one period of the held-out experiments, from what their two periods differ by.
+fn between_periods(position: &[f64], experiment: &[f64]) -> f64 {
+    let held = (EXPERIMENTS / 2..EXPERIMENTS).map(|e| rows_of(experiment, e));
+    let differences = held.flat_map(|rows| {
+        let pairs = rows.iter().zip(rows.iter().skip(PERIOD));
+        pairs.map(|(&a, &b)| position[a] - position[b]).collect::<Vec<f64>>()
+    });
     let (sum, count) = differences.fold((0.0, 0.0), |(s, n), d| (s + 0.5 * d * d, n + 1.0));
     (sum / f64::max(count, 1.0)).sqrt()
 }
 
-/// Error of a model on the second periods of the held-out records (um).
-fn second_periods(made: &Diagnosed, model: usize) -> f64 {
+/// Error of a model on the whole periods of the held-out records (um).
+fn whole_periods(made: &Diagnosed, model: usize) -> f64 {
     let held = made.data.runs.iter().zip(&made.errors[model]).filter(|(r, _)| r.role == Role::Holdout);
-    let (sum, count) = held.flat_map(|(_, e)| e.iter().skip(PERIOD)).fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+    let (sum, count) = held.flat_map(|(_, e)| e.iter().skip(RUN_IN)).fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
     (sum / f64::max(count, 1.0)).sqrt()
 }
 
@@ -145,8 +156,8 @@ fn page(axes: &[Axis]) -> String {
         "# Fast steering mirror: three inputs at once\n\nMade by `lab mirror-inputs --data DATA --out results`, DATA being the folder with `fsm_100mV/`. Source: M. Floren, L. Peri, \
          J. De Maeyer, W. De Munter, D. Vandepitte, J.-P. Noel, CubeSpec fine steering mirror, ISMA-USD 2024, data CC BY 4.0 (K. U. Leuven).\n\n\
          Each output axis is a case of its own: its own actuator is the command, the other two are `further_inputs`. The given model is the axis's own measured response, identified with {PAIRS} resonance \
-         pairs from {} to {} Hz. Experiments 0 to 2 (first realisation) are fitted, 3 to 5 (second realisation) held out. The mirror was in steady state before each record began, which a simulation from \
-         rest does not know: errors are of the second period of each held-out experiment, in open loop from the recorded commands. The noise is what the two periods of one experiment differ by.\n\n\
+         pairs from {} to {} Hz. Experiments 0 to 2 (first realisation) are fitted, 3 to 5 (second realisation) held out. Each record is the second period of its experiment and {RUN_IN} samples before it. The mirror was in steady state then, which a simulation from \
+         rest does not know: errors are of the whole period of each held-out experiment, in open loop from the recorded commands. The noise is what the two periods of one experiment differ by.\n\n\
          | axis | given (um) | with coupling and refit (um) | with findings (um) | noise (um) | coupling on the fit records | taps | verdict | seconds |\n|---|---|---|---|---|---|---|---|---|\n",
         BAND_HZ.0, BAND_HZ.1
     );
@@ -154,7 +165,7 @@ fn page(axes: &[Axis]) -> String {
     for a in axes {
         let d = &a.made.diagnosis;
         let each: Vec<String> = d.coupling.iter().map(|c| format!("{} {:.4} um", c.input, c.rms)).collect();
-        let [given, refit, after] = [0, 1, 2].map(|m| second_periods(&a.made, m));
+        let [given, refit, after] = [0, 1, 2].map(|m| whole_periods(&a.made, m));
         let _ = writeln!(
             text,
             "| {} | {given:.4} | {refit:.4} | {after:.4} | {:.4} | {} | {} | {} | {:.0} |",
