@@ -4,6 +4,7 @@ use super::diagnose_arguments::DiagnoseArguments;
 use super::{Ending, Failure, Screen, diagnose_rules, load};
 use servotune::diagnose::{Coupling, DiagnoseSettings, Diagnosis, Rule, decision_rules, diagnose};
 use servotune::document::{FileSet, check_target};
+use servotune::gate::features::csv_field;
 use servotune::recording::{Case, NominalNoise, Record, RecordEntry, Role};
 use servotune_answer::{case_provenance, conclude, sure};
 use servotune_report::diagnosis::{diagnosis_page, diagnosis_sentence};
@@ -25,12 +26,7 @@ fn three(value: f64) -> String {
 
 /// The impulse responses as comma-separated columns over time, each headed by its input and its unit.
 fn coupling_table(couplings: &[Coupling], sample_time_s: f64, unit: &str) -> String {
-    let heading = |c: &Coupling| {
-        let name = format!("{}_{unit}_per_unit", c.input);
-        // What a spreadsheet would take for a formula is shown as the text that it is.
-        let shown = if name.starts_with(['=', '+', '-', '@']) { format!("'{name}") } else { name };
-        if shown.contains([',', '"']) { format!("\"{}\"", shown.replace('"', "\"\"")) } else { shown }
-    };
+    let heading = |c: &Coupling| csv_field(&format!("{}_{unit}_per_unit", c.input));
     let mut text = format!("time_s,{}\n", couplings.iter().map(heading).collect::<Vec<_>>().join(","));
     for k in 0..couplings.iter().map(|c| c.response.len()).max().unwrap_or(0) {
         let _ = write!(text, "{}", k as f64 * sample_time_s);

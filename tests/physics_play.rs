@@ -115,7 +115,7 @@ fn an_observer_follows_masses_that_rattle_and_tells_gap_and_contact() {
         let rates = (0..30).map(|k| 200.0 * 1.14f64.powi(k));
         let resonance = rates.flat_map(|hz| [-1.0, 0.15, 0.4].map(|d| best(0.0, hz, d))).fold(f64::INFINITY, f64::min);
         assert!(resonance > truth + 100.0, "behind {behind}: a resonance {resonance}, the truth {truth}");
-        // White within a few per cent: what an observer of the right machine leaves is as large as it says.
+        // Known to the reading's own noise the play would leave 2 ln(noise) + 1 a sample; what it does not know of the masses may widen that to e^0.6.
         assert!(truth < 4000.0 * (2.0 * noise.ln() + 1.6), "behind {behind}: {truth}");
     }
 }

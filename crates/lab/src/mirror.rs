@@ -14,9 +14,9 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 /// Sample rate of the recording (Hz); the actuator's command is held over it.
-const RATE_HZ: f64 = 6400.0;
+pub(super) const RATE_HZ: f64 = 6400.0;
 /// Band fitted (Hz): below, the two periods recorded scatter too much; above, the excitation ends.
-const BAND_HZ: (f64, f64) = (5.0, 2990.0);
+pub(super) const BAND_HZ: (f64, f64) = (5.0, 2990.0);
 /// Resonance pairs tried at most; the source fits 28 states to all nine responses together.
 const PAIRS: usize = 20;
 
@@ -58,14 +58,7 @@ pub fn mirror(data: &Path) -> Result<Study, StudyError> {
 
 fn axis(file: &Path, i: usize, j: usize) -> Result<Axis, StudyError> {
     let name = format!("G{i}{j}");
-    let columns = ColumnChoice {
-        frequency: "f_Hz".into(),
-        real: Some(format!("{name}_re_um_per_V")),
-        imaginary: Some(format!("{name}_im_um_per_V")),
-        std: Some(format!("{name}_total_std")),
-        ..ColumnChoice::default()
-    };
-    let sweep = read_file(file, &ReadSettings { columns: Some(columns), ..ReadSettings::default() })?;
+    let measured = measured(file, &name)?;
     let settings = IdentifySettings {
         position_unit: "um".into(),
         low_hz: BAND_HZ.0,
@@ -74,11 +67,23 @@ fn axis(file: &Path, i: usize, j: usize) -> Result<Axis, StudyError> {
         zeros: ZeroSide::Either,
         ..IdentifySettings::default()
     };
-    let held = sweep.frf.clone().with_hold(Hold::Included { sample_time_s: 1.0 / RATE_HZ });
+    let held = measured.clone().with_hold(Hold::Included { sample_time_s: 1.0 / RATE_HZ });
     let identified = identify(&held, &settings)?;
     // The first points scatter most and are outside the band; the rest of the sweep is the measurement.
-    let frf = from(&sweep.frf, BAND_HZ.0)?;
+    let frf = from(&measured, BAND_HZ.0)?;
     Ok(Axis { name, diagonal: i == j, flat_at_rest: true, frf, identified })
+}
+
+/// The measured response of an output to an input, `G11` to `G33` (um/V).
+pub(super) fn measured(file: &Path, name: &str) -> Result<Frf, StudyError> {
+    let columns = ColumnChoice {
+        frequency: "f_Hz".into(),
+        real: Some(format!("{name}_re_um_per_V")),
+        imaginary: Some(format!("{name}_im_um_per_V")),
+        std: Some(format!("{name}_total_std")),
+        ..ColumnChoice::default()
+    };
+    Ok(read_file(file, &ReadSettings { columns: Some(columns), ..ReadSettings::default() })?.frf)
 }
 
 /// The response from `low_hz` on.

@@ -3,9 +3,10 @@
 //!
 //! Data: CubeSpec fine steering mirror, M. Floren et al., ISMA-USD 2024, CC BY 4.0 (see the page).
 
+use super::mirror::{BAND_HZ, RATE_HZ, measured};
 use super::{Study, StudyError};
 use servotune::diagnose::{DiagnoseSettings, Diagnosed, diagnose};
-use servotune::frf::{ColumnChoice, Hold, ReadSettings, read_file};
+use servotune::frf::Hold;
 use servotune::identify::{BodyChoice, IdentifySettings, OrderChoice, identify};
 use servotune::lti::{Body, Plant};
 use servotune::recording::{Case, Record, RecordEntry, Role, read_columns};
@@ -13,16 +14,13 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Sample rate of the recording (Hz).
-const RATE_HZ: f64 = 6400.0;
 /// Samples of a period; an experiment has two.
 const PERIOD: usize = 8192;
 /// Samples of the first period that a record takes along: the mirror was in full motion before, and what it answered to then dies in them.
 const RUN_IN: usize = 512;
 /// Experiments; those of the first realisation are fitted, those of the second held out.
 const EXPERIMENTS: usize = 6;
-/// Band in which the given model is fitted (Hz), and its resonance pairs.
-const BAND_HZ: (f64, f64) = (5.0, 2990.0);
+/// Resonance pairs of the given model.
 const PAIRS: usize = 2;
 
 /// Columns of the record file.
@@ -67,15 +65,6 @@ pub fn mirror_inputs(data: &Path, mut say: impl FnMut(&str)) -> Result<Study, St
 
 /// The model of an axis from its own measured response, its gain at rest above 0, and the sign that the position takes for that.
 fn given(responses: &Path, number: usize) -> Result<(Plant, f64), StudyError> {
-    let name = format!("G{number}{number}");
-    let columns = ColumnChoice {
-        frequency: "f_Hz".into(),
-        real: Some(format!("{name}_re_um_per_V")),
-        imaginary: Some(format!("{name}_im_um_per_V")),
-        std: Some(format!("{name}_total_std")),
-        ..ColumnChoice::default()
-    };
-    let sweep = read_file(responses, &ReadSettings { columns: Some(columns), ..ReadSettings::default() })?;
     let settings = IdentifySettings {
         position_unit: "um".into(),
         command_unit: "V".into(),
@@ -85,7 +74,8 @@ fn given(responses: &Path, number: usize) -> Result<(Plant, f64), StudyError> {
         order: OrderChoice::Fixed(PAIRS),
         ..IdentifySettings::default()
     };
-    let held = sweep.frf.with_hold(Hold::Included { sample_time_s: 1.0 / RATE_HZ });
+    let held =
+        measured(responses, &format!("G{number}{number}"))?.with_hold(Hold::Included { sample_time_s: 1.0 / RATE_HZ });
     let mut plant = identify(&held, &settings)?.plant;
     let mut sign = 1.0;
     if let Body::SecondOrder { dc_gain, .. } = &mut plant.body {

@@ -21,7 +21,7 @@ use crate::diagnose::verdict::fit_report::{Errors, figures_of, fit_report};
 use crate::diagnose::verdict::held_out::{held_out, mean};
 use crate::diagnose::verdict::judgement::{ByOthers, judge};
 use crate::diagnose::verdict::log_checks::LogChecks;
-use crate::diagnose::verdict::missing_curve::{Standing, enter, judged_runs, stand_in};
+use crate::diagnose::verdict::missing_curve::{Standing, enter, stand_in};
 use crate::diagnose::verdict::next_experiment::propose;
 use crate::diagnose::verdict::noise_finding::noise_findings;
 use crate::diagnose::verdict::observed_play::{observed_play, open_to_play};
@@ -79,12 +79,9 @@ impl Trial<'_> {
     /// Offers another model where it simulates no record that was not used worse than the one that is offered.
     fn offer(&self, made: &mut Diagnosed, mut open: Errors, model: Corrected) {
         let every: Vec<&Run> = made.data.runs.iter().collect();
-        let which = judged_runs(&made.data);
+        let which = made.data.judging();
         let of = |e: &[Vec<f64>]| rms(&which.iter().map(|&i| e[i].clone()).collect::<Vec<_>>());
-        let simulated = |closed: Option<&Law>| {
-            let judged = model.judged(&made.data, &made.selection);
-            errors(&SimulatedModel { own: vec![], lines: &made.data.lines, fit: None, ..judged }, &every, closed)
-        };
+        let simulated = |closed: Option<&Law>| errors(&model.alone(&made.data), &every, closed);
         let shown = simulated(self.closed);
         let (offered, after) = (of(&made.errors[2]), of(&shown));
         if after.is_nan() || after > offered {

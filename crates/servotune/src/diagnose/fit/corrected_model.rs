@@ -3,7 +3,9 @@
 //! Where a bearing that sticks takes over the spring of the body, little or less than nothing of that spring is left; the body
 //! then is a free inertia and the rest stands as a plain cable spring, of either sign.
 
+use super::diagnosis_data::DiagnosisData;
 use super::selected_effect::SelectedEffect;
+use super::simulation::SimulatedModel;
 use crate::diagnose::data::linear_form::{LinearForm, body_numbers};
 use crate::diagnose::rules::FREE_BODY;
 use crate::lti::{Body, PhysicsEntry, Plant};
@@ -17,6 +19,13 @@ pub struct Corrected {
     pub plant: Plant,
     /// The effects of the entries.
     pub effects: Vec<Setting>,
+}
+
+impl Corrected {
+    /// It in simulation, with the lines that are each record's own.
+    pub(in crate::diagnose) fn alone<'a>(&'a self, data: &'a DiagnosisData) -> SimulatedModel<'a> {
+        SimulatedModel { lines: &data.lines, ..SimulatedModel::of(&self.plant, &self.effects, &data.scene) }
+    }
 }
 
 /// Makes the corrected model of a fit; `per_record` effects belong to records, not to the machine, and stay out.

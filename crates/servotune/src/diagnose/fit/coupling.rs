@@ -188,7 +188,7 @@ impl Ready {
     fn all(fit: &[&Run], which: &[usize], given: &Plant, sample_time_s: f64) -> Vec<Ready> {
         let runs: Vec<Run> = fit.iter().map(|r| (*r).clone()).collect();
         let scene = scene(given, &runs, sample_time_s, None);
-        let model = SimulatedModel { plant: given, effects: vec![], own: vec![], lines: &[], fit: None, scene: &scene };
+        let model = SimulatedModel::of(given, &[], &scene);
         let ready = |(run, error): (&&Run, Vec<f64>)| {
             let departure = |j: &usize| run.further[*j].iter().map(|v| v - run.further[*j][0]).collect();
             let mut series: Vec<Vec<f64>> = which.iter().map(departure).collect();

@@ -300,6 +300,16 @@ impl DiagnosisData {
         if count > 0.0 { f64::max(sum / count, 1.0) } else { 1.0 }
     }
 
+    /// Runs of a role that no push fell into.
+    pub fn of_role(&self, role: Role) -> Vec<usize> {
+        (0..self.runs.len()).filter(|&i| self.runs[i].role == role && !self.runs[i].shocked).collect()
+    }
+
+    /// Runs that judge: those that were not used, else those that were.
+    pub fn judging(&self) -> Vec<usize> {
+        Some(self.of_role(Role::Holdout)).filter(|h| !h.is_empty()).unwrap_or_else(|| self.of_role(Role::Fit))
+    }
+
     /// A fit on the stack with these effects.
     pub fn fit(&self, chosen: Vec<SelectedEffect>) -> Fit<'_> {
         Fit {

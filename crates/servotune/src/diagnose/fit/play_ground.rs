@@ -6,7 +6,7 @@
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::numeric::simplex::simplex;
-use crate::numeric::statistics::median;
+use crate::numeric::statistics::{median, rms};
 use crate::physics::{PlayObserver, Readings, logarithmic};
 use crate::recording::Role;
 use nalgebra::DMatrix;
@@ -97,33 +97,33 @@ fn white(readings: &[Readings]) -> f64 {
 }
 
 impl PlayGround {
-    /// The ground of what a linear plant leaves; none where it leaves nothing finite, or records are too short to tell.
+    /// The ground of what a linear plant leaves; none where it leaves nothing finite, or nothing at all.
     pub fn of(data: &DiagnosisData, rest: &[Vec<f64>]) -> Option<PlayGround> {
         let t = data.scene.sample_time_s;
-        let of = |role: Role| -> Vec<usize> {
-            (0..data.runs.len()).filter(|&i| data.runs[i].role == role && !data.runs[i].shocked).collect()
-        };
-        let stretches = |which: Vec<usize>| -> Vec<Readings> {
+        let stretches = |role: Role| -> Vec<Readings> {
+            let which = data.of_role(role);
             let each = SAMPLES / which.len().max(1);
             let stretch = |&i: &usize| {
                 let n = data.runs[i].len();
                 let from = n.saturating_sub(each) / 2;
                 readings(&data.runs[i], &rest[i], from..(from + each).min(n), t)
             };
-            which.iter().filter(|&&i| data.runs[i].len() > 8).map(stretch).collect()
+            which.iter().map(stretch).collect()
         };
-        let (fit, held) = (stretches(of(Role::Fit)), stretches(of(Role::Holdout)));
+        let (fit, held) = (stretches(Role::Fit), stretches(Role::Holdout));
         let all: Vec<f64> = fit.iter().flat_map(|r| r.rest.iter().copied()).collect();
-        let left = (all.iter().map(|v| v * v).sum::<f64>() / all.len().max(1) as f64).sqrt();
+        let left = rms(&all);
         let noise = white(&fit);
         let sound = left.is_finite() && noise > 0.0 && noise.is_finite();
         sound.then_some(PlayGround { fit, held, sample_time_s: t, noise, rest: left })
     }
 
+    /// Samples of some readings.
     pub fn samples(readings: &[Readings]) -> f64 {
         readings.iter().map(|r| r.rest.len()).sum::<usize>() as f64
     }
 
+    /// Deviance of some readings under an observer.
     pub fn deviance(&self, observer: &PlayObserver, readings: &[Readings]) -> f64 {
         readings.iter().map(|r| observer.deviance(r, self.sample_time_s)).sum()
     }

@@ -46,7 +46,12 @@ pub struct SimulatedModel<'a> {
     pub scene: &'a Scene,
 }
 
-impl SimulatedModel<'_> {
+impl<'a> SimulatedModel<'a> {
+    /// A plant with effects and nothing that is a record's own.
+    pub fn of(plant: &'a Plant, effects: &'a [Setting], scene: &'a Scene) -> SimulatedModel<'a> {
+        SimulatedModel { plant, effects: effects.iter().collect(), own: vec![], lines: &[], fit: None, scene }
+    }
+
     /// The constant torque on a record that does not begin at rest, where laws feel it (command_unit).
     pub fn constant_torque(&self, run: &Run) -> Result<Option<f64>, LtiError> {
         let asked = self.fit.filter(|_| !run.rested && !self.effects.is_empty());

@@ -164,13 +164,8 @@ impl<'a> Trial<'a> {
     /// Does something with every stretch under the model at `x`, in parallel.
     fn each<T: Send>(&self, x: &[f64], of: impl Fn(usize, &Run, &SimulatedModel) -> T + Sync) -> Vec<T> {
         let made = self.made(x);
-        let effects = || made.effects.iter().collect();
-        let scene = &self.data.scene;
-        let one = |(i, run): (usize, &Run)| {
-            let judged =
-                SimulatedModel { plant: &made.plant, effects: effects(), own: vec![], lines: &[], fit: None, scene };
-            of(i, run, &judged)
-        };
+        let one =
+            |(i, run): (usize, &Run)| of(i, run, &SimulatedModel::of(&made.plant, &made.effects, &self.data.scene));
         self.stretches.runs.par_iter().enumerate().map(one).collect()
     }
 

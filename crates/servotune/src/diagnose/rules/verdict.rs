@@ -145,7 +145,7 @@ rules! {
         "as before";
     PLAY_CLEARLY: f64 = 0.012, "per sample",
         "deviance of the fitted records under an observer of a play, below that of a resonance under the same observer, from which the play is named",
-        "0.02 to 0.5 where a play acts, 12 machines of another program";
+        "judgement: over the 8000 samples that are read, odds of e^48";
     PLAY_LEAST: f64 = 60.0, "twice log-likelihood",
         "the same over all samples",
         "judgement: odds of e^30";

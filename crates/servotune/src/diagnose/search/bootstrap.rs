@@ -31,14 +31,7 @@ pub(in crate::diagnose) fn bootstrap(
     let observed_log_p = strongest(data, library, baseline);
     // Simulated by the refitted plant itself: what it answers along the recorded motion holds what is wrong with that motion.
     let refitted = &baseline.refitted.plant;
-    let model = SimulatedModel {
-        plant: refitted,
-        effects: Vec::new(),
-        own: Vec::new(),
-        lines: &[],
-        fit: None,
-        scene: &data.scene,
-    };
+    let model = SimulatedModel::of(refitted, &[], &data.scene);
     let along = data.fit(vec![]).errors(&baseline.refitted.p);
     let simulated = |(run, along): (&Run, Vec<f64>)| error(&model, run, None).unwrap_or(along);
     let errors: Vec<Vec<f64>> = data.means.iter().zip(along).map(simulated).collect();

@@ -92,8 +92,7 @@ pub(in crate::diagnose) fn check(
 /// The given plant's answer to each record's command, its free motions fitted to the position: the motion without the noise.
 fn smooth(given: &Plant, runs: &[Run], sample_time_s: f64) -> Result<Vec<Vec<f64>>, LtiError> {
     let scene = scene(given, runs, sample_time_s, None);
-    let model =
-        SimulatedModel { plant: given, effects: Vec::new(), own: Vec::new(), lines: &[], fit: None, scene: &scene };
+    let model = SimulatedModel::of(given, &[], &scene);
     let smooth = |run: &Run| Ok(run.position.iter().zip(error(&model, run, None)?).map(|(y, e)| y - e).collect());
     runs.iter().map(smooth).collect()
 }

@@ -11,7 +11,7 @@ use crate::controller::Law;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::Corrected;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
-use crate::diagnose::fit::simulation::{SimulatedModel, errors, rms};
+use crate::diagnose::fit::simulation::{errors, rms};
 use crate::diagnose::free_form::curve::FreeForm;
 use crate::diagnose::free_form::estimation::{Curved, Estimated, Foretelling, estimated, grounds};
 use crate::diagnose::free_form::gauge::Plain;
@@ -27,7 +27,6 @@ use crate::diagnose::search::torque_balance::{Balance, SMOOTHINGS, recorded_mean
 use crate::lti::{CurveKnot, PhysicsEntry, Plant};
 use crate::physics::sensor_curve::{self, SensorCurve};
 use crate::physics::{CurvePort, Facts, Setting, coulomb_friction, pivot_friction, shortest_loop};
-use crate::recording::Role;
 
 /// A model with a curve.
 pub(in crate::diagnose) struct StandIn {
@@ -76,7 +75,7 @@ fn stands(data: &DiagnosisData, found: &Estimated, one_place: &Stretches, standi
     let best = taken(found)?;
     let model = model(data, best, &found.plain);
     let errors = [standing.closed, None].map(|closed| shown(data, &model, best, one_place, closed));
-    let which = judged_runs(data);
+    let which = data.judging();
     let of = |e: &[Vec<f64>]| rms(&which.iter().map(|&i| e[i].clone()).collect::<Vec<_>>());
     let [given, refit, laws] = [0, 1, 2].map(|m| of(&standing.errors[m]));
     let (linear, after) = (given.min(refit), of(&errors[0]));
@@ -108,14 +107,6 @@ fn taken<'e, 'a>(found: &'e Estimated<'a>) -> Option<&'e Foretelling<'a>> {
     }
 }
 
-/// The runs that judge: those that were not used, else those that were.
-pub(in crate::diagnose) fn judged_runs(data: &DiagnosisData) -> Vec<usize> {
-    let role = |role: Role| -> Vec<usize> {
-        (0..data.runs.len()).filter(|&i| data.runs[i].role == role && !data.runs[i].shocked).collect()
-    };
-    Some(role(Role::Holdout)).filter(|h| !h.is_empty()).unwrap_or_else(|| role(Role::Fit))
-}
-
 /// Recorded less simulated position of every run under the model.
 fn shown(
     data: &DiagnosisData,
@@ -133,10 +124,7 @@ fn shown(
         return best.trial.clone().over(&all).shown();
     }
     let every: Vec<&Run> = data.runs.iter().collect();
-    let effects = model.effects.iter().collect();
-    let scene = &data.scene;
-    let judged = SimulatedModel { plant: &model.plant, effects, own: vec![], lines: &data.lines, fit: None, scene };
-    errors(&judged, &every, closed)
+    errors(&model.alone(data), &every, closed)
 }
 
 /// The entry of an effect with named parameters.

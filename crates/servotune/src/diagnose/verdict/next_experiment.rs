@@ -7,7 +7,7 @@ use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::{SimulatedModel, error};
 use crate::diagnose::noise::whitening::Whitener;
 use crate::diagnose::search::selection::Selection;
-use crate::physics::{Scene, facts};
+use crate::physics::facts;
 
 /// Scales of the existing excitations that are tried.
 const SCALES: [f64; 4] = [0.3, 1.0, 2.0, 4.0];
@@ -73,13 +73,7 @@ fn difference(
 ) -> f64 {
     let simulate = |m: &crate::diagnose::fit::model::Model| {
         let fixed = crate::diagnose::fit::corrected_model::corrected(&data.form, &m.refitted.p, &m.chosen, &data.scene);
-        let (effects, scene): (_, &Scene) = (fixed.effects.iter().collect(), &data.scene);
-        error(
-            &SimulatedModel { plant: &fixed.plant, effects, own: Vec::new(), lines: &[], fit: None, scene },
-            run,
-            None,
-        )
-        .ok()
+        error(&SimulatedModel::of(&fixed.plant, &fixed.effects, &data.scene), run, None).ok()
     };
     let (Some(x), Some(y)) = (simulate(a), simulate(b)) else { return 0.0 };
     // A record that would leave the stroke is no proposal.

@@ -42,9 +42,7 @@ pub(in crate::diagnose) struct ObservedPlay {
 /// What a plant leaves of every run in open loop.
 fn left(data: &DiagnosisData, made: &Corrected) -> Vec<Vec<f64>> {
     let every: Vec<&Run> = data.runs.iter().collect();
-    let effects = made.effects.iter().collect();
-    let alone = SimulatedModel { plant: &made.plant, effects, own: vec![], lines: &[], fit: None, scene: &data.scene };
-    errors(&alone, &every, None)
+    errors(&SimulatedModel::of(&made.plant, &made.effects, &data.scene), &every, None)
 }
 
 /// The plant that is fitted to what the records hold beside the play.
@@ -65,6 +63,8 @@ fn beside(data: &DiagnosisData, rest: &[Vec<f64>], play: &PlayObserver, iteratio
 struct Found {
     ground: PlayGround,
     plant: Corrected,
+    /// What that plant leaves of every run (position_unit).
+    rest: Vec<Vec<f64>>,
     play: FittedPlay,
 }
 
@@ -86,20 +86,19 @@ fn found(data: &DiagnosisData, plants: &[Plant], iterations: usize) -> Option<(F
         [Side::Before, Side::Behind].into_iter().filter_map(move |s| ground.fitted(s).map(|play| (i, play)))
     });
     let (at, play) = plays.min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))?;
-    let (ground, mut rest, plant) = begun.swap_remove(at);
+    let (ground, rest, plant) = begun.swap_remove(at);
     let mut grounds: Vec<PlayGround> = begun.into_iter().map(|b| b.0).collect();
-    let mut best = Found { ground, plant, play };
+    let mut best = Found { ground, plant, rest, play };
     for _ in 0..ROUNDS {
-        let Some(plant) = beside(data, &rest, &best.play.observer, iterations) else { break };
-        let now = left(data, &plant);
-        let Some(ground) = PlayGround::of(data, &now) else { break };
+        let Some(plant) = beside(data, &best.rest, &best.play.observer, iterations) else { break };
+        let rest = left(data, &plant);
+        let Some(ground) = PlayGround::of(data, &rest) else { break };
         let Some(play) = ground.settled(best.play.side, &best.play.observer) else { break };
         if play.deviance >= best.play.deviance {
             grounds.push(ground);
             break;
         }
-        grounds.push(std::mem::replace(&mut best, Found { ground, plant, play }).ground);
-        rest = now;
+        grounds.push(std::mem::replace(&mut best, Found { ground, plant, rest, play }).ground);
     }
     Some((best, grounds))
 }
@@ -183,10 +182,9 @@ fn told(data: &DiagnosisData, best: &Found, gain: f64, touching: f64) -> Observe
         })
         .collect();
     let t = data.scene.sample_time_s;
-    let rest = left(data, &best.plant);
     let signal = data.stack.series(|i| {
         let first = data.stack.segments[i].runs[0];
-        let all = readings(&data.runs[first], &rest[first], 0..data.runs[first].len(), t);
+        let all = readings(&data.runs[first], &best.rest[first], 0..data.runs[first].len(), t);
         let mut added = best.play.observer.follow(&all, t).added;
         data.whitener.apply(&mut added);
         added
@@ -206,7 +204,7 @@ fn told(data: &DiagnosisData, best: &Found, gain: f64, touching: f64) -> Observe
         place: place(data, &data.stack, &signal),
     };
     let remark = format!(
-        "the play was found under an observer that the recorded positions correct: its masses touch {:.0} % of the time and rattle, and no simulation over a whole record repeats that; a resonance under the same observer is {gain:.0} units of twice the log-likelihood worse",
+        "the play was found under an observer that the recorded positions correct: its masses touch {:.0} % of the time and rattle, and no simulation over a whole record repeats that (what stands above of laws on held-out records is of such simulations); a resonance under the same observer is {gain:.0} units of twice the log-likelihood worse",
         100.0 * touching
     );
     ObservedPlay { finding, remark, corrected }

@@ -81,8 +81,7 @@ impl<'a> Reporting<'a> {
         if offer.full {
             return errors(&made.judged(self.data, self.selection), runs, closed);
         }
-        let plain = SimulatedModel { own: Vec::new(), lines: &[], fit: None, ..made.judged(self.data, self.selection) };
-        errors(&plain, runs, closed)
+        errors(&SimulatedModel::of(&made.plant, &made.effects, &self.data.scene), runs, closed)
     }
 
     fn rms(&self, offer: &Offer, runs: &[&Run]) -> f64 {
