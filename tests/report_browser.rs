@@ -26,9 +26,9 @@ fn browser() -> Option<&'static str> {
 fn faults(browser: &str, page: &str, width: u32, dark: bool, dir: &Path) -> Vec<String> {
     let probed = page.replacen("<head>", &format!("<head><script>{PROBE}</script>"), 1);
     let quoted = probed.replace('&', "&amp;").replace('"', "&quot;");
-    // In a frame of its own a page may be narrower than a browser's window.
+    // In a frame of its own a page may be narrower than a browser's window. Without its encoding the browser would guess it, now and then wrongly.
     let around = format!(
-        "<!doctype html><body style=\"margin:0\"><iframe style=\"border:0;width:{width}px;height:900px\" srcdoc=\"{quoted}\"></iframe></body>"
+        "<!doctype html><meta charset=\"utf-8\"><body style=\"margin:0\"><iframe style=\"border:0;width:{width}px;height:900px\" srcdoc=\"{quoted}\"></iframe></body>"
     );
     let file = dir.join(format!("around_{width}_{dark}.html"));
     std::fs::write(&file, around).unwrap();

@@ -75,7 +75,9 @@ impl<'a> Evidence<'a> {
     /// Whether the laws of the model may be named; what speaks against it is said.
     fn names(&self, d: &mut Diagnosis) -> bool {
         let Evidence { selection, model, explained, .. } = *self;
-        let near = d.fit.holdout.is_none_or(|h| h.rms_after <= DECISIVE_LEFT * h.noise_floor);
+        // Without repeats nothing tells how far from the noise the simulation stays.
+        let near = !self.data.levels.from_repeats
+            || d.fit.holdout.is_none_or(|h| h.rms_after <= DECISIVE_LEFT * h.noise_floor);
         let decisive = near && explained >= DECISIVE_SHARE && rival_share(selection) < DECISIVE_RIVAL;
         if let Some(h) = &self.against {
             d.remarks.push(format!(
