@@ -92,7 +92,7 @@ rules! {
         "gain of the first finding that its best rival must stay below then",
         "what the library lacks is near to several of its laws";
     DECISIVE_LEFT: f64 = 2.0, "noise",
-        "error on held-out records up to which such a name may be given, where repeats show the noise",
+        "error on held-out records up to which such a name may be given, in closed loop",
         "as for curves: a name leaves no several times the noise";
     BOOTSTRAP_CHANCE: f64 = 0.01, "probability",
         "chance by the bootstrap up to which findings stand",

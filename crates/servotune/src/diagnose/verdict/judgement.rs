@@ -75,8 +75,8 @@ impl<'a> Evidence<'a> {
     /// Whether the laws of the model may be named; what speaks against it is said.
     fn names(&self, d: &mut Diagnosis) -> bool {
         let Evidence { selection, model, explained, .. } = *self;
-        // Without repeats nothing tells how far from the noise the simulation stays.
-        let near = !self.data.levels.from_repeats
+        // In open loop a free body drifts, and how far from the noise it ends says little of the law.
+        let near = d.fit.simulation != Simulation::ClosedLoop
             || d.fit.holdout.is_none_or(|h| h.rms_after <= DECISIVE_LEFT * h.noise_floor);
         let decisive = near && explained >= DECISIVE_SHARE && rival_share(selection) < DECISIVE_RIVAL;
         if let Some(h) = &self.against {
