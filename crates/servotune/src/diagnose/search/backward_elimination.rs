@@ -13,7 +13,15 @@ use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::rules::{
     OWN_OF_RECORD, RIVAL_BETTER, RIVAL_TRIED, RIVAL_TRIED_WITHOUT_REPEATS, SECOND_ADDS, SMALL_BESIDE_DRAG,
 };
-use crate::physics::{Effect, library};
+use crate::physics::{Effect, Port, library};
+
+/// What an effect must explain to stay: the price of its numbers and a share of what the others explain, whose form may be wrong by as much. What
+/// turns with the disk has a clock of its own: no other form makes it.
+fn worth(c: &SelectedEffect, price: f64, others: f64) -> f64 {
+    let numbers = (c.setting.strengths.len() + c.setting.law.size()) as f64;
+    let form = if c.effect().facts().port == Port::Disk { 0.0 } else { SECOND_ADDS * others };
+    (price * numbers).max(form)
+}
 
 /// Takes effects out again that later ones made needless.
 pub(super) fn prune(data: &DiagnosisData, model: &mut Model, before: f64, iterations: usize) {
@@ -26,9 +34,7 @@ pub(super) fn prune(data: &DiagnosisData, model: &mut Model, before: f64, iterat
         };
         let all: Vec<Model> = (0..model.chosen.len()).map(without).collect();
         let Some((i, best)) = all.into_iter().enumerate().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost)) else { return };
-        let c = &model.chosen[i];
-        let numbers = (c.setting.strengths.len() + c.setting.law.size()) as f64;
-        if best.cost - model.cost > (price * numbers).max(SECOND_ADDS * (before - best.cost)) {
+        if best.cost - model.cost > worth(&model.chosen[i], price, before - best.cost) {
             return;
         }
         *model = best;
@@ -61,9 +67,7 @@ pub(super) fn spare(
             }
         }
         let Some((at, less, s)) = without.into_iter().min_by(|a, b| a.2.cost.total_cmp(&b.2.cost)) else { return };
-        let c = &model.chosen[at];
-        let numbers = (c.setting.strengths.len() + c.setting.law.size()) as f64;
-        if s.cost - by_simulation.cost > (price * numbers).max(SECOND_ADDS * (before - s.cost)) {
+        if s.cost - by_simulation.cost > worth(&model.chosen[at], price, before - s.cost) {
             return;
         }
         rivals.remove(at);

@@ -44,7 +44,7 @@ struct Search<'a> {
     retraced: usize,
     /// Whether the model stands by simulation: along a noisy motion its laws fall far short of themselves.
     felt: bool,
-    /// Whether the rest is within the form of the laws that were found: only what turns with the disk, by a clock of its own, is still told from it.
+    /// Whether only what turns with the disk is looked for any more.
     disk_only: bool,
 }
 
@@ -84,11 +84,29 @@ pub fn select(
         felt: false,
         disk_only: false,
     };
-    while search.model.chosen.len() < settings.most && search.step(&mut progress) == Onward::Next {}
+    while search.has_room() && search.step(&mut progress) == Onward::Next {}
+    search.what_turns(&mut progress);
     search.finished(given, calibration, &mut progress)
 }
 
 impl Search<'_> {
+    fn has_room(&self) -> bool {
+        self.model.chosen.len() < self.settings.most
+    }
+
+    /// What turns with the disk has a clock of its own: neither the form of the laws that were found nor their size stands in its way.
+    fn what_turns(&mut self, progress: &mut dyn FnMut(&str)) {
+        if self.model.chosen.is_empty() || !self.has_room() || !self.data.noise_known {
+            return;
+        }
+        self.disk_only = true;
+        let (steps, found) = (self.steps.len(), self.model.chosen.len());
+        self.step(progress);
+        if self.model.chosen.len() == found {
+            self.steps.truncate(steps);
+        }
+    }
+
     /// One step: scan, refits, the best of them, and what follows.
     fn step(&mut self, progress: &mut dyn FnMut(&str)) -> Onward {
         progress(&format!("scan of {} effects for finding {}", self.library.len(), self.model.chosen.len() + 1));
@@ -210,10 +228,9 @@ impl Search<'_> {
         if (self.felt || to_the_end) && self.model.cost > next.cost {
             (self.model, self.felt) = (next, true);
             let form = FORM_OF_SIMULATED * self.baseline.excess();
-            if self.model.excess_sigma() < DOWN_TO_NOISE || self.disk_only {
+            if self.model.excess_sigma() < DOWN_TO_NOISE || self.model.excess() < form {
                 return Onward::End;
             }
-            self.disk_only = self.model.excess() < form;
         }
         Onward::Next
     }
