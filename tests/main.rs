@@ -14,6 +14,7 @@ mod diagnose_offered;
 mod diagnose_report;
 mod diagnose_rules;
 mod diagnose_sealed;
+mod diagnose_slow;
 mod documentation;
 mod export;
 mod feedback_margins;

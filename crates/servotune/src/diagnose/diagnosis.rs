@@ -20,6 +20,10 @@ use crate::diagnose::verdict::log_checks::{LogChecks, check};
 use crate::lti::{Body, Plant};
 use crate::recording::{Case, Role};
 
+/// The remark where no filter of the noise judges models.
+const PLAIN: &str =
+    "no model comes near the noise: models are judged by plain simulation error, every frequency as large as it is";
+
 /// Diagnoses a case.
 pub fn diagnose(
     case: &Case,
@@ -73,8 +77,15 @@ pub fn diagnose(
     if let Some(start) = start {
         remarks.push(start.says().into());
         data = DiagnosisData::new(&start.plant, data.runs, sample_time_s, case.spindle_hz)?;
-        if !data.noise_known && start.bends() {
-            data = data.with_noise(start.left);
+        if start.bends() {
+            let left = rms(&start.left);
+            if !data.noise_known {
+                data = data.with_noise(start.left);
+            }
+            if data.is_far(left) {
+                data = data.judged_plainly(left);
+                remarks.push(PLAIN.into());
+            }
         }
         data.foretold = start.law;
     }

@@ -13,9 +13,10 @@ use crate::diagnose::data::stacked_records::{NuisanceBasis, StackedRecords};
 use crate::diagnose::noise::lines::{Line, take_lines};
 use crate::diagnose::noise::repeats::{in_laps, noise_of, noise_series, values, weigh, without_start};
 use crate::diagnose::noise::whitening::{NoiseLevels, Whitener};
-use crate::diagnose::rules::ROUNDING_ALIKE;
-use crate::lti::{LtiError, Plant};
+use crate::diagnose::rules::{FAR_FROM_REPEATS, FAR_FROM_SENSOR, ROUNDING_ALIKE};
+use crate::lti::{Body, LtiError, Plant};
 use crate::numeric::least_squares::Qr;
+use crate::numeric::statistics::rms;
 use crate::physics::{Entry, Port, Scene};
 use crate::recording::Role;
 use std::f64::consts::TAU;
@@ -45,6 +46,8 @@ pub struct DiagnosisData {
     pub scene: Scene,
     /// What repeats differ by, whitened, with the run it belongs to; empty without repeats.
     pub repeats: Vec<(usize, Vec<f64>)>,
+    /// What repeats differ by but for their starts, rms (position_unit); NaN without repeats.
+    pub repeats_rms: f64,
     /// The encoder's count, where every fitted position lies on one.
     pub grid: Option<Grid>,
     /// Whether the noise is known apart from what the linear plant leaves: from repeats, or from what the cleared plant and its law leave.
@@ -127,6 +130,7 @@ impl DiagnosisData {
         let from_repeats = !repeats.is_empty();
         let series = if from_repeats { &repeats } else { &errors };
         let (levels, whitener, filtered) = noise_of(series, &free, body, sample_time_s, from_repeats);
+        let repeats_rms = rms(&values(&without_start(&repeats, &free, &|_| {})).concat());
         let repeats = if from_repeats { filtered } else { Vec::new() };
         weigh(&mut stack, &repeats);
         let grid = count(&runs, &fit_runs);
@@ -152,6 +156,7 @@ impl DiagnosisData {
             stack,
             scene,
             repeats,
+            repeats_rms,
             grid,
             noise_known: from_repeats,
             foretold: None,
@@ -181,6 +186,31 @@ impl DiagnosisData {
         let left: Vec<(usize, Vec<f64>)> = left.into_iter().enumerate().collect();
         (self.levels, self.whitener, _) = noise_of(&left, &|n| free_motions(&body, t, n).to_vec(), &body, t, false);
         self.scene.noise = self.levels.sensor_rms;
+        self.noise_known = true;
+        self
+    }
+
+    /// Whether the plant has a spring: a free body drifts in simulation, and between repeats.
+    pub fn is_sprung(&self) -> bool {
+        !matches!(self.form.given.body, Body::FreeInertia { .. })
+    }
+
+    /// Whether a plain simulation error, of a plant on a spring, is far from all noise.
+    pub fn is_far(&self, plain: f64) -> bool {
+        let far = match self.levels.from_repeats {
+            true => plain > FAR_FROM_REPEATS * self.repeats_rms,
+            false => plain > FAR_FROM_SENSOR * self.levels.sensor_rms,
+        };
+        far && self.is_sprung()
+    }
+
+    /// Models judged by plain simulation error, every frequency as large as it is, `left` (position_unit) being what the best model leaves: far
+    /// from all noise the rest is the model's own, and its small parts at high frequencies must choose no law.
+    pub fn judged_plainly(mut self, left: f64) -> DiagnosisData {
+        self.whitener = Whitener::flat(left);
+        self.repeats.clear();
+        self.lines.clear();
+        self.stack.segments.iter_mut().for_each(|s| s.weight = 1.0);
         self.noise_known = true;
         self
     }

@@ -194,6 +194,12 @@ impl Whitener {
         Whitener { step, gain, scale: spread.sqrt().recip(), ar: Vec::new(), ar_scale: 1.0 }
     }
 
+    /// The filter of white noise of this level: behind it an error is a plain simulation error, every frequency as large as it is.
+    pub fn flat(level: f64) -> Whitener {
+        let scale = level.max(f64::MIN_POSITIVE).recip();
+        Whitener { step: Matrix3::zeros(), gain: Vector3::zeros(), scale, ar: Vec::new(), ar_scale: 1.0 }
+    }
+
     /// What the noise's own level adds to minus twice the logarithm of a likelihood of `n` samples, up to a constant; each coefficient
     /// of the autoregression is paid for (Schwarz 1978).
     pub fn evidence(&self, n: usize) -> f64 {

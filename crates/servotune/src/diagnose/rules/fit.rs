@@ -23,7 +23,7 @@ rules! {
         "stiffness over the given one below which a body counts as free",
         "judgement";
     CLEARED_TELLS: f64 = 0.7, "share",
-        "equation error of the linear balance that a law must stay below to be simulated",
+        "equation error of the linear balance below which a law bends the plant, and is simulated near the given plant's noise too",
         "it only saves simulations: they decide";
     CLEARED_BETTER: f64 = 0.5, "ratio",
         "simulation error with the law over that of the best linear plant below which its plant is taken",

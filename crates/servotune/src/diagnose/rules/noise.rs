@@ -10,6 +10,12 @@ rules! {
     ROUNDING_ALIKE: f64 = 0.5, "ratio",
         "rounding over the noise of repeats from which repeats round alike",
         "a mean then does not take the rounding away (Widrow and Kollar 2008)";
+    FAR_FROM_REPEATS: f64 = 5.0, "ratio",
+        "plain simulation error of the cleared plant and its law over what repeats differ by, from which models are judged by that error",
+        "what is left then is the model's own, and its small parts at high frequencies choose no law";
+    FAR_FROM_SENSOR: f64 = 30.0, "ratio",
+        "the same over the sensor's noise, without repeats",
+        "without repeats an uneven push counts as noise too";
     PUSH_CHANCE: f64 = 1e-9, "probability",
         "chance of a false push below which it is one",
         "many places, widths and records are looked at; false pushes are to be rarer than one in a thousand cases";

@@ -5,7 +5,7 @@
 //! simulates far better than the best linear plant. It names nothing: the search begins anew from the plant alone.
 
 use super::curve_balance::curves;
-use super::torque_balance::{Balance, Balanced, SLOWEST_RAD_S, SMOOTHINGS, recorded_means, with_freedom};
+use super::torque_balance::{Balance, Balanced, SLOWEST_RAD_S, recorded_means, smoothings, with_freedom};
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
@@ -77,11 +77,12 @@ pub(in crate::diagnose) fn cleared(
     say: &mut dyn FnMut(&str),
 ) -> Option<Cleared> {
     let means = recorded_means(data);
-    let balances = SMOOTHINGS.iter().flat_map(|&w| SLIDES.map(|s| Balance::of(data, &means, w, s)));
+    let widths = smoothings(&means);
+    let balances = widths.iter().flat_map(|&w| SLIDES.map(|s| Balance::of(data, &means, w, s)));
     let mut laws: Vec<(f64, Balanced)> = balances.flat_map(|b| b.laws()).collect();
-    let bent = curves(&SMOOTHINGS.map(|w| Balance::of(data, &means, w, 0.0)));
+    let bent = curves(&widths.iter().map(|&w| Balance::of(data, &means, w, 0.0)).collect::<Vec<_>>());
     let bent: Vec<Curved> = bent.into_iter().filter(|c| c.share < CLEARED_TELLS).collect();
-    let nothing_bends = bent.is_empty() && laws.iter().all(|(_, b)| b.law.is_none());
+    let nothing_bends = bent.is_empty() && laws.iter().all(|(share, _)| *share >= CLEARED_TELLS);
     let zero = vec![0.0; data.form.free_parameters.len()];
     let near = data.fit(vec![]).cost(&zero) < CLEARED_FAR * CLEARED_FAR * data.stack.total as f64;
     if laws.is_empty() || nothing_bends && near {

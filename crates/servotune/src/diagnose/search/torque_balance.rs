@@ -6,7 +6,6 @@ use crate::diagnose::data::run::{Run, mean_run};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::regressors::columns_along;
 use crate::diagnose::fit::selected_effect::SelectedEffect;
-use crate::diagnose::rules::CLEARED_TELLS;
 use crate::lti::{Body, Plant};
 use crate::numeric::least_squares::Qr;
 use crate::physics::{AnyLaw, Effect, Entry, Sample, Scene, Setting, library};
@@ -14,6 +13,9 @@ use rayon::prelude::*;
 
 /// Standard deviations of the smoothing (samples): wide for slow machines, narrow for fast ones.
 pub(in crate::diagnose) const SMOOTHINGS: [f64; 3] = [3.0, 8.0, 20.0];
+/// Wider ones for motion that is slow beside the samples, as far as they keep this share of its squared speed.
+const WIDER: [f64; 2] = [50.0, 125.0];
+const KEEPS_SPEED: f64 = 0.8;
 /// The later of the two commands whose shares make any delay between them (samples).
 pub(super) const LATER: usize = 4;
 /// Smoothings between rows of the balance.
@@ -113,6 +115,24 @@ fn roughness(means: &[Run]) -> f64 {
 /// The mean run of every segment as recorded: what was taken out around a bent plant (lines) is none of theirs.
 pub(in crate::diagnose) fn recorded_means(data: &DiagnosisData) -> Vec<Run> {
     data.stack.segments.iter().map(|s| mean_run(&data.runs, &s.runs)).collect()
+}
+
+/// The smoothings for some mean runs: behind a wide one a vibration that the plant lacks no longer drowns what acts on the slow motion.
+pub(super) fn smoothings(means: &[Run]) -> Vec<f64> {
+    let speed = |width: f64| -> f64 {
+        let (weights, stride) = (weights(width), (0.5 * width) as usize);
+        let edge = weights.len();
+        let squares = |m: &Run| -> f64 {
+            let rows = (edge..m.len().saturating_sub(edge)).step_by(stride.max(1));
+            let count = rows.len().max(1) as f64;
+            let step = |k: usize| smooth(&m.position, k + 1, &weights) - smooth(&m.position, k - 1, &weights);
+            m.len() as f64 * rows.map(|k| step(k).powi(2)).sum::<f64>() / count
+        };
+        means.iter().map(squares).sum()
+    };
+    let all = speed(SMOOTHINGS[0]);
+    let wider = WIDER.into_iter().filter(|w| speed(*w) > KEEPS_SPEED * all);
+    SMOOTHINGS.into_iter().chain(wider).collect()
 }
 
 /// The balance of all mean runs at one smoothing.
@@ -240,7 +260,7 @@ impl<'a> Balance<'a> {
         Plant { body, delay_s: (delay_samples * t).clamp(0.0, 3.0 * LATER as f64 * t), ..given.clone() }
     }
 
-    /// The best point of every law that bends or drags, where it explains what no linear plant does.
+    /// The best point of every law that bends or drags, with the share of the linear balance's error that it leaves.
     /// After them the balance without a law: the given plant may be far off by itself.
     pub fn laws(&self) -> Vec<(f64, Balanced)> {
         let Some(linear) = self.solved(None) else { return Vec::new() };
@@ -252,8 +272,7 @@ impl<'a> Balance<'a> {
             let grid = e.grid(&self.scene);
             let all = grid.iter().filter_map(|law| self.solved(Some(law)));
             let best = all.min_by(|a, b| a.left.total_cmp(&b.left))?;
-            let share = best.left / linear.left;
-            (share < CLEARED_TELLS).then_some((share, best))
+            Some((best.left / linear.left, best))
         };
         let mut all: Vec<(f64, Balanced)> = effects.par_iter().filter_map(best).collect();
         all.push((1.0, linear));

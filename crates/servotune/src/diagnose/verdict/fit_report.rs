@@ -91,7 +91,9 @@ pub(in crate::diagnose) fn figures_of(
     }
 }
 
-/// Without repeats the floor is the sensor's noise as the spectrum shows it, never more than what the best model leaves.
+/// Without repeated records the floor is what laps of one record differ by, else the sensor's noise as the spectrum shows it; never more than what
+/// the best model leaves.
 fn fallback_floor(data: &DiagnosisData, after: f64) -> f64 {
-    data.levels.sensor_rms.min(after)
+    let laps = Some(data.repeats_rms).filter(|r| r.is_finite() && data.is_sprung());
+    laps.unwrap_or(data.levels.sensor_rms).min(after)
 }
