@@ -97,7 +97,7 @@ impl Run {
     pub fn period(&self) -> Option<usize> {
         let drives: Vec<&[f64]> = match &self.reference {
             Some(r) => vec![r, &self.excitation],
-            None => vec![&self.input],
+            None => vec![&self.command],
         };
         let moving: Vec<(&[f64], f64)> = drives
             .into_iter()
