@@ -82,7 +82,8 @@ pub fn diagnose(
             if !data.noise_known {
                 data = data.with_noise(start.left);
             }
-            if data.is_far(left) {
+            // In closed loop it is not the open-loop simulation that is reported.
+            if controller.is_none() && data.is_far(left) {
                 data = data.judged_plainly(left);
                 remarks.push(PLAIN.into());
             }
