@@ -35,9 +35,14 @@ fn describing_functions_of_the_textbook() {
     let (a, w) = (0.8, TAU * 40.0);
     // Gelb, Vander Velde: saturation at d, 2/pi (asin r + r sqrt(1 - r²)), r = d/A; the dead zone is its complement.
     let r: f64 = 0.3 / a;
-    let clipped = 2.0 / PI * (r.asin() + r * (1.0 - r * r).sqrt());
+    let saturates = |r: f64| 2.0 / PI * (r.asin() + r * (1.0 - r * r).sqrt());
+    let clipped = saturates(r);
     // 4096 steps: a kink is met within one step, its error in the harmonic is of the step squared.
-    close(df(CurrentSaturation { limit: 0.3 }, 1.0, a, w), Complex::new(clipped - 1.0, 0.0), 1e-6);
+    close(df(CurrentSaturation { limit: 0.3, knee: None }, 1.0, a, w), Complex::new(clipped - 1.0, 0.0), 1e-6);
+    // A soft knee is the mean of sharp corners that lie evenly over its width.
+    let evenly: f64 = (0..2000).map(|i| saturates(r * (0.8 + 0.4 * (f64::from(i) + 0.5) / 2000.0))).sum();
+    let soft = CurrentSaturation { limit: 0.3, knee: Some(0.2) };
+    close(df(soft, 1.0, a, w), Complex::new(evenly / 2000.0 - 1.0, 0.0), 1e-6);
     close(df(DeadBand { half_width: 0.3 }, 1.0, a, w), Complex::new(-clipped, 0.0), 1e-6);
     // Coulomb F with a pre-sliding length of 1e-5 A: 4F/(pi A) against the velocity; the length turns the phase by about sqrt.
     close(df(CoulombFriction::sticking(1e-5, None), 0.03, a, w), Complex::new(0.0, -4.0 * 0.03 / (PI * a)), 1e-2);

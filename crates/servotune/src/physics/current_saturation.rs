@@ -1,4 +1,7 @@
-//! The amplifier's current is limited: i = sat(u, limit).
+//! The amplifier's current is limited: i = sat(u, limit), at a corner that electronics and voltage headroom round off.
+//!
+//! The rounded corner is the soft knee of limiters (Giannoulis, Massberg and Reiss 2012, equation 4): a parabola that meets both lines with
+//! their slopes.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::parameter::{Parameter, Unit};
@@ -9,7 +12,13 @@ use super::sample::{Sample, Scene};
 pub struct CurrentSaturation {
     /// Largest current, as a command (command_unit), above 0.
     pub limit: f64,
+    /// Half the width of the rounded corner over the limit, above 0, at most 1; none where it is sharp.
+    pub knee: Option<f64>,
 }
+
+/// Knees of the grid, and the widest: there the gain falls from the first volt on.
+const KNEES: [f64; 3] = [0.04, 0.1, 0.25];
+const WIDEST: f64 = 1.0;
 
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
@@ -19,7 +28,7 @@ pub static FACTS: Facts = Facts {
     columns: 1,
     fixed: true,
     per_record: false,
-    equation: "i = clip(u, -limit, limit)",
+    equation: "i = clip(u, -limit, limit); with a knee k the corner is the parabola |u| - (|u| - (1 - k) limit)^2 / (4 k limit)",
     says: "the amplifier runs out of current: commands above a limit give no more torque",
     confused_with: &["slew_limit", "torque_factor_rolloff"],
     experiment: "moves of growing length, so that the largest command grows step by step",
@@ -28,11 +37,26 @@ pub static FACTS: Facts = Facts {
 
 struct Clip {
     limit: f64,
+    knee: f64,
+}
+
+impl Clip {
+    /// What the amplifier takes from a command of this size, at least 0.
+    fn taken(&self, size: f64) -> f64 {
+        let (half, over) = (self.knee * self.limit, size - self.limit);
+        if over >= half {
+            over
+        } else if over > -half {
+            (over + half).powi(2) / (4.0 * half)
+        } else {
+            0.0
+        }
+    }
 }
 
 impl Law for Clip {
     fn columns(&self, _from: &Sample, to: &Sample, out: &mut [f64]) {
-        out[0] = to.u.max(-self.limit).min(self.limit) - to.u;
+        out[0] = -self.taken(to.u.abs()).copysign(to.u);
     }
 }
 
@@ -49,15 +73,25 @@ impl Parametric for CurrentSaturation {
         // Dense towards the largest command: there few samples are touched, and each point touches others.
         let near = (0..8).map(|i| 1.0 - 0.12 * 0.7f64.powi(i));
         let far = (3..23).map(|i| f64::from(i) / 26.0);
-        far.chain(near).map(|s| CurrentSaturation { limit: scene.command * s }).collect()
+        let limits: Vec<f64> = far.chain(near).map(|s| scene.command * s).collect();
+        let forms = std::iter::once(None).chain(KNEES.map(Some));
+        forms.flat_map(|knee| limits.iter().map(move |&limit| CurrentSaturation { limit, knee })).collect()
     }
 
     fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
-        vec![Some(&mut self.limit)]
+        vec![Some(&mut self.limit), self.knee.as_mut()]
+    }
+
+    fn choices(&self) -> Vec<usize> {
+        vec![usize::from(self.knee.is_some())]
+    }
+
+    fn member(&self) -> usize {
+        usize::from(self.knee.is_some())
     }
 
     fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Clip { limit: self.limit })
+        Box::new(Clip { limit: self.limit, knee: self.knee.unwrap_or(0.0).min(WIDEST) })
     }
 
     fn is_hard_nonlinearity() -> bool {
@@ -65,7 +99,8 @@ impl Parametric for CurrentSaturation {
     }
 
     fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![Parameter::new("limit", self.limit, Unit::Command)]
+        let knee = self.knee.map(|k| Parameter::new("knee", k, Unit::Ratio));
+        std::iter::once(Parameter::new("limit", self.limit, Unit::Command)).chain(knee).collect()
     }
 
     /// Amplifiers round their corner off: a limit that is met softly is taken for one a little lower.
@@ -74,6 +109,11 @@ impl Parametric for CurrentSaturation {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(CurrentSaturation, Vec<f64>), PhysicsError> {
-        Ok((CurrentSaturation { limit: given.positive("limit")? }, vec![1.0]))
+        let knee = if given.has("knee") {
+            Some(given.between("knee", 0.0, f64::next_up(WIDEST), "a number above 0, at most 1")?)
+        } else {
+            None
+        };
+        Ok((CurrentSaturation { limit: given.positive("limit")?, knee }, vec![1.0]))
     }
 }

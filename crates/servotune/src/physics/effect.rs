@@ -269,6 +269,11 @@ pub trait Parametric: Clone + PartialEq + std::fmt::Debug + Sized {
         false
     }
 
+    /// Whether it is a wave over the position, with a period of its own that no other law's form has.
+    fn is_wave_over_position() -> bool {
+        false
+    }
+
     /// Whether it is a tone of one frequency, which a narrow band of noise looks like.
     fn is_tone() -> bool {
         false

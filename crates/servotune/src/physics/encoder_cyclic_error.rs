@@ -69,6 +69,10 @@ impl Parametric for EncoderCyclicError {
         &FACTS
     }
 
+    fn is_wave_over_position() -> bool {
+        true
+    }
+
     fn shown_over() -> ShownOver {
         ShownOver::Position
     }

@@ -269,6 +269,7 @@ pub trait Effect: Sync {
     fn has_own_clock(&self) -> bool;
     fn is_single_event(&self) -> bool;
     fn is_tone(&self) -> bool;
+    fn is_wave_over_position(&self) -> bool;
     fn independent_of_motion(&self) -> bool;
     fn is_on_every_machine(&self) -> bool;
     fn may_occur_several_times(&self) -> bool;
@@ -324,6 +325,10 @@ where
 
     fn is_tone(&self) -> bool {
         L::is_tone()
+    }
+
+    fn is_wave_over_position(&self) -> bool {
+        L::is_wave_over_position()
     }
 
     fn independent_of_motion(&self) -> bool {

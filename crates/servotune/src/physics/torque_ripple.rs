@@ -60,6 +60,10 @@ impl Parametric for TorqueRipple {
         &FACTS
     }
 
+    fn is_wave_over_position() -> bool {
+        true
+    }
+
     fn shown_over() -> ShownOver {
         ShownOver::Position
     }

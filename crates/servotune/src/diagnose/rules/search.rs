@@ -23,6 +23,9 @@ rules! {
     FOURTH_ADDS: f64 = 4e-2, "share",
         "the same of a fourth",
         "judgement, as for the third";
+    WAVE_STANDS_OUT: f64 = 25.0, "times",
+        "gain of a wave over the position beside another law, over the median gain of waves of other periods, from which chance alone judges it",
+        "the wrong form of another law feeds waves of every period; the largest of 700 that chance makes is ten times their median";
     BESIDE_DRAG: f64 = 0.08, "share",
         "gain beside a friction, of what is explained, below which a law must explain more of the rest",
         "what friction does at rest no motion tells";

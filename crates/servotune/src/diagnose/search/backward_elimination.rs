@@ -1,5 +1,6 @@
 //! The final model of a search, looked at again: effects that others made needless go, and rivals are tried in the place of each.
 
+use super::candidate::has_own_period;
 use super::rival::more;
 use super::rival_model::Rival;
 use super::selection::{Step, gain_of};
@@ -13,13 +14,13 @@ use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::rules::{
     OWN_OF_RECORD, RIVAL_BETTER, RIVAL_TRIED, RIVAL_TRIED_WITHOUT_REPEATS, SECOND_ADDS, SMALL_BESIDE_DRAG,
 };
-use crate::physics::{Effect, Port, library};
+use crate::physics::{Effect, library};
 
-/// What an effect must explain to stay: the price of its numbers and a share of what the others explain, whose form may be wrong by as much. What
-/// turns with the disk has a clock of its own: no other form makes it.
+/// What an effect must explain to stay: the price of its numbers and a share of what the others explain, whose form may be wrong by as much; not
+/// so what has a period of its own.
 fn worth(c: &SelectedEffect, price: f64, others: f64) -> f64 {
     let numbers = (c.setting.strengths.len() + c.setting.law.size()) as f64;
-    let form = if c.effect().facts().port == Port::Disk { 0.0 } else { SECOND_ADDS * others };
+    let form = if has_own_period(c.effect()) { 0.0 } else { SECOND_ADDS * others };
     (price * numbers).max(form)
 }
 

@@ -3,7 +3,12 @@
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{PUSH_MOVES, PUSH_TOGETHER};
-use crate::physics::{Effect, Setting};
+use crate::physics::{Effect, Port, Setting};
+
+/// Whether no other law's form makes it: what turns with the disk, and a wave over the position.
+pub(super) fn has_own_period(e: &dyn Effect) -> bool {
+    e.facts().port == Port::Disk || e.is_wave_over_position()
+}
 
 /// The best that one effect can do.
 #[derive(Clone)]
@@ -12,6 +17,8 @@ pub struct Candidate {
     pub setting: Setting,
     /// Fall of the sum of squares of the whitened error.
     pub gain: f64,
+    /// Its gain over the median of the grid's points around it: how far it stands out among laws of its kind with other numbers.
+    pub stands_out: f64,
     /// Share of its columns that the linear parameters can imitate, at its best point.
     pub concealed: f64,
     /// Points of the grid.

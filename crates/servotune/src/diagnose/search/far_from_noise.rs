@@ -73,6 +73,7 @@ pub(in crate::diagnose) fn foretold(data: &DiagnosisData, model: &Model, step: &
     let candidate = Candidate {
         setting: found.chosen[0].setting.clone(),
         gain: model.evidence - found.evidence,
+        stands_out: 1.0,
         concealed: 0.0,
         points: law.effect().grid(&data.scene).len(),
         strengths: if law.setting.facts().fixed { 1 } else { law.setting.strengths.len() },

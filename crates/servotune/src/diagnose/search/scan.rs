@@ -13,6 +13,7 @@ use crate::diagnose::fit::fit_inputs::Fit;
 use crate::diagnose::fit::regressors::{raw_columns, white_columns};
 use crate::lti::Plant;
 use crate::numeric::least_squares::dot;
+use crate::numeric::statistics::median;
 use crate::physics::{AnyLaw, Effect, Entry, Setting};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -285,11 +286,13 @@ impl<'a, 'f> Ground<'a, 'f> {
         // The sort is stable: of equals the order of their making stands.
         all.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
         let mut peaks: Vec<(usize, Candidate)> = Vec::new();
+        let usual = median(&worth).unwrap_or(f64::NAN);
         for (i, s) in all {
             let rises = peaks.first().is_none_or(|(_, best)| s.gain > RISES * best.gain);
             if peaks.len() < PEAKS && rises && peaks.iter().all(|(at, _)| i.abs_diff(*at) > BESIDE) {
                 let candidate = Candidate {
                     gain: s.gain,
+                    stands_out: s.gain / usual,
                     concealed: s.concealed,
                     points: grid.len(),
                     strengths: if fixed { 1 } else { s.strengths.len() },

@@ -6,7 +6,7 @@
 use super::backward_elimination::{exchange, prune, spare};
 use super::bootstrap::bootstrap;
 use super::bootstrap_chance::Bootstrap;
-use super::candidate::Candidate;
+use super::candidate::{Candidate, has_own_period};
 use super::drift_test::follows_motion;
 use super::far_from_noise::{by_simulation_first, deep, felt_scan, felt_trial, foretold};
 use super::residual_screen::leftover;
@@ -23,9 +23,9 @@ use crate::diagnose::fit::output_error_fit::simulated;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{
     BESIDE_DRAG, DOWN_TO_NOISE, FORM_OF_SIMULATED, FOURTH_ADDS, LINEAR_FURTHER, LINEAR_OF_GAIN, OWN_OF_RECORD,
-    REST_BESIDE_DRAG, SECOND_ADDS, THIRD_ADDS,
+    REST_BESIDE_DRAG, SECOND_ADDS, THIRD_ADDS, WAVE_STANDS_OUT,
 };
-use crate::physics::{Effect, Port};
+use crate::physics::Effect;
 
 /// Share of what is explained already that a first, second, third and fourth effect must add.
 const ADDS: [f64; 4] = [0.0, SECOND_ADDS, THIRD_ADDS, FOURTH_ADDS];
@@ -44,8 +44,8 @@ struct Search<'a> {
     retraced: usize,
     /// Whether the model stands by simulation: along a noisy motion its laws fall far short of themselves.
     felt: bool,
-    /// Whether only what turns with the disk is looked for any more.
-    disk_only: bool,
+    /// Whether only what has a period of its own is looked for any more.
+    own_period_only: bool,
 }
 
 /// What follows a step.
@@ -82,10 +82,10 @@ pub fn select(
         steps: Vec::new(),
         retraced: 0,
         felt: false,
-        disk_only: false,
+        own_period_only: false,
     };
     while search.has_room() && search.step(&mut progress) == Onward::Next {}
-    search.what_turns(&mut progress);
+    search.what_has_own_period(&mut progress);
     search.finished(given, calibration, &mut progress)
 }
 
@@ -94,12 +94,12 @@ impl Search<'_> {
         self.model.chosen.len() < self.settings.most
     }
 
-    /// What turns with the disk has a clock of its own: neither the form of the laws that were found nor their size stands in its way.
-    fn what_turns(&mut self, progress: &mut dyn FnMut(&str)) {
+    /// What has a period of its own is looked for once more: neither the form of the laws that were found nor their size stands in its way.
+    fn what_has_own_period(&mut self, progress: &mut dyn FnMut(&str)) {
         if self.model.chosen.is_empty() || !self.has_room() || !self.data.noise_known {
             return;
         }
-        self.disk_only = true;
+        self.own_period_only = true;
         let (steps, found) = (self.steps.len(), self.model.chosen.len());
         self.step(progress);
         if self.model.chosen.len() == found {
@@ -111,8 +111,8 @@ impl Search<'_> {
     fn step(&mut self, progress: &mut dyn FnMut(&str)) -> Onward {
         progress(&format!("scan of {} effects for finding {}", self.library.len(), self.model.chosen.len() + 1));
         let seen = if self.felt { felt_scan } else { scan };
-        let turns = |e: &&'static dyn Effect| !self.disk_only || e.facts().port == Port::Disk;
-        let library: Vec<&'static dyn Effect> = self.library.iter().copied().filter(turns).collect();
+        let looked_for = |e: &&'static dyn Effect| !self.own_period_only || has_own_period(*e);
+        let library: Vec<&'static dyn Effect> = self.library.iter().copied().filter(looked_for).collect();
         let mut step = seen(&self.data, &library, &self.model);
         self.try_each(&mut step, progress);
         let first = self.settings.by_simulation && self.model.chosen.is_empty();
@@ -182,7 +182,9 @@ impl Search<'_> {
         let share = if dragged && gain < BESIDE_DRAG * explained { REST_BESIDE_DRAG } else { settings.share };
         let asked = share * (model.excess() - 2.0 * model.sigma).max(0.0);
         let minor = ADDS.get(model.chosen.len()).copied().unwrap_or(0.0) * explained;
-        let enough = self.disk_only || gain > asked && gain > minor;
+        let wave = c.effect().is_wave_over_position();
+        let apart = self.own_period_only && (!wave || c.stands_out > WAVE_STANDS_OUT);
+        let enough = apart || gain > asked && gain > minor;
         (self.chance(c, gain) < settings.false_alarm.ln() && enough).then(|| next.clone())
     }
 
