@@ -7,8 +7,10 @@ use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, corrected};
 use crate::diagnose::fit::coupling::Decoupled;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::repeats_around::repeats_around;
 use crate::diagnose::fit::shock::{DetectedShock, beyond};
 use crate::diagnose::fit::simulation::{SimulatedModel, errors, rms};
+use crate::diagnose::free_form::estimation::may_fold;
 use crate::diagnose::noise::torque_noise::torque_noise;
 use crate::diagnose::search::select::select;
 use crate::diagnose::search::select_settings::SelectSettings;
@@ -21,7 +23,7 @@ use crate::diagnose::verdict::fit_report::{Errors, figures_of, fit_report};
 use crate::diagnose::verdict::held_out::{held_out, mean};
 use crate::diagnose::verdict::judgement::{ByOthers, judge};
 use crate::diagnose::verdict::log_checks::LogChecks;
-use crate::diagnose::verdict::missing_curve::{Standing, enter, stand_in};
+use crate::diagnose::verdict::missing_curve::{StandIn, Standing, enter, stand_in};
 use crate::diagnose::verdict::next_experiment::propose;
 use crate::diagnose::verdict::noise_finding::noise_findings;
 use crate::diagnose::verdict::observed_play::{observed_play, open_to_play};
@@ -59,6 +61,11 @@ impl Trial<'_> {
         // Curves and observers take whole records only: excerpts of very long ones end without.
         let whole = cut.iter().map(Run::len).eq(self.whole.iter().map(Run::len));
         if whole && open_to_play(&first.diagnosis) {
+            // A reading that folds turns round like a play; simulated, it leaves nothing.
+            let read = may_fold(&first.data).then(|| self.curve(&first, progress)).flatten();
+            if let Some(found) = read.filter(|found| found.finding.is_some()) {
+                return Ok(self.with_curve(first, open, found));
+            }
             progress("a play under an observer");
             let (data, iterations) = (&first.data, self.settings.select.iterations);
             let beside_laws = data.form.plant(&first.selection.last().refitted.p);
@@ -73,7 +80,10 @@ impl Trial<'_> {
         if settled(&first.diagnosis) || !whole {
             return Ok(first);
         }
-        Ok(self.with_curve(first, open, progress))
+        match self.curve(&first, progress) {
+            Some(found) => Ok(self.with_curve(first, open, found)),
+            None => Ok(first),
+        }
     }
 
     /// Offers another model where it simulates no record that was not used worse than the one that is offered.
@@ -96,25 +106,27 @@ impl Trial<'_> {
         made.corrected = model;
     }
 
-    /// The same with a curve in the place of the law that has no name, where one is worth it.
-    fn with_curve(&self, mut made: Diagnosed, mut open: Errors, progress: &mut dyn FnMut(&str)) -> Diagnosed {
+    /// A curve in the place of the law that has no name, where one is worth it.
+    fn curve(&self, made: &Diagnosed, progress: &mut dyn FnMut(&str)) -> Option<StandIn> {
         let floor = made.diagnosis.fit.holdout.unwrap_or(made.diagnosis.fit.fit).noise_floor;
         let standing = Standing { closed: self.closed, errors: &made.errors, floor };
-        if let Some(found) = stand_in(&made.data, &made.selection, &standing, progress) {
-            enter(&mut made.diagnosis, &found);
-            [made.errors[2], open[2]] = found.errors;
-            let every: Vec<&Run> = made.data.runs.iter().collect();
-            made.diagnosis.fit = figures_of(&made.data, &every, [&open, &made.errors], self.closed.is_some());
-            made.corrected = found.corrected;
-            propose(&mut made.diagnosis, &made.data, &made.selection);
-        }
+        stand_in(&made.data, &made.selection, &standing, progress)
+    }
+
+    /// The diagnosis with that curve.
+    fn with_curve(&self, mut made: Diagnosed, mut open: Errors, found: StandIn) -> Diagnosed {
+        enter(&mut made.diagnosis, &found);
+        [made.errors[2], open[2]] = found.errors;
+        let every: Vec<&Run> = made.data.runs.iter().collect();
+        made.diagnosis.fit = figures_of(&made.data, &every, [&open, &made.errors], self.closed.is_some());
+        made.corrected = found.corrected;
+        propose(&mut made.diagnosis, &made.data, &made.selection);
         made
     }
 
     /// One search and what it comes to, with the errors of all runs in open loop.
     fn made(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<(Diagnosed, Errors), DiagnoseError> {
         let mut remarks = self.remarks.to_vec();
-        let torque_noise = torque_noise(&data.repeats, &data.whitener, &data.form.given, data.scene.sample_time_s);
         // Records whose samples slipped hold nothing that a model could be fitted to.
         // A log that slipped or is in other units is no ground for the long way.
         let sound = self.log_checks.finding.is_none();
@@ -122,8 +134,12 @@ impl Trial<'_> {
         let (data, selection) = select(data, library(), &search_settings, &mut *progress);
         progress("simulating all records");
         let last = selection.last();
+        let plants = [data.form.given.clone(), data.form.plant(&selection.baseline.refitted.p), self.given.clone()];
+        let around = |p: Plant| repeats_around(&data, &p).map(|series| (p, series));
+        let around = plants.into_iter().map(around).collect::<Result<Vec<_>, _>>()?;
         // Where commands bend, repeats differ by more than a linear arm answers: no sign of a push.
-        let torque_noise = torque_noise.filter(|_| !last.chosen.iter().any(|c| c.effect().is_hard_nonlinearity()));
+        let torque_noise = torque_noise(&around, data.scene.sample_time_s)
+            .filter(|_| !last.chosen.iter().any(|c| c.effect().is_hard_nonlinearity()));
         remarks.extend(torque_noise.as_ref().map(|u| u.says(&self.given.command_unit)));
         // What the search found, whether or not it is offered.
         let fixed = corrected(&data.form, &last.refitted.p, &last.chosen, &data.scene);

@@ -14,6 +14,7 @@ pub(super) mod output_error_problem;
 pub(super) mod play_ground;
 mod quantisation;
 pub(super) mod regressors;
+pub(super) mod repeats_around;
 pub(super) mod selected_effect;
 pub(super) mod shock;
 pub(super) mod simulation;

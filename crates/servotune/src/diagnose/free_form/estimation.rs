@@ -10,6 +10,7 @@ use super::shape::Shape;
 use super::stretches::Stretches;
 use super::trial::Trial;
 use crate::diagnose::data::linear_form::body_numbers;
+use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::rules::{CURVE_CLEARLY, CURVE_LAG, FOLD_NAMED, SECOND_CURVE};
 use crate::lti::Plant;
@@ -186,15 +187,25 @@ fn other_gains(data: &DiagnosisData, starts: &[Vec<f64>]) -> Vec<Vec<f64>> {
     starts.iter().flat_map(|p| [0.0, 1.5 * LN_2].map(|by| moved(p, by))).collect()
 }
 
-/// Readings that fold or end at limits, each fitted from several starts.
-fn readings<'a>(data: &'a DiagnosisData, stretches: &'a Stretches, starts: &[Vec<f64>]) -> Vec<Foretelling<'a>> {
-    let mut all: Vec<f64> = stretches.runs.iter().flat_map(|r| r.position.iter().copied()).collect();
+/// Where the lower and the upper end of some readings lie, and whether each is an edge; none without readings.
+fn ends(runs: &[Run]) -> Option<[(f64, bool); 2]> {
+    let mut all: Vec<f64> = runs.iter().flat_map(|r| r.position.iter().copied()).collect();
     all.sort_by(f64::total_cmp);
     let at = |share: f64| all.get((share * all.len() as f64) as usize).copied().unwrap_or(0.0);
     let (low, high) = (at(LOWEST), at(1.0 - LOWEST));
-    let (Some(least), Some(most)) = (all.first(), all.last()) else { return Vec::new() };
+    let (least, most) = (all.first()?, all.last()?);
     let edge = EDGE * (most - least);
-    let [below, above] = [low - least < edge, most - high < edge];
+    Some([(low, low - least < edge), (high, most - high < edge)])
+}
+
+/// Whether the readings end below as if the sensor folded there.
+pub(in crate::diagnose) fn may_fold(data: &DiagnosisData) -> bool {
+    ends(&data.runs).is_some_and(|[(_, below), _]| below)
+}
+
+/// Readings that fold or end at limits, each fitted from several starts.
+fn readings<'a>(data: &'a DiagnosisData, stretches: &'a Stretches, starts: &[Vec<f64>]) -> Vec<Foretelling<'a>> {
+    let Some([(low, below), (high, above)]) = ends(&stretches.runs) else { return Vec::new() };
     let fitted = |starts: &[Vec<f64>], reading: Shape| {
         // A lag in front changes the whole motion: it is no afterthought here.
         let lags = [None, Some(LAG * data.scene.sample_time_s)];

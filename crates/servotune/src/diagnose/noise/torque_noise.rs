@@ -4,10 +4,9 @@
 //! torque does; a sensor's noise, white, coloured from sample to sample or with a floor of low frequencies, has no such shape. Both are
 //! fitted by Whittle's likelihood (Whittle 1953), and the torque is spoken of only where it is far ahead.
 
-use super::whitening::{Periodogram, Whitener};
-use crate::diagnose::data::linear_form::body_numbers;
+use super::whitening::Periodogram;
 use crate::diagnose::rules::{CORNERS_TOLD, TORQUE_NOISE_AHEAD, TORQUE_NOISE_LOUD};
-use crate::lti::Plant;
+use crate::lti::{FrequencyResponse, Plant};
 use std::f64::consts::TAU;
 
 /// Corners that are tried, and colours of the sensor's noise from sample to sample.
@@ -105,34 +104,26 @@ impl TorqueNoise {
     }
 }
 
-/// Torque noise, where whitened differences of repeats show it clearly.
-pub(in crate::diagnose) fn torque_noise(
-    repeats: &[(usize, Vec<f64>)],
-    whitener: &Whitener,
-    given: &Plant,
-    sample_time_s: f64,
-) -> Option<TorqueNoise> {
-    if repeats.is_empty() {
-        return None;
-    }
-    let t = sample_time_s;
-    let raw = repeats.iter().map(|(_, white)| {
-        let mut x = white.clone();
-        whitener.colour(&mut x);
-        x
-    });
-    let p = Periodogram::of(&raw.collect::<Vec<_>>(), t);
-    let (b, k, c) = body_numbers(&given.body);
-    let modes: f64 = given.modes.iter().map(|m| (m.zero_rad_s / m.pole_rad_s).powi(2)).product();
-    let b = b * given.resonance_gain * modes;
-    let through = |w: f64| b * b / ((k - w * w).powi(2) + (c * w).powi(2));
+/// Torque noise, where what repeats differ by shows it clearly; `around` holds those series for each of some plants. The plant that leaves the
+/// likeliest series is the one through which the torque is seen (Ljung 1999, section 7.4).
+pub(in crate::diagnose) fn torque_noise(around: &[(Plant, Vec<Vec<f64>>)], sample_time_s: f64) -> Option<TorqueNoise> {
+    let seen = around.iter().filter(|(_, series)| !series.is_empty());
+    let all: Vec<(f64, Option<TorqueNoise>)> = seen.filter_map(|(plant, s)| through(plant, s, sample_time_s)).collect();
+    all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?.1
+}
+
+/// The cost of what repeats differ by around one plant, and the torque noise that it shows clearly.
+fn through(plant: &Plant, series: &[Vec<f64>], t: f64) -> Option<(f64, Option<TorqueNoise>)> {
+    let p = Periodogram::of(series, t);
+    let through = |w: f64| plant.at(w).norm_sqr();
     let nyquist = 0.5 / t;
     let coarse: Vec<f64> = (0..CORNERS).map(|i| 3.0 * (nyquist / 6.0).powf(i as f64 / (CORNERS - 1) as f64)).collect();
     let torque = mixture(&p, t, &through, &coarse)?;
     let sensor = mixture(&p, t, &|_| 1.0, &coarse)?;
     let ahead = sensor.cost - torque.cost;
+    let cost = torque.cost.min(sensor.cost);
     if !(ahead > TORQUE_NOISE_AHEAD && torque.ratio > TORQUE_NOISE_LOUD) {
-        return None;
+        return Some((cost, None));
     }
     // Between two corners of the grid, and as far as the spectrum cannot tell.
     let fine: Vec<Mixture> = (-FINE..=FINE)
@@ -144,13 +135,14 @@ pub(in crate::diagnose) fn torque_noise(
     // Neighbours that were not tried may be as good.
     let corners_hz = [low * (-STEP).exp(), high * STEP.exp()];
     let bins: f64 = p.w_rad_s.iter().zip(&p.count).filter(|(w, _)| **w < TAU * 3.0 * best.corner_hz).map(|b| b.1).sum();
-    Some(TorqueNoise {
+    let found = TorqueNoise {
         rms_command: best.parts[1].sqrt(),
         corner_hz: best.corner_hz,
         corners_hz,
         spread: 0.5 / bins.max(1.0).sqrt(),
         ahead,
-    })
+    };
+    Some((cost, Some(found)))
 }
 
 /// Corners on either side of the best of the grid, and how far apart in the logarithm.

@@ -31,6 +31,9 @@ rules! {
     DRY_LENGTH: f64 = 12.0, "noise",
         "sliding length over the sensor's noise below which friction counts as dry",
         "a shorter one is not resolved";
+    LEFT_IN_NUMBERS: f64 = 0.5, "share",
+        "of what is left beyond the noise over what a law took, in amplitude: by how much its numbers may be off for it",
+        "a fit leaves what its law's numbers cannot take; a machine of another form may hide half as much in them";
     ORDER_BESIDE: f64 = 0.2, "share",
         "size over the largest order's below which other orders do not count",
         "judgement";
@@ -76,6 +79,12 @@ rules! {
     LOOP_EXPLAINS: f64 = 0.99, "share",
         "that share",
         "judgement";
+    LOOP_LEFT_TWICE: f64 = 2.0, "noise",
+        "the same error from which no name stands that explains less than a smaller share",
+        "what is named must be the larger part";
+    LOOP_EXPLAINS_HALF: f64 = 0.5, "share",
+        "that share",
+        "the larger part is more than half";
     HELD_OUT_DOWN: f64 = 1.05, "noise",
         "error over the noise floor that is down to it",
         "judgement: the floor errs by some per cent";

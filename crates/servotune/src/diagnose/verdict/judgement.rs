@@ -14,8 +14,8 @@ use crate::diagnose::fit::simulation::Simulation;
 use crate::diagnose::rules::{
     BELOW_NOISE, BOOTSTRAP_CHANCE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, DECISIVE_LEFT, DECISIVE_RIVAL,
     DECISIVE_SHARE, GIVEN_FAR, HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER,
-    LOOP_EXPLAINS, LOOP_LEFT, NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE,
-    WIND_LEFT,
+    LOOP_EXPLAINS, LOOP_EXPLAINS_HALF, LOOP_LEFT, LOOP_LEFT_TWICE, NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO,
+    RESTLESS_SIGMA, SEEN_CHANCE, WIND_LEFT,
 };
 use crate::diagnose::search::selection::Selection;
 use crate::diagnose::search::shortlist::same_drag;
@@ -244,9 +244,12 @@ fn far_from_noise(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection
     d.findings = vec![unexplained(data, selection, figures.explained_share.clamp(0.0, 1.0))];
 }
 
-/// Whether these figures, of records in closed loop, leave several times the noise and much of what the given plant leaves.
+/// Whether these figures, of records in closed loop, leave several times the noise and much of what the given plant leaves, or twice the noise and
+/// half of that.
 fn loop_left(d: &Diagnosis, figures: FitFigures) -> bool {
-    let far = figures.rms_after > LOOP_LEFT * figures.noise_floor && figures.explained_share < LOOP_EXPLAINS;
+    let leaves =
+        |noise: f64, share: f64| figures.rms_after > noise * figures.noise_floor && figures.explained_share < share;
+    let far = leaves(LOOP_LEFT, LOOP_EXPLAINS) || leaves(LOOP_LEFT_TWICE, LOOP_EXPLAINS_HALF);
     d.fit.simulation == Simulation::ClosedLoop && far
 }
 

@@ -10,7 +10,7 @@ use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::noise::lines::mains;
 use crate::diagnose::rules::{
-    DRY_LENGTH, MAINS_ORDER, ORDER_BESIDE, SLIGHT, SLIGHT_CONFOUNDED, SLIGHT_NEAR_NOISE, SLIGHT_SHARE,
+    DRY_LENGTH, LEFT_IN_NUMBERS, MAINS_ORDER, ORDER_BESIDE, SLIGHT, SLIGHT_CONFOUNDED, SLIGHT_NEAR_NOISE, SLIGHT_SHARE,
 };
 use crate::diagnose::search::rival_model::{Rival, family_width};
 use crate::diagnose::search::selection::Selection;
@@ -174,13 +174,16 @@ fn single_order(setting: &Setting) -> Option<f64> {
 }
 
 /// Parameters of the chosen effect `at` with 95 % intervals: its numbers moved together along each direction that errs independently,
-/// the changes of each parameter added as squares; widened where the model leaves more than noise, and by what no machine follows a law to.
+/// the changes of each parameter added as squares; widened where the model leaves more than noise, by what no machine follows a law to, and by
+/// what is left beyond the noise over what the law took, in amplitude: it may be the law's own.
 fn estimates(data: &DiagnosisData, selection: &Selection, at: usize) -> BTreeMap<String, Estimate> {
     let model = selection.last();
     let scene = &data.scene;
     let chosen = &model.chosen[at];
     let base = chosen.setting.parameters(scene);
     let widen = (model.cost / model.freedom).max(1.0).sqrt() * 1.96;
+    let left = (model.excess() - 2.0 * model.sigma).max(0.0);
+    let left = (left / selection.gain(at).max(f64::MIN_POSITIVE)).sqrt().min(1.0);
     let strengths_of = |c: &SelectedEffect| if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
     let moving = |c: &SelectedEffect| c.continuous.iter().filter(|c| **c).count();
     let (before, all) = (&model.chosen[..at], &model.chosen);
@@ -213,7 +216,11 @@ fn estimates(data: &DiagnosisData, selection: &Selection, at: usize) -> BTreeMap
         .map(|(k, p)| {
             let off = moved.iter().map(|m| m.get(k).map_or(0.0, |q| (q.value - p.value).powi(2))).sum::<f64>();
             let exact = nudged.get(k).is_none_or(|q| q.value == p.value);
-            let form = if exact { 0.0 } else { chosen.setting.law.form_uncertainty(p.name) * p.value };
+            let form = if exact {
+                0.0
+            } else {
+                chosen.setting.law.form_uncertainty(p.name).hypot(LEFT_IN_NUMBERS * left) * p.value
+            };
             let off = off.sqrt().hypot(form);
             // Numbers of a law are above 0: lengths, times, frequencies, damping.
             let own = by_strength.get(k).is_some_and(|q| q.value == p.value);
