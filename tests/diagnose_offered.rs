@@ -105,9 +105,8 @@ fn noise_above_the_stated_level_is_a_finding_and_at_it_none() {
     assert!(rms.low < NOISE && NOISE < rms.high, "{rms:?}");
 }
 
-#[test]
-fn wind_that_is_most_of_the_error_is_a_finding_with_level_and_corner() {
-    let (level, corner) = (0.004, 150.0);
+/// Records of the machine in a wind of this level and corner (Hz).
+fn in_wind(level: f64, corner: f64) -> Vec<(RecordEntry, Record)> {
     let mut blown = Vec::new();
     for (i, (entry, r)) in records(&GIVEN).into_iter().enumerate() {
         let mut random = Random::new(900 + i as u64);
@@ -129,11 +128,29 @@ fn wind_that_is_most_of_the_error_is_a_finding_with_level_and_corner() {
         let position = respond_to(&GIVEN, &acting, 950 + i as u64);
         blown.push((entry, Record { position, ..r }));
     }
-    let d = of(blown, &plant(), NominalNoise::default());
+    blown
+}
+
+#[test]
+fn wind_that_is_most_of_the_error_is_a_finding_with_level_and_corner() {
+    let (level, corner) = (0.004, 150.0);
+    let d = of(in_wind(level, corner), &plant(), NominalNoise::default());
     assert_eq!(d.verdict, Verdict::Named, "{:?} {:?}", d.findings, d.remarks);
     assert_eq!((d.findings.len(), d.findings[0].effect.as_str()), (1, "broadband_disturbance"));
     let p = &d.findings[0].parameters;
     // Four differences of 0.2 s each: some 200 independent bins below the corner.
     assert!((p["rms_command"].value / level - 1.0).abs() < 0.15, "{p:?}");
     assert!((p["corner_hz"].value / corner).ln().abs() < 0.4, "{p:?}");
+}
+
+#[test]
+fn the_level_of_wind_is_read_through_the_plant_that_fits_and_not_through_one_that_is_off() {
+    let (level, corner) = (0.004, 150.0);
+    let (b, k, c) = (2.0 * GIVEN.b, 3.0 * GIVEN.k, GIVEN.c);
+    let body =
+        Body::SecondOrder { dc_gain: b / k, natural_frequency_rad_s: k.sqrt(), damping_ratio: 0.5 * c / k.sqrt() };
+    let d = of(in_wind(level, corner), &Plant { body, ..plant() }, NominalNoise::default());
+    let wind = d.findings.iter().find(|f| f.effect == "broadband_disturbance");
+    let p = &wind.unwrap_or_else(|| panic!("{:?} {:?}", d.findings, d.remarks)).parameters;
+    assert!((p["rms_command"].value / level - 1.0).abs() < 0.15, "{p:?}");
 }

@@ -293,14 +293,18 @@ fn what_an_effect_reports_it_takes_back() {
     let scene = restored(&plant, &[]).scene;
     let scene = servotune::physics::Scene { spindle_hz: Some(120.0), duration_s: 0.5, ..scene };
     for effect in servotune::physics::library() {
-        let Some(law) = effect.grid(&scene).into_iter().next() else { continue };
-        let strengths =
-            if effect.facts().fixed { vec![1.0; effect.facts().columns] } else { vec![0.1; effect.facts().columns] };
-        let setting = servotune::physics::Setting { law, strengths };
-        let parameters: Vec<(&str, f64)> = setting.parameters(&scene).iter().map(|p| (p.name, p.value)).collect();
-        let with = Plant { physics: vec![entry(effect.facts().name, &parameters)], ..plant.clone() };
-        let context = Context { spindle_hz: Some(120.0), duration_s: 0.5, ..Context::default() };
-        let r = Restored::of(&with, &context);
-        assert!(r.is_ok(), "{}: {:?}", effect.facts().name, r.err());
+        // The plainest form, and the fullest of most laws.
+        let grid = effect.grid(&scene);
+        for law in grid.first().into_iter().chain(grid.last()) {
+            let columns = effect.facts().columns;
+            let of = |s: f64| servotune::physics::Setting { law: law.clone(), strengths: vec![s; columns] };
+            let whole = effect.facts().fixed && of(1.0).is_possible(&[]);
+            let setting = of(if whole { 1.0 } else { 0.1 });
+            let parameters: Vec<(&str, f64)> = setting.parameters(&scene).iter().map(|p| (p.name, p.value)).collect();
+            let with = Plant { physics: vec![entry(effect.facts().name, &parameters)], ..plant.clone() };
+            let context = Context { spindle_hz: Some(120.0), duration_s: 0.5, ..Context::default() };
+            let r = Restored::of(&with, &context);
+            assert!(r.is_ok(), "{}: {:?}", effect.facts().name, r.err());
+        }
     }
 }
