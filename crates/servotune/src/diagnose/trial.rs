@@ -58,29 +58,31 @@ impl Trial<'_> {
     pub fn best(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
         let cut = data.runs.clone();
         let (mut first, open) = self.made(data, progress)?;
-        // Curves and observers take whole records only: excerpts of very long ones end without.
-        let whole = cut.iter().map(Run::len).eq(self.whole.iter().map(Run::len));
-        if whole && open_to_play(&first.diagnosis) {
+        if settled(&first.diagnosis) && !open_to_play(&first.diagnosis) {
+            return Ok(first);
+        }
+        // The search may have been made on excerpts: so are observers and curves; what they come to is judged on the whole.
+        let searched = DiagnosisData { runs: cut, ..first.data.clone() };
+        if open_to_play(&first.diagnosis) {
             // A reading that folds turns round like a play; simulated, it leaves nothing.
-            let read = may_fold(&first.data).then(|| self.curve(&first, progress)).flatten();
+            let read = may_fold(&searched).then(|| self.curve(&first, &searched, progress)).flatten();
             if let Some(found) = read.filter(|found| found.finding.is_some()) {
                 return Ok(self.with_curve(first, open, found));
             }
             progress("a play under an observer");
-            let (data, iterations) = (&first.data, self.settings.select.iterations);
-            let beside_laws = data.form.plant(&first.selection.last().refitted.p);
-            let plants = [self.given.clone(), first.refitted.clone(), data.form.given.clone(), beside_laws];
-            if let Some(play) = observed_play(data, &plants, iterations) {
+            let beside_laws = searched.form.plant(&first.selection.last().refitted.p);
+            let plants = [self.given.clone(), first.refitted.clone(), searched.form.given.clone(), beside_laws];
+            if let Some(play) = observed_play(&searched, &plants, self.settings.select.iterations) {
                 play.enter(&mut first.diagnosis);
                 self.offer(&mut first, open, play.corrected);
                 propose(&mut first.diagnosis, &first.data, &first.selection);
                 return Ok(first);
             }
         }
-        if settled(&first.diagnosis) || !whole {
+        if settled(&first.diagnosis) {
             return Ok(first);
         }
-        match self.curve(&first, progress) {
+        match self.curve(&first, &searched, progress) {
             Some(found) => Ok(self.with_curve(first, open, found)),
             None => Ok(first),
         }
@@ -107,10 +109,10 @@ impl Trial<'_> {
     }
 
     /// A curve in the place of the law that has no name, where one is worth it.
-    fn curve(&self, made: &Diagnosed, progress: &mut dyn FnMut(&str)) -> Option<StandIn> {
+    fn curve(&self, made: &Diagnosed, searched: &DiagnosisData, progress: &mut dyn FnMut(&str)) -> Option<StandIn> {
         let floor = made.diagnosis.fit.holdout.unwrap_or(made.diagnosis.fit.fit).noise_floor;
         let standing = Standing { closed: self.closed, errors: &made.errors, floor };
-        stand_in(&made.data, &made.selection, &standing, progress)
+        stand_in([searched, &made.data], &made.selection, &standing, progress)
     }
 
     /// The diagnosis with that curve.

@@ -51,9 +51,9 @@ pub(in crate::diagnose) struct Standing<'a> {
 }
 
 /// Looks for a curve and takes it where it is worth it: on whole records, then on short pieces of them, for a law under which simulations of
-/// whole records part.
+/// whole records part. It is estimated on the ground of the search, which may be of excerpts, and judged on the same with whole runs.
 pub(in crate::diagnose) fn stand_in(
-    data: &DiagnosisData,
+    [data, whole]: [&DiagnosisData; 2],
     selection: &Selection,
     standing: &Standing,
     progress: &mut dyn FnMut(&str),
@@ -62,7 +62,7 @@ pub(in crate::diagnose) fn stand_in(
     let (starts, balanced) = (starts(data, selection), balanced(data));
     let on = |ground: &Stretches, sensor: Option<&Stretches>, progress: &mut dyn FnMut(&str)| {
         let found = estimated(data, (ground, sensor), &starts, &balanced, progress)?;
-        stands(data, &found, &one_place, standing)
+        stands(whole, &found, &one_place, standing)
     };
     on(&ground, Some(&one_place), progress).or_else(|| {
         progress("a curve without a name, on short pieces of the records");
