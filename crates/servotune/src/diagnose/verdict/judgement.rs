@@ -125,12 +125,19 @@ impl<'a> Evidence<'a> {
         let below = selection.baseline.cost < BELOW_NOISE * selection.baseline.freedom;
         let rounded = below && d.holdout_whitened.is_some_and(|[refit, after]| after >= refit);
         let told = !rounded
+            && !self.rounding(d)
             && (explained >= NAMED_SHARE || self.clean || decisive)
             && !several
             && beside.is_none()
             && !mixture;
-        let left = d.fit.holdout.is_some_and(|h| loop_left(d, h));
+        let left = d.fit.holdout.is_some_and(|h| loop_left(d, h) || less_than_half(d, h));
         told && !left && self.holds && self.against.is_none() && denied.is_none()
+    }
+
+    /// Whether the encoder's rounding is what the laws were fitted to: they take nothing of records that were not used.
+    fn rounding(&self, d: &Diagnosis) -> bool {
+        let near = |h: FitFigures| h.rms_refit_linear < HELD_OUT_HOLDS * h.noise_floor;
+        self.data.coarse() && d.fit.holdout.is_some_and(|h| near(h) && h.rms_after >= h.rms_refit_linear)
     }
 
     /// The findings of the search by name.
@@ -199,7 +206,7 @@ pub(in crate::diagnose) fn judge(
         d.remarks.extend(reported.withdrawn.clone());
         if evidence.names(d) {
             evidence.named(d);
-        } else if selection.baseline.excess_sigma() < CLEAN {
+        } else if selection.baseline.excess_sigma() < CLEAN || evidence.rounding(d) {
             // Nothing is there to be named, and nothing to be said of it.
             d.remarks.truncate(said);
         } else if d.findings.is_empty() {
@@ -244,12 +251,18 @@ fn far_from_noise(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection
     d.findings = vec![unexplained(data, selection, figures.explained_share.clamp(0.0, 1.0))];
 }
 
-/// Whether these figures, of records in closed loop, leave several times the noise and much of what the given plant leaves, or twice the noise and
-/// half of that.
+/// Whether these figures, of records in closed loop, leave several times the noise and much of what the given plant leaves.
 fn loop_left(d: &Diagnosis, figures: FitFigures) -> bool {
-    let leaves =
-        |noise: f64, share: f64| figures.rms_after > noise * figures.noise_floor && figures.explained_share < share;
-    let far = leaves(LOOP_LEFT, LOOP_EXPLAINS) || leaves(LOOP_LEFT_TWICE, LOOP_EXPLAINS_HALF);
+    leaves(d, figures, LOOP_LEFT, LOOP_EXPLAINS)
+}
+
+/// Whether they leave twice the noise and more than half of what the given plant leaves.
+fn less_than_half(d: &Diagnosis, figures: FitFigures) -> bool {
+    leaves(d, figures, LOOP_LEFT_TWICE, LOOP_EXPLAINS_HALF)
+}
+
+fn leaves(d: &Diagnosis, figures: FitFigures, noise: f64, share: f64) -> bool {
+    let far = figures.rms_after > noise * figures.noise_floor && figures.explained_share < share;
     d.fit.simulation == Simulation::ClosedLoop && far
 }
 
