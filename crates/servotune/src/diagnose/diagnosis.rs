@@ -35,18 +35,7 @@ pub fn diagnose(
     let mut pace = Pace::new();
     let mut progress = |step: &str| say(&pace.says(step));
     let sample_time_s = case.records[0].1.sample_time_s;
-    if let Some(c) = controller
-        && (c.sample_time_s - sample_time_s).abs() > 1e-3 * sample_time_s
-    {
-        return Err(DiagnoseError::SampleTime { controller_s: c.sample_time_s, records_s: sample_time_s });
-    }
-    if let Some(entry) = given.physics.first() {
-        return Err(DiagnoseError::Physics { effect: entry.effect.clone() });
-    }
-    let given = &given.paired();
-    if let Body::Rational(r) = &given.body {
-        return Err(DiagnoseError::Body { poles: r.poles.len() });
-    }
+    let given = &usable(given, controller, sample_time_s)?;
     let mut all = runs(case);
     driven(&all, case)?;
     // Digits of the printed clock do not matter once a controller says what the sample time is.
@@ -105,6 +94,24 @@ pub fn diagnose(
         remarks: &remarks,
     };
     trial.best(data, &mut progress)
+}
+
+/// The given plant with its resonances in pairs; refused where it holds physics already or no body that laws act on, or the controller runs at
+/// another rate.
+fn usable(given: &Plant, controller: Option<&Controller>, sample_time_s: f64) -> Result<Plant, DiagnoseError> {
+    if let Some(c) = controller
+        && (c.sample_time_s - sample_time_s).abs() > 1e-3 * sample_time_s
+    {
+        return Err(DiagnoseError::SampleTime { controller_s: c.sample_time_s, records_s: sample_time_s });
+    }
+    if let Some(entry) = given.physics.first() {
+        return Err(DiagnoseError::Physics { effect: entry.effect.clone() });
+    }
+    let given = given.paired();
+    match &given.body {
+        Body::Rational(r) => Err(DiagnoseError::Body { poles: r.poles.len() }),
+        _ => Ok(given),
+    }
 }
 
 /// Refuses runs that are not driven, and such whose further inputs are not those of the case.
