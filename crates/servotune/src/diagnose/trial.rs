@@ -58,34 +58,36 @@ impl Trial<'_> {
     pub fn best(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
         let cut = data.runs.clone();
         let (mut first, open) = self.made(data, progress)?;
-        if settled(&first.diagnosis) && !open_to_play(&first.diagnosis) {
+        if !open_to_play(&first.diagnosis) {
             return Ok(first);
         }
         // The search may have been made on excerpts: so are observers and curves; what they come to is judged on the whole.
         let searched = DiagnosisData { runs: cut, ..first.data.clone() };
-        if open_to_play(&first.diagnosis) {
-            // A reading that folds turns round like a play; simulated, it leaves nothing.
-            let read = may_fold(&searched).then(|| self.curve(&first, &searched, progress)).flatten();
-            if let Some(found) = read.filter(|found| found.finding.is_some()) {
-                return Ok(self.with_curve(first, open, found));
-            }
-            progress("a play under an observer");
-            let beside_laws = searched.form.plant(&first.selection.last().refitted.p);
-            let plants = [self.given.clone(), first.refitted.clone(), searched.form.given.clone(), beside_laws];
-            if let Some(play) = observed_play(&searched, &plants, self.settings.select.iterations) {
-                play.enter(&mut first.diagnosis);
-                self.offer(&mut first, open, play.corrected);
-                propose(&mut first.diagnosis, &first.data, &first.selection);
-                return Ok(first);
-            }
+        // A reading that folds turns round like a play; simulated, it leaves nothing.
+        let folds = may_fold(&searched);
+        let mut curve = if folds { self.curve(&first, &searched, progress) } else { None };
+        if let Some(found) = curve.take_if(|found| found.finding.is_some()) {
+            return Ok(self.with_curve(first, open, found));
+        }
+        progress("a play under an observer");
+        let beside_laws = searched.form.plant(&first.selection.last().refitted.p);
+        let plants = [self.given.clone(), first.refitted.clone(), searched.form.given.clone(), beside_laws];
+        if let Some(play) = observed_play(&searched, &plants, self.settings.select.iterations) {
+            play.enter(&mut first.diagnosis);
+            self.offer(&mut first, open, play.corrected);
+            propose(&mut first.diagnosis, &first.data, &first.selection);
+            return Ok(first);
         }
         if settled(&first.diagnosis) {
             return Ok(first);
         }
-        match self.curve(&first, &searched, progress) {
-            Some(found) => Ok(self.with_curve(first, open, found)),
-            None => Ok(first),
+        if !folds {
+            curve = self.curve(&first, &searched, progress);
         }
+        Ok(match curve {
+            Some(found) => self.with_curve(first, open, found),
+            None => first,
+        })
     }
 
     /// Offers another model where it simulates no record that was not used worse than the one that is offered.
@@ -137,8 +139,7 @@ impl Trial<'_> {
         progress("simulating all records");
         let last = selection.last();
         let plants = [data.form.given.clone(), data.form.plant(&selection.baseline.refitted.p), self.given.clone()];
-        let around = |p: Plant| repeats_around(&data, &p).map(|series| (p, series));
-        let around = plants.into_iter().map(around).collect::<Result<Vec<_>, _>>()?;
+        let around = repeats_around(&data, plants)?;
         // Where commands bend, repeats differ by more than a linear arm answers: no sign of a push.
         let torque_noise = torque_noise(&around, data.scene.sample_time_s)
             .filter(|_| !last.chosen.iter().any(|c| c.effect().is_hard_nonlinearity()));

@@ -91,7 +91,7 @@ impl Parametric for CurrentSaturation {
     }
 
     fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
-        Box::new(Clip { limit: self.limit, knee: self.knee.unwrap_or(0.0).min(WIDEST) })
+        Box::new(Clip { limit: self.limit, knee: self.knee.unwrap_or(0.0) })
     }
 
     fn is_hard_nonlinearity() -> bool {

@@ -1,6 +1,6 @@
 //! Everything that a diagnosis works on, made in order: given plant, noise, filter, refit, motion.
 
-use super::equation_error_fit::simulation_error;
+use super::equation_error_fit::{linear_error, simulation_error};
 use super::fit_inputs::Fit;
 use super::model::Model;
 use super::regressors::{Drive, drive, raw_columns};
@@ -104,12 +104,9 @@ impl DiagnosisData {
         let p = vec![0.0; form.free_parameters.len()];
         let nominal = form.nominal(&p);
         let sampled = Sampled::of(&nominal.plant, sample_time_s)?;
-        // Repeats differ by noise only, so that the linear answer to the difference of their commands is all that counts.
-        let plain = NominalModel { spring: 0.0, damper: 0.0, ..nominal.clone() };
-        let still = Trajectory { samples: Vec::new(), unexplained: Vec::new(), repeats: Vec::new() };
         let free = |n: usize| free_motions(&given.body, sample_time_s, n).to_vec();
         let mut errors: Vec<(usize, Vec<f64>)> =
-            (fit_runs.iter()).map(|&r| (r, simulation_error(&sampled, &plain, &[], &runs[r], &still, 0))).collect();
+            fit_runs.iter().map(|&r| (r, linear_error(&sampled, &nominal, &runs[r]))).collect();
         let body = &nominal.plant.body;
         let white = |errors: &[(usize, Vec<f64>)]| {
             let series = noise_series(&in_laps(errors, &runs), &runs);

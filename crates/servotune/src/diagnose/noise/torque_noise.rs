@@ -104,18 +104,24 @@ impl TorqueNoise {
     }
 }
 
-/// Torque noise, where what repeats differ by shows it clearly; `around` holds those series for each of some plants. The plant that leaves the
-/// likeliest series is the one through which the torque is seen (Ljung 1999, section 7.4).
-pub(in crate::diagnose) fn torque_noise(around: &[(Plant, Vec<Vec<f64>>)], sample_time_s: f64) -> Option<TorqueNoise> {
-    let seen = around.iter().filter(|(_, series)| !series.is_empty());
-    let all: Vec<(f64, Option<TorqueNoise>)> = seen.filter_map(|(plant, s)| through(plant, s, sample_time_s)).collect();
-    all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?.1
+/// What repeats differ by around one plant.
+pub(in crate::diagnose) struct Differences {
+    pub plant: Plant,
+    /// A series (position_unit) for each repeat.
+    pub series: Vec<Vec<f64>>,
+}
+
+/// Torque noise, where what repeats differ by shows it clearly. The plant that leaves the likeliest differences is the one through which the torque
+/// is seen (Ljung 1999, section 7.4).
+pub(in crate::diagnose) fn torque_noise(around: &[Differences], sample_time_s: f64) -> Option<TorqueNoise> {
+    let all = around.iter().filter_map(|d| through(d, sample_time_s));
+    all.min_by(|a, b| a.0.total_cmp(&b.0))?.1
 }
 
 /// The cost of what repeats differ by around one plant, and the torque noise that it shows clearly.
-fn through(plant: &Plant, series: &[Vec<f64>], t: f64) -> Option<(f64, Option<TorqueNoise>)> {
-    let p = Periodogram::of(series, t);
-    let through = |w: f64| plant.at(w).norm_sqr();
+fn through(around: &Differences, t: f64) -> Option<(f64, Option<TorqueNoise>)> {
+    let p = Periodogram::of(&around.series, t);
+    let through = |w: f64| around.plant.at(w).norm_sqr();
     let nyquist = 0.5 / t;
     let coarse: Vec<f64> = (0..CORNERS).map(|i| 3.0 * (nyquist / 6.0).powf(i as f64 / (CORNERS - 1) as f64)).collect();
     let torque = mixture(&p, t, &through, &coarse)?;
