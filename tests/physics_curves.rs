@@ -41,6 +41,20 @@ fn curve(port: &str, argument: &str, from: f64, to: f64, f: impl Fn(f64) -> f64)
     )
 }
 
+/// A torque over position and velocity with many knots of a function.
+fn surface(reach: [f64; 2], f: impl Fn(f64, f64) -> f64) -> String {
+    let place = |k: i32, reach: f64| reach * (f64::from(k) / 40.0 - 1.0);
+    let knot = |i: i32, j: i32| {
+        let (at, velocity) = (place(i, reach[0]), place(j, reach[1]));
+        format!("{{at = {at}, velocity = {velocity}, value = {}}}", f(at, velocity))
+    };
+    let knots: Vec<String> = (0..=80).flat_map(|i| (0..=80).map(move |j| (i, j))).map(|(i, j)| knot(i, j)).collect();
+    format!(
+        "effect = \"free_form\"\nport = \"torque\"\nargument = \"position_and_velocity\"\nunit = \"A\"\nknots = [{}]\n",
+        knots.join(", ")
+    )
+}
+
 #[test]
 fn a_curve_survives_the_way_to_the_file_and_back() {
     let text = "effect = \"free_form\"\nport = \"torque\"\nargument = \"velocity\"\nunit = \"A\"\nknots = [{at = -1.0, value = 0.5, low = 0.4, high = 0.6}, {at = 2.0, value = -0.5}]\n\
@@ -51,6 +65,9 @@ fn a_curve_survives_the_way_to_the_file_and_back() {
     assert_eq!(plant, again);
     let knots = &again.physics[0].curve.as_ref().unwrap().knots;
     assert_eq!((knots[0].low, knots[1].high), (Some(0.4), None));
+    let plant = read(&surface([2.0, 30.0], |x, v| x * v)).unwrap();
+    let written = toml::to_string(&PlantFile::from(&plant)).unwrap();
+    assert_eq!(plant, Plant::try_from(parse_toml::<PlantFile>(Path::new("p"), &written).unwrap()).unwrap());
 }
 
 #[test]
@@ -72,6 +89,19 @@ fn what_makes_no_curve_is_refused_by_name() {
         (
             format!("effect = \"dead_band\"\nport = \"torque\"\nargument = \"position\"\nunit = \"A\"\n{knots}"),
             "dead_band",
+        ),
+        (form(&format!("port = \"torque\"\nargument = \"position_and_velocity\"\n{knots}")), "no velocity"),
+        (
+            form(
+                "port = \"torque\"\nargument = \"position_and_velocity\"\nknots = [{at = 0.0, velocity = 0.0, value = 0.0}, {at = 0.0, velocity = 1.0, value = 1.0}, {at = 1.0, velocity = 0.0, value = 2.0}]\n",
+            ),
+            "grid",
+        ),
+        (
+            form(
+                "port = \"torque\"\nargument = \"position\"\nknots = [{at = 0.0, value = 0.0}, {at = 1.0, velocity = 1.0, value = 1.0}]\n",
+            ),
+            "found a velocity",
         ),
         (
             form(&format!(
@@ -116,10 +146,12 @@ fn the_machine_with_a_curve_agrees_with_an_independent_simulation() {
     let drag = |v: f64| -0.05 * (v / 2e3).tanh() - 1e-9 * v * v.abs();
     let bent = |u: f64| u + 0.3 * u * u;
     let even = |x: f64| 1.0 - 1e-4 * x * x;
+    let uneven = |x: f64, v: f64| -0.05 * (1.0 + 0.6 * (x / 20.0).tanh()) * (v / 4e3).tanh();
     type Law<'a> = Box<dyn Fn(f64, f64, f64) -> f64 + 'a>;
-    let cases: [(String, Law, f64); 4] = [
+    let cases: [(String, Law, f64); 5] = [
         (curve("torque", "position", -60.0, 60.0, bump), Box::new(|u, x, _| u + bump(x)), 1e-3),
         (curve("torque", "velocity", -3e4, 3e4, drag), Box::new(|u, _, v| u + drag(v)), 2e-3),
+        (surface([60.0, 3e4], uneven), Box::new(|u, x, v| u + uneven(x, v)), 4e-3),
         (curve("amplifier", "command", -0.5, 0.5, bent), Box::new(|u, _, _| bent(u)), 1e-6),
         (curve("gain", "position", -60.0, 60.0, even), Box::new(|u, x, _| even(x) * u), 1e-3),
     ];
@@ -185,7 +217,11 @@ fn every_port_has_a_curve_that_changes_nothing() {
     let plain = runge_kutta(&u, |u, _, _| u);
     for port in CurvePort::ALL {
         let [name, argument] = port.names();
-        let r = restored(&curve(name, argument, -50.0, 50.0, |a| port.idle(a))).unwrap();
+        let text = match port {
+            CurvePort::TorqueOverMotion => surface([50.0, 2e4], |x, _| port.idle(x)),
+            _ => curve(name, argument, -50.0, 50.0, |a| port.idle(a)),
+        };
+        let r = restored(&text).unwrap();
         let worst = run(&r).iter().zip(&plain).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(worst < 1e-6, "{name} over {argument}: {worst:e}");
     }

@@ -12,6 +12,8 @@ use servotune::recording::{Case, Record, RecordEntry, Role};
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
+/// Held-out records of a trial, by their places in it.
+const HELD: [usize; 2] = [10, 11];
 /// Lines of an excitation.
 const LINES: usize = 70;
 
@@ -116,6 +118,16 @@ impl Trial {
         Ok((self.case(id), self.plant()?, controller()))
     }
 
+    fn noise_seed(&self, record: usize) -> u64 {
+        1000 + 100 * self.seed + record as u64
+    }
+
+    /// Noise of the encoder in the held-out records as it was drawn (rms): what nothing explains.
+    pub fn held_noise(&self) -> f64 {
+        let squares = HELD.map(|i| self.machine.noise_drawn(self.samples, self.noise_seed(i)));
+        (squares.iter().sum::<f64>() / (HELD.len() * self.samples) as f64).sqrt()
+    }
+
     /// The records.
     pub fn case(&self, id: &str) -> Case {
         let n = self.samples;
@@ -140,7 +152,7 @@ impl Trial {
             .into_par_iter()
             .enumerate()
             .map(|(i, (name, group, role, reference, excitation))| {
-                let [command, position] = self.machine.record(reference, excitation, 1000 + 100 * self.seed + i as u64);
+                let [command, position] = self.machine.record(reference, excitation, self.noise_seed(i));
                 let file = PathBuf::from(name);
                 let entry = RecordEntry { file: file.clone(), role, repeat_group: Some(group.into()) };
                 let record = Record {

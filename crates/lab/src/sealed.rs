@@ -11,7 +11,7 @@ use super::sealed_row::{Outcome, Row, outcome};
 use super::{Study, StudyError};
 use rayon::prelude::*;
 use servotune::controller::Controller;
-use servotune::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
+use servotune::diagnose::{DiagnoseSettings, Diagnosis, FitFigures, diagnose};
 use servotune::document::sha256_hex;
 use servotune::lti::Plant;
 use servotune::recording::{Case, Role};
@@ -146,10 +146,18 @@ impl SealedCase {
             // What is no number is written as a very large one: JSON has no infinity.
             holdout: [h.rms_before, h.rms_refit_linear, h.rms_after]
                 .map(|v| if v.is_finite() { v / h.noise_floor.max(f64::MIN_POSITIVE) } else { 1e300 }),
-            curve: d.free_form.as_ref().map(|c| c.explained_share),
+            curve: d.free_form.as_ref().map(|c| self.explained(&h).unwrap_or(c.explained_share)),
             held,
             ..self.refused("", seconds)
         })
+    }
+
+    /// Share of what the better linear model leaves beyond the noise that was drawn, which the program does not know; none of a stage.
+    fn explained(&self, held: &FitFigures) -> Option<f64> {
+        let Made::Arm(trial) = &self.drawn.made else { return None };
+        let noise = (self.drawn.scale.position * trial.held_noise()).powi(2);
+        let beyond = |rms: f64| rms * rms - noise;
+        Some(1.0 - beyond(held.rms_after) / beyond(held.rms_before.min(held.rms_refit_linear)))
     }
 
     /// The line of a case without a diagnosis.

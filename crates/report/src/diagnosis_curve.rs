@@ -1,7 +1,8 @@
 //! A curve without a name, drawn with its band: what stands in for the law that is missing.
 //!
 //! In: a diagnosis that carries one. Out: a figure, and its sentences. Convention: the band is the 95 % interval at each argument; what a
-//! linear plant can hold is not in the curve. Spec: `specs/mismatch.md`, "Curves without a name".
+//! linear plant can hold is not in the curve. A torque over position and velocity is drawn over the velocity at some of its positions.
+//! Spec: `specs/mismatch.md`, "Curves without a name".
 
 use super::ReportError;
 use super::diagnosis_shown::short;
@@ -30,6 +31,9 @@ pub(super) fn curve_section(curve: Option<&FreeForm>) -> Result<Option<Section>,
 /// The curve over its argument.
 pub fn curve_figure(curve: &FreeForm) -> Result<Figure, ReportError> {
     let knots = &curve.knots;
+    if knots.iter().all(|k| k.velocity.is_some()) {
+        return surface_figure(curve);
+    }
     let through = |of: &dyn Fn(&CurveKnot) -> f64| {
         Spline::new(knots.iter().map(|k| k.at).collect(), knots.iter().map(of).collect())
     };
@@ -77,9 +81,46 @@ pub fn curve_figure(curve: &FreeForm) -> Result<Figure, ReportError> {
             if loading {
                 "First loading, straight between knots and level behind the last; loops follow Masing's rule"
             } else {
-                "Natural cubic spline, straight beyond its ends"
+                "Natural cubic spline over what the records reached"
             }
         ),
+        share_x: false,
+        panels: vec![panel],
+    })
+}
+
+/// Positions at which a torque over position and velocity is drawn.
+const DRAWN: usize = 5;
+
+/// A torque over the velocity, a line a position.
+fn surface_figure(curve: &FreeForm) -> Result<Figure, ReportError> {
+    let mut at: Vec<f64> = curve.knots.iter().map(|k| k.at).collect();
+    at.dedup();
+    let speed_unit = format!("{}/s", curve.argument_unit);
+    let mut panel = Panel::new(Axis::linear("Velocity", &speed_unit), Axis::linear("Torque added", &curve.unit));
+    panel.height = 1.2;
+    let lines = DRAWN.min(at.len());
+    for line in 0..lines {
+        let here = at[line * (at.len() - 1) / (lines - 1).max(1)];
+        let row: Vec<&CurveKnot> = curve.knots.iter().filter(|k| k.at == here).collect();
+        let of = |value: &dyn Fn(&CurveKnot) -> f64| row.iter().map(|k| value(k)).collect::<Vec<f64>>();
+        let velocity = of(&|k| k.velocity.unwrap_or(0.0));
+        let ink = Ink::Data(line as u8);
+        let name = format!("at {} {}", short(here), curve.argument_unit);
+        let band = Kind::Band { upper: of(&|k| k.high.unwrap_or(k.value)) };
+        let lower = of(&|k| k.low.unwrap_or(k.value));
+        // The bands of inner lines would hide one another.
+        if line == 0 || line + 1 == lines {
+            panel.marks.push(Series::new(&name, ink, band, &velocity, &lower)?.into());
+        }
+        panel.marks.push(Series::new(&name, ink, Kind::Solid, &velocity, &of(&|k| k.value))?.into());
+    }
+    Ok(Figure {
+        title: format!("A curve without a name: {}", curve_title(curve.port, curve.argument)),
+        caption: "Cubic spline over the position, straight between the velocities of the knots; its smoothness is the one under which \
+                  stretches that were left out are simulated best. The 95 % band is drawn at the two ends of the stroke, where it is \
+                  widest. What a linear plant can hold is in the plant, not in the curve."
+            .into(),
         share_x: false,
         panels: vec![panel],
     })

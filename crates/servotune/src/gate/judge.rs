@@ -18,6 +18,7 @@ use super::novelty::Novelty;
 use super::parallel::each;
 use super::table::{Column, Table};
 use super::verdict::{Doubt, PlantEvidence, Verdict};
+use crate::numeric::digits::said;
 
 /// A trained gate.
 #[derive(Clone, Debug)]
@@ -249,8 +250,8 @@ impl Gate {
                     Direction::Below => "below",
                     Direction::Equal => "at",
                 };
-                let value = d.value.map_or("missing".to_owned(), four_digits);
-                format!("{} = {value} ({side} the median {})", d.feature, four_digits(d.training_median))
+                let value = d.value.map_or("missing".to_owned(), |v| said(v, 4));
+                format!("{} = {value} ({side} the median {})", d.feature, said(d.training_median, 4))
             })
             .collect();
         why += &format!("; decided by {}; plant evidence: {}", features.join(", "), j.plant.says);
@@ -277,15 +278,5 @@ impl Gate {
             expected_cost: j.expected,
             imputed,
         }
-    }
-}
-
-/// Four digits, and a power of ten only where zeros would have to be counted.
-fn four_digits(v: f64) -> String {
-    let exponent = v.abs().log10().floor();
-    match exponent {
-        _ if v == 0.0 || !v.is_finite() => v.to_string(),
-        -4.0..6.0 => format!("{v:.*}", (3.0 - exponent).max(0.0) as usize),
-        _ => format!("{v:.3e}"),
     }
 }

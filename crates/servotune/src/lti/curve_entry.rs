@@ -6,8 +6,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CurveKnot {
-    /// The argument.
+    /// The argument; over position and velocity the position.
     pub at: f64,
+    /// The velocity (position_unit/s) of a curve over both.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<f64>,
     /// The value there.
     pub value: f64,
     /// Lower end of the value's interval, where it is known.
@@ -27,6 +30,6 @@ pub struct CurveEntry {
     pub argument: String,
     /// Unit of its values.
     pub unit: String,
-    /// Its points, the argument ascending.
+    /// Its points, the argument ascending; over two arguments the position outermost.
     pub knots: Vec<CurveKnot>,
 }

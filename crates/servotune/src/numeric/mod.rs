@@ -4,6 +4,7 @@
 
 pub mod brent;
 pub mod dense;
+pub mod digits;
 pub mod golden;
 pub mod interval;
 pub mod least_squares;

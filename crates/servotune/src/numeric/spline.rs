@@ -106,6 +106,12 @@ impl Spline {
         a + d * (b + d * (c + d * e))
     }
 
+    /// The value at `x`; beyond the ends that of the nearer one.
+    #[inline]
+    pub fn held(&self, x: f64) -> f64 {
+        self.value(x.clamp(self.at[0], self.at[self.at.len() - 1]))
+    }
+
     /// The slope at `x`.
     pub fn slope(&self, x: f64) -> f64 {
         let last = self.at.len() - 1;
@@ -138,6 +144,7 @@ mod tests {
         let s = Spline::new(at.clone(), at.iter().map(|x| 2.0 - 3.0 * x).collect());
         for x in [-9.0, -1.0, 0.1, 0.7, 2.9, 12.0] {
             assert!((s.value(x) - (2.0 - 3.0 * x)).abs() < 1e-12 && (s.slope(x) + 3.0).abs() < 1e-12, "{x}");
+            assert!((s.held(x) - (2.0 - 3.0 * x.clamp(-1.0, 3.0))).abs() < 1e-12, "{x}");
         }
         assert!((roughness_rows(&at) * DVector::from_column_slice(s.values())).norm() < 1e-12);
     }

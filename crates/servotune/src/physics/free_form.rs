@@ -1,12 +1,14 @@
 //! A curve without a name: what no law of the library holds, as it was estimated at one port of the machine.
 //!
-//! A natural cubic spline through knots, straight beyond the first and the last with the slope that it has there; at the amplifier a
-//! first-order lag may follow it. Over the way since the last turn it is a loading curve, linear between knots and level behind the last: a
-//! row of springs that slide, one at each knot (Iwan 1966; generalised Maxwell slip, Al-Bender, Lampaert, Swevers 2005), whose loops follow
-//! Masing's rule. One curve for each port, all under the name `free_form`; the search of the library leaves them out (`specs/mismatch.md`,
-//! "Curves without a name").
+//! A natural cubic spline through knots. Beyond the first and the last nothing was seen: a torque and a gain stay there as they were last,
+//! an amplifier and a sensor go on straight. At the amplifier a first-order lag may follow. Over the way since the last turn it is a loading
+//! curve, linear between knots and level behind the last: a row of springs that slide, one at each knot (Iwan 1966; generalised Maxwell
+//! slip, Al-Bender, Lampaert, Swevers 2005), whose loops follow Masing's rule. Over position and velocity at once it is a surface (`knots`).
+//! One curve for each port, all under the name `free_form`; the search of the library leaves them out (`specs/mismatch.md`, "Curves without
+//! a name").
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::knots::{Knots, Surface};
 use super::parameter::Parameter;
 use super::sample::{Sample, Scene};
 use super::share::Share;
@@ -21,6 +23,8 @@ pub enum CurvePort {
     TorqueOverPosition,
     /// Torque added (command_unit) over the arm's velocity.
     TorqueOverVelocity,
+    /// Torque added (command_unit) over the arm's position and velocity: a friction that changes along the stroke, a drag of one direction.
+    TorqueOverMotion,
     /// Torque that resists (command_unit) over the way of the arm since it first moved: the loading curve of a hysteresis.
     TorqueOverLoading,
     /// Torque added (command_unit) over the time since the start of each record (s): what comes with every record at its own time.
@@ -40,8 +44,8 @@ pub enum CurvePort {
 pub struct FreeForm {
     /// Where it acts and what it goes over.
     pub port: CurvePort,
-    /// Positions of the knots, strictly ascending, in the unit of the argument.
-    pub at: Vec<f64>,
+    /// Where its values stand, in the unit of the argument.
+    pub knots: Knots,
     /// Values there, one a knot, in the unit of the port.
     pub value: Vec<f64>,
     /// Time constant of the lag that follows an amplifier's curve (s), above 0; none without one.
@@ -66,6 +70,8 @@ const fn made(part: Port, entry: Entry, equation: &'static str) -> Facts {
 
 static TORQUE_OVER_POSITION: Facts = made(Port::Torque, Entry::Torque, "tau = u + f(x), f a natural cubic spline");
 static TORQUE_OVER_VELOCITY: Facts = made(Port::Torque, Entry::Torque, "tau = u + f(x'), f a natural cubic spline");
+static TORQUE_OVER_MOTION: Facts =
+    made(Port::Torque, Entry::Torque, "tau = u + f(x, x'), f a cubic spline over x, straight between velocities");
 static AMPLIFIER_OVER_COMMAND: Facts = made(Port::Amplifier, Entry::Command, "i = f(u), f a natural cubic spline");
 static GAIN_OVER_POSITION: Facts = made(Port::Torque, Entry::Torque, "tau = f(x) u, f a natural cubic spline");
 static GAIN_OVER_TIME: Facts = made(Port::Torque, Entry::Torque, "tau = f(t) u, f a natural cubic spline");
@@ -80,7 +86,7 @@ static SENSOR_OVER_POSITION: Facts = made(Port::Sensor, Entry::Position, "m = f(
 
 impl CurvePort {
     /// All of them.
-    pub const ALL: [CurvePort; 8] = [
+    pub const ALL: [CurvePort; 9] = [
         CurvePort::TorqueOverPosition,
         CurvePort::TorqueOverVelocity,
         CurvePort::TorqueOverLoading,
@@ -88,6 +94,7 @@ impl CurvePort {
         CurvePort::AmplifierOverCommand,
         CurvePort::GainOverPosition,
         CurvePort::GainOverTime,
+        CurvePort::TorqueOverMotion,
         CurvePort::SensorOverPosition,
     ];
 
@@ -96,6 +103,7 @@ impl CurvePort {
         match self {
             CurvePort::TorqueOverPosition => &TORQUE_OVER_POSITION,
             CurvePort::TorqueOverVelocity => &TORQUE_OVER_VELOCITY,
+            CurvePort::TorqueOverMotion => &TORQUE_OVER_MOTION,
             CurvePort::TorqueOverLoading => &TORQUE_OVER_LOADING,
             CurvePort::TorqueOverTime => &TORQUE_OVER_TIME,
             CurvePort::AmplifierOverCommand => &AMPLIFIER_OVER_COMMAND,
@@ -110,6 +118,7 @@ impl CurvePort {
         match self {
             CurvePort::TorqueOverPosition => ["torque", "position"],
             CurvePort::TorqueOverVelocity => ["torque", "velocity"],
+            CurvePort::TorqueOverMotion => ["torque", "position_and_velocity"],
             CurvePort::TorqueOverLoading => ["torque", "loading"],
             CurvePort::TorqueOverTime => ["torque", "time"],
             CurvePort::AmplifierOverCommand => ["amplifier", "command"],
@@ -119,11 +128,13 @@ impl CurvePort {
         }
     }
 
-    /// Units of argument and value on a machine with these units.
+    /// Units of argument, over two of the position, and of the value on a machine with these units.
     pub fn units(self, position: &str, command: &str) -> [String; 2] {
         let speed = format!("{position}/s");
         match self {
-            CurvePort::TorqueOverPosition | CurvePort::TorqueOverLoading => [position.into(), command.into()],
+            CurvePort::TorqueOverPosition | CurvePort::TorqueOverMotion | CurvePort::TorqueOverLoading => {
+                [position.into(), command.into()]
+            }
             CurvePort::TorqueOverVelocity => [speed, command.into()],
             CurvePort::AmplifierOverCommand => [command.into(), command.into()],
             CurvePort::GainOverPosition => [position.into(), "1".into()],
@@ -143,6 +154,7 @@ impl CurvePort {
         match self {
             CurvePort::TorqueOverPosition
             | CurvePort::TorqueOverVelocity
+            | CurvePort::TorqueOverMotion
             | CurvePort::TorqueOverLoading
             | CurvePort::TorqueOverTime => 0.0,
             CurvePort::GainOverPosition | CurvePort::GainOverTime => 1.0,
@@ -150,7 +162,7 @@ impl CurvePort {
         }
     }
 
-    /// What the curve goes over, at a sample; of a loading curve the position, from whose turns on it counts.
+    /// What the curve goes over, at a sample; over two arguments the position; of a loading curve the position, from whose turns on it counts.
     pub fn argument(self, s: &Sample) -> f64 {
         match self {
             CurvePort::TorqueOverVelocity => s.v,
@@ -161,9 +173,9 @@ impl CurvePort {
         }
     }
 
-    /// The curve through these points, `at` strictly ascending.
-    pub fn curve(self, at: &[f64], value: &[f64]) -> FreeForm {
-        FreeForm { port: self, at: at.to_vec(), value: value.to_vec(), lag_s: None }
+    /// The curve through these values.
+    pub fn curve(self, knots: &Knots, value: &[f64]) -> FreeForm {
+        FreeForm { port: self, knots: knots.clone(), value: value.to_vec(), lag_s: None }
     }
 
     /// The entry of a plant file.
@@ -177,9 +189,9 @@ impl CurvePort {
 }
 
 impl FreeForm {
-    /// The spline through the knots.
-    pub fn spline(&self) -> Spline {
-        Spline::new(self.at.clone(), self.value.clone())
+    /// The spline through the knots of a curve over one argument.
+    fn spline(&self) -> Spline {
+        Spline::new(self.knots.at.clone(), self.value.clone())
     }
 
     /// The same curve, its output following it with a lag (s).
@@ -217,12 +229,10 @@ pub(super) fn restored(entry: &PhysicsEntry) -> Result<FreeForm, PhysicsError> {
     if let Some(k) = knots.iter().find(|k| !k.at.is_finite() || !k.value.is_finite()) {
         return Err(wrong(format!("found a knot at {} with the value {}; expected finite numbers", k.at, k.value)));
     }
-    if let Some(w) = knots.windows(2).find(|w| w[1].at <= w[0].at) {
-        return Err(wrong(format!("found a knot at {} behind one at {}; expected them ascending", w[1].at, w[0].at)));
-    }
-    let at: Vec<f64> = knots.iter().map(|k| k.at).collect();
-    let value: Vec<f64> = knots.iter().map(|k| k.value).collect();
-    Ok(FreeForm { port, at, value, lag_s })
+    let value = knots.iter().map(|k| k.value).collect();
+    let over_two = port == CurvePort::TorqueOverMotion;
+    let knots = if over_two { Knots::grid_of(knots) } else { Knots::line_of(knots) }.map_err(wrong)?;
+    Ok(FreeForm { port, knots, value, lag_s })
 }
 
 struct Curve {
@@ -248,10 +258,18 @@ impl Lag {
 }
 
 impl Curve {
-    /// The mean over a straight way from `a` to `b` (Simpson).
+    /// The mean of a torque or a gain over a straight way from `a` to `b` (Simpson).
     fn mean(&self, a: f64, b: f64) -> f64 {
-        let f = |x| self.spline.value(x);
+        let f = |x| self.spline.held(x);
         (f(a) + 4.0 * f(0.5 * (a + b)) + f(b)) / 6.0
+    }
+}
+
+impl Law for Surface {
+    /// The mean over a straight way (Simpson).
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        let middle = self.value(0.5 * (from.x + to.x), 0.5 * (from.v + to.v));
+        out[0] = (self.value(from.x, from.v) + 4.0 * middle + self.value(to.x, to.v)) / 6.0;
     }
 }
 
@@ -263,8 +281,8 @@ impl Law for Curve {
             CurvePort::TorqueOverTime => self.mean(from.t, to.t),
             CurvePort::GainOverPosition => (self.mean(from.x, to.x) - 1.0) * from.i,
             CurvePort::GainOverTime => (self.mean(from.session, to.session) - 1.0) * from.i,
-            // It has a motion of its own (`Loading`).
-            CurvePort::TorqueOverLoading => 0.0,
+            // They have motions of their own (`Loading`, `Surface`).
+            CurvePort::TorqueOverLoading | CurvePort::TorqueOverMotion => 0.0,
             CurvePort::AmplifierOverCommand => {
                 let wanted = self.spline.value(to.u);
                 let late = |lag: &Lag| (lag.arrived(self.spline.value(from.u)) - wanted) * lag.mean;
@@ -298,8 +316,11 @@ impl Parametric for FreeForm {
 
     fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
         if self.port == CurvePort::TorqueOverLoading {
-            let stiffness = slider_stiffness(&self.at, &self.value);
-            return Box::new(Loading { sliders: Sliders::of(&self.at), stiffness });
+            let stiffness = slider_stiffness(&self.knots.at, &self.value);
+            return Box::new(Loading { sliders: Sliders::of(&self.knots.at), stiffness });
+        }
+        if self.port == CurvePort::TorqueOverMotion {
+            return Box::new(Surface::of(&self.knots, &self.value));
         }
         let made = |tau: f64| {
             let ratio = scene.sample_time_s / tau;
@@ -323,7 +344,7 @@ impl Parametric for FreeForm {
 
     /// Of a loading curve, its first and steepest part.
     fn stiffness(&self, _strengths: &[f64]) -> f64 {
-        let first = || slider_stiffness(&self.at, &self.value).iter().sum::<f64>().max(0.0);
+        let first = || slider_stiffness(&self.knots.at, &self.value).iter().sum::<f64>().max(0.0);
         if self.port == CurvePort::TorqueOverLoading { first() } else { 0.0 }
     }
 
@@ -331,6 +352,9 @@ impl Parametric for FreeForm {
     fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
         if self.port == CurvePort::TorqueOverTime {
             return Share::Outside;
+        }
+        if self.port == CurvePort::TorqueOverMotion {
+            return Share::Cycle;
         }
         let spline = self.spline();
         let rises = |k: &[f64]| spline.slope(k[0]) > 0.0 && spline.slope(0.5 * (k[0] + k[1])) > 0.0;
@@ -348,5 +372,5 @@ impl Parametric for FreeForm {
 pub static FACTS: Facts = made(
     Port::Torque,
     Entry::Torque,
-    "a natural cubic spline at one port: torque over position or velocity, amplifier over command, gain over position or time, torque over the time of a record, sensor over position; a loading curve over the way since the last turn",
+    "a natural cubic spline at one port: torque over position, velocity or both, amplifier over command, gain over position or time, torque over the time of a record, sensor over position; a loading curve over the way since the last turn",
 );

@@ -6,6 +6,7 @@
 mod cycle;
 mod describing;
 mod effect;
+mod knots;
 mod library;
 mod machine;
 mod oscillator;
@@ -63,6 +64,7 @@ pub use cycle::{Cycle, Motion};
 pub use describing::describing;
 pub use effect::{COLUMNS, Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 pub use free_form::CurvePort;
+pub use knots::Knots;
 pub use library::{AnyLaw, Effect, Setting, curves, data_facts, effect, facts, library};
 pub use machine::{Machine, Reading};
 pub use parameter::{Parameter, Unit};

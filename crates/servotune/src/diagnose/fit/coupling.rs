@@ -12,6 +12,7 @@ use crate::diagnose::fit::diagnosis_data::scene;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{COUPLING_CHANCE, COUPLING_LEFT_OUT, COUPLING_SHORTER};
 use crate::lti::Plant;
+use crate::numeric::digits::said;
 use crate::numeric::least_squares::dot;
 use crate::numeric::statistics::mean;
 use crate::recording::Role;
@@ -152,14 +153,9 @@ fn listed(names: &[&str]) -> String {
     }
 }
 
-/// Three digits.
-fn three(v: f64) -> String {
-    format!("{v:.*}", (2.0 - v.abs().max(1e-9).log10().floor()).clamp(0.0, 12.0) as usize)
-}
-
 fn says(couplings: &[Coupling], unit: &str) -> String {
     let names: Vec<&str> = couplings.iter().map(|c| c.input.as_str()).collect();
-    let each: Vec<String> = couplings.iter().map(|c| format!("{} {} {unit} rms", c.input, three(c.rms))).collect();
+    let each: Vec<String> = couplings.iter().map(|c| format!("{} {} {unit} rms", c.input, said(c.rms, 3))).collect();
     let verb = if names.len() > 1 { "move" } else { "moves" };
     let taps = couplings.first().map_or(0, |c| c.taps);
     format!(

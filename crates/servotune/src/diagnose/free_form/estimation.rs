@@ -14,8 +14,8 @@ use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::rules::{CURVE_CLEARLY, CURVE_LAG, FOLD_NAMED, SECOND_CURVE};
 use crate::lti::Plant;
-use crate::numeric::spline::{Spline, roughness_rows};
-use crate::physics::CurvePort;
+use crate::numeric::spline::Spline;
+use crate::physics::{CurvePort, Knots};
 use nalgebra::DMatrix;
 use std::f64::consts::LN_2;
 
@@ -47,21 +47,23 @@ pub(in crate::diagnose) struct Curved {
 impl Curved {
     /// The same curve beside another plant: what either holds of gain, spring and damper goes over to the other.
     fn beside(&self, plant: &Plant) -> Option<Shape> {
-        let Shape::Curve(port, at, value) = &self.shape else { return None };
+        let Shape::Curve(port, knots, value) = &self.shape else { return None };
         let numbers = |p: &Plant| {
             let (b, k, c) = body_numbers(&p.body);
             (b * p.resonance_gain, k, c)
         };
         let ((b, k, c), (gain, spring, damper)) = (numbers(plant), numbers(&self.plant));
         let line = match port {
-            CurvePort::TorqueOverPosition => (k - spring) / b,
-            CurvePort::TorqueOverLoading => (spring - k) / b,
-            CurvePort::TorqueOverVelocity => (c - damper) / b,
-            _ => 0.0,
+            CurvePort::TorqueOverPosition => [(k - spring) / b, 0.0],
+            CurvePort::TorqueOverLoading => [(spring - k) / b, 0.0],
+            CurvePort::TorqueOverVelocity => [(c - damper) / b, 0.0],
+            CurvePort::TorqueOverMotion => [(k - spring) / b, (c - damper) / b],
+            _ => [0.0; 2],
         };
-        let ratio = if port.is_of_command() || line != 0.0 { gain / b } else { 1.0 };
-        let value = at.iter().zip(value).map(|(a, v)| ratio * v + line * a).collect();
-        Some(Shape::Curve(*port, at.clone(), value))
+        let ratio = if port.is_of_command() || line != [0.0; 2] { gain / b } else { 1.0 };
+        let at = |i: usize| knots.place(i).iter().zip(line).map(|(a, l)| a * l).sum::<f64>();
+        let value = value.iter().enumerate().map(|(i, v)| ratio * v + at(i)).collect();
+        Some(Shape::Curve(*port, knots.clone(), value))
     }
 }
 
@@ -95,17 +97,14 @@ const EDGE: f64 = 0.03;
 
 /// Fits a trial, its smoothness chosen by what is left out.
 fn foretold<'a>(mut trial: Trial<'a>) -> Option<Foretelling<'a>> {
-    let at = match &trial.shape {
-        Shape::Curve(_, at, _) => Some(at.clone()),
-        _ => None,
-    };
-    let rough = at.as_ref().map_or_else(|| DMatrix::zeros(0, 0), |at| roughness_rows(at));
+    let curved = matches!(trial.shape, Shape::Curve(..));
+    let rough = trial.shape.roughness();
     let judged = |trial: &mut Trial<'a>| {
         let (r, j) = trial.slopes();
         let sound = r.iter().chain(j.iter()).all(|v| v.is_finite());
         sound.then(|| (LeftOut::new(&trial.stretches.blocks, &r, &j, &trial.numbers(), &rough), r, j))
     };
-    if at.is_some() {
+    if curved {
         for _ in 0..CHOICES {
             trial.smoothness = judged(&mut trial)?.0.best_smoothness();
             trial.descend();
@@ -114,7 +113,7 @@ fn foretold<'a>(mut trial: Trial<'a>) -> Option<Foretelling<'a>> {
         trial.descend();
     }
     let (left_out, r, j) = judged(&mut trial)?;
-    if at.is_some() {
+    if curved {
         trial.smoothness = left_out.best_smoothness();
     }
     let covariance = left_out.covariance(&r, &j, trial.smoothness);
@@ -156,14 +155,14 @@ fn doubled(at: &[f64]) -> Vec<f64> {
 /// The same curve over more knots, where it foretells clearly better: what acts at one place only falls between few.
 fn finer<'a>(data: &'a DiagnosisData, ground: &'a Stretches, mut found: Foretelling<'a>) -> Foretelling<'a> {
     for _ in 0..FINER {
-        let Shape::Curve(port, at, value) = &found.trial.shape else { break };
-        if *port == CurvePort::SensorOverPosition {
+        let Shape::Curve(port, knots, value) = &found.trial.shape else { break };
+        if matches!(port, CurvePort::SensorOverPosition | CurvePort::TorqueOverMotion) {
             break;
         }
-        let spline = Spline::new(at.clone(), value.clone());
-        let at = doubled(at);
+        let spline = Spline::new(knots.at.clone(), value.clone());
+        let at = doubled(&knots.at);
         let value = at.iter().map(|a| spline.value(*a)).collect();
-        let shape = Shape::Curve(*port, at, value);
+        let shape = Shape::Curve(*port, Knots::line(at), value);
         let next = foretold(Trial::new(data, ground, &found.trial.p, shape).lagged(found.trial.lag_s));
         match next.filter(|n| n.left_out < CURVE_CLEARLY * found.left_out) {
             Some(next) => found = next,
@@ -245,7 +244,7 @@ fn sensor<'a>(
             }
             _ => return None,
         };
-        let shape = Shape::Curve(port, at, value);
+        let shape = Shape::Curve(port, Knots::line(at), value);
         foretold(Trial::new(data, stretches, &reading.trial.p, shape).lagged(reading.trial.lag_s))
     });
     bent.fold(straight, |best, b| better(best, Some(b)))
@@ -283,7 +282,8 @@ pub(in crate::diagnose) fn estimated<'a>(
         tried.extend(found.as_ref().map(|f| (port, f.left_out)));
         best = better(best.take(), found);
     };
-    for port in CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition) {
+    let later = [CurvePort::SensorOverPosition, CurvePort::TorqueOverMotion];
+    for port in CurvePort::ALL.into_iter().filter(|p| !later.contains(p)) {
         let [name, argument] = port.names();
         progress(&format!("a curve without a name: {name} over {argument}"));
         // The balance of torques knows nothing of the given plant, which what acts may have bent.
@@ -304,12 +304,18 @@ pub(in crate::diagnose) fn estimated<'a>(
         read = readings(data, one_place, starts);
         taken(CurvePort::SensorOverPosition, sensor(data, one_place, &from, &read));
     }
-    let mut curve = best?;
-    let Shape::Curve(port, ..) = curve.trial.shape else { return None };
-    curve = finer(data, ground, curve);
+    let mut curve = finer(data, ground, best?);
+    progress("a curve without a name: torque over position and velocity");
+    if let Some(found) = surface(data, ground, curves, &from) {
+        tried.push((CurvePort::TorqueOverMotion, found.left_out));
+        if found.left_out < CURVE_CLEARLY * curve.left_out {
+            curve = found;
+        }
+    }
     if curve.trial.lag_s.is_none() {
         curve = with_lag(curve);
     }
+    let port = curve.trial.shape.port()?;
     let reading = read
         .into_iter()
         .min_by(|a, b| a.left_out.total_cmp(&b.left_out))
@@ -347,6 +353,20 @@ fn from_balance<'a>(
     foretold(best.1)
 }
 
+/// A torque over position and velocity, where the balance foretells clearly better with it than with any curve over one argument.
+fn surface<'a>(
+    data: &'a DiagnosisData,
+    ground: &'a Stretches,
+    curves: &[Curved],
+    starts: &[Vec<f64>],
+) -> Option<Foretelling<'a>> {
+    let (both, one): (Vec<_>, Vec<_>) =
+        curves.iter().partition(|c| c.shape.port() == Some(CurvePort::TorqueOverMotion));
+    let least = one.iter().map(|c| c.share).fold(1.0, f64::min);
+    let found = both.first().filter(|c| c.share < CURVE_CLEARLY * least)?;
+    from_balance(data, ground, found, starts)
+}
+
 /// The best curve at another port beside a reading that folds or ends at limits.
 fn beside<'a>(reading: &Foretelling<'a>, one_place: &'a Stretches) -> Option<(Foretelling<'a>, Vec<(CurvePort, f64)>)> {
     let data = reading.trial.data;
@@ -372,8 +392,8 @@ fn both_sides(port: CurvePort, at: &[f64]) -> Vec<f64> {
 }
 
 fn in_plain_form(f: &Foretelling) -> Option<Plain> {
-    let Shape::Curve(port, at, value) = &f.trial.shape else { return None };
+    let Shape::Curve(port, knots, value) = &f.trial.shape else { return None };
     let from = f.trial.shape_from();
-    let own = f.covariance.view((from, from), (at.len(), at.len())).into_owned();
-    Some(plain(f.trial.data, *port, at, value, &own, &f.trial.p))
+    let own = f.covariance.view((from, from), (value.len(), value.len())).into_owned();
+    Some(plain(f.trial.data, *port, knots, value, &own, &f.trial.p))
 }

@@ -5,6 +5,7 @@
 
 use super::gauge::Plain;
 use crate::diagnose::rules::{CURVE_LIKE, CURVE_LOPSIDED};
+use crate::numeric::digits::said;
 use crate::numeric::least_squares::Qr;
 use crate::physics::{
     CurvePort, Facts, aerodynamic_drag, cable_spring, coulomb_friction, current_saturation, dead_band,
@@ -23,37 +24,55 @@ pub struct Likeness {
     pub says: String,
 }
 
+impl Likeness {
+    /// Like none of them.
+    pub(super) fn none() -> Likeness {
+        Likeness { effect: unexplained::FACTS.name, share: 0.0, says: "like none of the named laws".into() }
+    }
+}
+
 /// One shape to compare with.
 struct Form {
     facts: &'static Facts,
-    words: &'static str,
+    words: String,
     value: Vec<f64>,
+    /// Whether its sign is part of the law: no friction gives energy, no end of a stroke pulls.
+    directed: bool,
 }
 
 /// Places of a kink, as shares of the range.
-const KINKS: [f64; 7] = [0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.75];
+pub(super) const KINKS: [f64; 7] = [0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.75];
+
+/// A shape whose two sides differ by themselves.
+const TWO_GAINS: &str = "an amplifier with another gain each way";
 
 /// First knot, middle and half width of a curve.
 fn range(c: &Plain) -> (f64, f64, f64) {
-    let [low, high] = [c.at[0], c.at[c.at.len() - 1]];
+    let [low, high] = c.knots.ends();
     (low, 0.5 * (low + high), 0.5 * (high - low))
 }
 
 impl Plain {
     /// A shape at the curve's knots.
-    fn form(&self, facts: &'static Facts, words: &'static str, f: &dyn Fn(f64) -> f64) -> Form {
-        Form { facts, words, value: self.at.iter().map(|a| f(*a)).collect() }
+    fn form(&self, facts: &'static Facts, words: &str, f: &dyn Fn(f64) -> f64) -> Form {
+        let directed = self.port != CurvePort::SensorOverPosition && facts.name != torque_ripple::FACTS.name;
+        Form { facts, words: words.into(), value: self.knots.at.iter().map(|a| f(*a)).collect(), directed }
+    }
+
+    /// A shape of either sign that no law of the library has.
+    fn nameless(&self, words: &str, f: &dyn Fn(f64) -> f64) -> Form {
+        Form { directed: false, ..self.form(&unexplained::FACTS, words, f) }
     }
 }
 
 /// The textbook shapes at a curve's port.
-fn forms(c: &Plain) -> Vec<Form> {
-    let of_torque = torque_forms(c);
+fn forms(c: &Plain, unit: &str) -> Vec<Form> {
+    let of_torque = torque_forms(c, unit);
     if of_torque.is_empty() { other_forms(c) } else { of_torque }
 }
 
 /// Shapes of a torque over position, velocity, loading or time.
-fn torque_forms(c: &Plain) -> Vec<Form> {
+fn torque_forms(c: &Plain, unit: &str) -> Vec<Form> {
     let (low, centre, half) = range(c);
     let over = |facts, words, f: &dyn Fn(f64) -> f64| c.form(facts, words, f);
     let mut all = Vec::new();
@@ -76,6 +95,10 @@ fn torque_forms(c: &Plain) -> Vec<Form> {
                 all.push(over(&torque_ripple::FACTS, "a ripple of the torque", &|x| (w * (x - centre)).sin()));
                 all.push(over(&torque_ripple::FACTS, "a ripple of the torque", &|x| (w * (x - centre)).cos()));
             }
+            for place in &c.knots.at {
+                let words = format!("a detent at {} {unit}", said(*place, 3));
+                all.extend(KINKS.map(|s| c.nameless(&words, &|x| (-((x - place) / (s * half)).powi(2)).exp())));
+            }
         }
         CurvePort::TorqueOverLoading => {
             for s in KINKS {
@@ -85,9 +108,10 @@ fn torque_forms(c: &Plain) -> Vec<Form> {
             }
         }
         CurvePort::TorqueOverTime => {
-            let strongest = (0..c.at.len()).max_by(|a, b| c.value[*a].abs().total_cmp(&c.value[*b].abs())).unwrap_or(0);
+            let strongest =
+                (0..c.value.len()).max_by(|a, b| c.value[*a].abs().total_cmp(&c.value[*b].abs())).unwrap_or(0);
             for s in KINKS {
-                let push = |t: f64| (-((t - c.at[strongest]) / (s * half)).powi(2)).exp();
+                let push = |t: f64| (-((t - c.knots.at[strongest]) / (s * half)).powi(2)).exp();
                 all.push(over(&shock::FACTS, "a push at one time of every record", &push));
             }
         }
@@ -103,6 +127,7 @@ fn other_forms(c: &Plain) -> Vec<Form> {
     let mut all = Vec::new();
     match c.port {
         CurvePort::AmplifierOverCommand => {
+            all.push(c.nameless(TWO_GAINS, &|u| u.abs()));
             for s in KINKS {
                 let edge = s * half;
                 all.push(over(&dead_band::FACTS, "an amplifier that ignores small commands", &|u| {
@@ -153,7 +178,7 @@ fn other_forms(c: &Plain) -> Vec<Form> {
 }
 
 /// Values fitted by columns, weighted: shares, and sum of squares left.
-fn fitted(value: &[f64], columns: &[Vec<f64>], weight: &[f64]) -> (Vec<f64>, f64) {
+pub(super) fn fitted(value: &[f64], columns: &[Vec<f64>], weight: &[f64]) -> (Vec<f64>, f64) {
     let n = value.len();
     let root: Vec<f64> = weight.iter().map(|w| w.sqrt()).collect();
     let mut qr = Qr::default();
@@ -180,25 +205,25 @@ fn sides(port: CurvePort) -> [&'static str; 2] {
     }
 }
 
-/// The law that the curve is most like.
-pub(in crate::diagnose) fn likeness(c: &Plain) -> Likeness {
-    let n = c.at.len();
-    let line = || vec![vec![1.0; n], c.at.clone()];
+/// The law that a curve over one argument (in this unit) is most like.
+pub(in crate::diagnose) fn likeness(c: &Plain, unit: &str) -> Likeness {
+    let n = c.value.len();
+    let line = || vec![vec![1.0; n], c.knots.at.clone()];
     let (_, whole) = fitted(&c.value, &line(), &c.weight);
-    let mut best: Option<(f64, Form)> = None;
-    for form in forms(c) {
+    let mut best: Option<(f64, Form, Vec<f64>)> = None;
+    for form in forms(c, unit) {
         let mut columns = line();
         columns.push(form.value.clone());
         let (shares, left) = fitted(&c.value, &columns, &c.weight);
-        // Friction that gives energy, an end where the torque grows: another law.
-        let directed =
-            c.port == CurvePort::SensorOverPosition || form.facts.name == torque_ripple::FACTS.name || shares[2] > 0.0;
-        if directed && shares.iter().all(|s| s.is_finite()) && best.as_ref().is_none_or(|b| left < b.0) {
-            best = Some((left, form));
+        let allowed = !form.directed || shares[2] > 0.0;
+        if allowed && shares.iter().all(|s| s.is_finite()) && best.as_ref().is_none_or(|b| left < b.0) {
+            best = Some((left, form, shares));
         }
     }
-    let Some((left, form)) = best else {
-        return Likeness { effect: unexplained::FACTS.name, share: 0.0, says: "like none of the named laws".into() };
+    let Some((left, form, shares)) = best else { return Likeness::none() };
+    let (beside, left) = match form.words == TWO_GAINS {
+        true => (weaker((shares[1] + shares[2]) / (shares[1] - shares[2]), sides(c.port)), left),
+        false => lopsided(c, &form).map_or((None, left), |(text, left)| (Some(text), left)),
     };
     let share = if whole > 0.0 { 1.0 - left / whole } else { 0.0 };
     let percent = 100.0 * share;
@@ -207,26 +232,31 @@ pub(in crate::diagnose) fn likeness(c: &Plain) -> Likeness {
             format!("like none of the named laws: the nearest, {}, holds {percent:.0} % of the curve", form.words);
         return Likeness { effect: form.facts.name, share, says };
     }
-    let beside = lopsided(c, &form).map_or(String::new(), |text| format!(", but {text}"));
+    let joint = if form.words == TWO_GAINS { ": it is" } else { ", but" };
+    let beside = beside.map_or(String::new(), |text| format!("{joint} {text}"));
     let says = format!("like {}{beside}; that shape holds {percent:.0} % of the curve", form.words);
     Likeness { effect: form.facts.name, share, says }
 }
 
-/// How much weaker a shape is on one side than on the other.
-fn lopsided(c: &Plain, form: &Form) -> Option<String> {
-    let [low, high] = [c.at[0], c.at[c.at.len() - 1]];
+/// How much weaker a shape is on one side than on the other, and the sum of squares that it leaves with a strength of its own on either.
+fn lopsided(c: &Plain, form: &Form) -> Option<(String, f64)> {
+    let [low, high] = c.knots.ends();
     let signed = matches!(c.port, CurvePort::TorqueOverVelocity | CurvePort::AmplifierOverCommand);
     let middle = if signed && low < 0.0 && high > 0.0 { 0.0 } else { 0.5 * (low + high) };
-    let side =
-        |up: bool| c.at.iter().zip(&form.value).map(|(a, v)| if (*a > middle) == up { *v } else { 0.0 }).collect();
+    let side = |up: bool| {
+        c.knots.at.iter().zip(&form.value).map(|(a, v)| if (*a > middle) == up { *v } else { 0.0 }).collect()
+    };
     // With a line free beside it, two halves of a straight piece could not be told apart: the sides alone, and a level.
-    let (shares, _) = fitted(&c.value, &[vec![1.0; c.at.len()], c.at.clone(), side(true), side(false)], &c.weight);
-    let [up, down] = [shares[2], shares[3]];
-    let ratio = up / down;
+    let (shares, left) =
+        fitted(&c.value, &[vec![1.0; c.value.len()], c.knots.at.clone(), side(true), side(false)], &c.weight);
+    Some((weaker(shares[2] / shares[3], sides(c.port))?, left))
+}
+
+/// On which of two sides a law is weaker, by the first over the second.
+pub(super) fn weaker(ratio: f64, [above, below]: [&str; 2]) -> Option<String> {
     if ratio.is_nan() || ratio <= 0.0 {
         return None;
     }
-    let [above, below] = sides(c.port);
     let (share, place) = if ratio < 1.0 { (1.0 - ratio, above) } else { (1.0 - ratio.recip(), below) };
     (share > CURVE_LOPSIDED).then(|| format!("{:.0} % weaker {place}", 100.0 * share))
 }

@@ -7,4 +7,5 @@ pub(super) mod left_out;
 pub(super) mod likeness;
 pub(super) mod shape;
 pub(super) mod stretches;
+pub(super) mod surface_likeness;
 mod trial;

@@ -6,7 +6,8 @@
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::physics::amplifier_lag::AmplifierLag;
 use crate::physics::sensor_curve::SensorCurve;
-use crate::physics::{CurvePort, Setting};
+use crate::physics::{CurvePort, Knots, Setting};
+use nalgebra::DMatrix;
 
 /// What stands beside the linear plant.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,7 +19,7 @@ pub(in crate::diagnose) enum Shape {
     /// The reading ends at two limits.
     Limits([f64; 2]),
     /// A curve: its port, where its knots are, and its values there.
-    Curve(CurvePort, Vec<f64>, Vec<f64>),
+    Curve(CurvePort, Knots, Vec<f64>),
 }
 
 /// Knots of a curve.
@@ -44,7 +45,7 @@ impl Shape {
             Shape::Linear => Shape::Linear,
             Shape::Fold(_) => Shape::Fold([numbers[0], numbers[1]]),
             Shape::Limits(_) => Shape::Limits([numbers[0], numbers[1]]),
-            Shape::Curve(port, at, _) => Shape::Curve(*port, at.clone(), numbers.to_vec()),
+            Shape::Curve(port, knots, _) => Shape::Curve(*port, knots.clone(), numbers.to_vec()),
         }
     }
 
@@ -56,7 +57,7 @@ impl Shape {
             Shape::Limits([low, high]) => {
                 Some(Setting::fixed(SensorCurve::Limited { low: *low, high: low.max(*high) }))
             }
-            Shape::Curve(port, at, value) => Some(Setting::fixed(port.curve(at, value))),
+            Shape::Curve(port, knots, value) => Some(Setting::fixed(port.curve(knots, value))),
         }
     }
 
@@ -73,9 +74,18 @@ impl Shape {
         matches!(self, Shape::Fold(_) | Shape::Limits(_) | Shape::Curve(CurvePort::SensorOverPosition, ..))
     }
 
+    /// Rows whose squares, times the numbers, add up to the roughness; none where there is no curve.
+    pub fn roughness(&self) -> DMatrix<f64> {
+        match self {
+            Shape::Curve(_, knots, _) => knots.roughness(),
+            _ => DMatrix::zeros(0, 0),
+        }
+    }
+
     /// Knots of a curve at a port over the range of the records; none where nothing moves there, or few knots tell nothing.
     pub fn knots(data: &DiagnosisData, port: CurvePort) -> Option<Vec<f64>> {
-        if port == CurvePort::TorqueOverTime {
+        // Of these there are many, and the balance of torques gives their start.
+        if matches!(port, CurvePort::TorqueOverTime | CurvePort::TorqueOverMotion) {
             return None;
         }
         let arm = match port {
@@ -130,7 +140,7 @@ impl Shape {
     /// The curve that changes nothing.
     pub fn idle(port: CurvePort, at: Vec<f64>) -> Shape {
         let value = at.iter().map(|a| port.idle(*a)).collect();
-        Shape::Curve(port, at, value)
+        Shape::Curve(port, Knots::line(at), value)
     }
 }
 
@@ -147,11 +157,11 @@ pub(in crate::diagnose) fn effects(lag_s: Option<f64>, shape: &Shape, reading: &
     if let Some(lag_s) = lag_s {
         let port = CurvePort::AmplifierOverCommand;
         let curve = match shape {
-            Shape::Curve(CurvePort::AmplifierOverCommand, at, value) => {
+            Shape::Curve(CurvePort::AmplifierOverCommand, knots, value) => {
                 own = None;
-                port.curve(at, value)
+                port.curve(knots, value)
             }
-            _ => port.curve(&[-1.0, 1.0], &[-1.0, 1.0]),
+            _ => port.curve(&Knots::line(vec![-1.0, 1.0]), &[-1.0, 1.0]),
         };
         all.push(Setting::fixed(curve.lagged(lag_s)));
     }

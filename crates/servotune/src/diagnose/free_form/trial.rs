@@ -12,7 +12,6 @@ use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::{Begun, SimulatedModel};
 use crate::lti::{Body, Plant};
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
-use crate::numeric::spline::roughness_rows;
 use crate::physics::{CurvePort, Setting};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -72,21 +71,19 @@ struct Made {
 
 /// Linear parameters that the shape leaves free: what it can hold itself stays.
 fn free_parameters(data: &DiagnosisData, shape: &Shape) -> Vec<usize> {
-    let held = match shape {
-        Shape::Curve(CurvePort::TorqueOverPosition | CurvePort::TorqueOverLoading, ..) => {
-            Some(FreeParameter::Stiffness)
-        }
-        Shape::Curve(CurvePort::TorqueOverVelocity, ..) => Some(FreeParameter::Viscous),
-        Shape::Curve(CurvePort::TorqueOverTime, ..) => None,
-        Shape::Curve(..) => Some(FreeParameter::Gain),
-        _ => None,
+    let held: &[FreeParameter] = match shape.port() {
+        Some(CurvePort::TorqueOverPosition | CurvePort::TorqueOverLoading) => &[FreeParameter::Stiffness],
+        Some(CurvePort::TorqueOverVelocity) => &[FreeParameter::Viscous],
+        Some(CurvePort::TorqueOverMotion) => &[FreeParameter::Stiffness, FreeParameter::Viscous],
+        Some(CurvePort::TorqueOverTime) | None => &[],
+        Some(_) => &[FreeParameter::Gain],
     };
     let few = data.form.free_parameters.len() <= FEW;
     let body = |k: FreeParameter| {
         matches!(k, FreeParameter::Gain | FreeParameter::Stiffness | FreeParameter::Viscous | FreeParameter::Delay)
     };
     let all = data.form.free_parameters.iter().enumerate();
-    all.filter(|(_, k)| Some(**k) != held && (few || body(**k))).map(|(i, _)| i).collect()
+    all.filter(|(_, k)| !held.contains(k) && (few || body(**k))).map(|(i, _)| i).collect()
 }
 
 impl<'a> Trial<'a> {
@@ -232,8 +229,8 @@ impl<'a> Trial<'a> {
     /// Rows of the roughness, times the root of its weight.
     fn roughness(&self, shape: &[f64]) -> Vec<f64> {
         match &self.shape {
-            Shape::Curve(_, at, _) if self.smoothness > 0.0 => {
-                let rows = roughness_rows(at) * DVector::from_column_slice(shape);
+            Shape::Curve(..) if self.smoothness > 0.0 => {
+                let rows = self.shape.roughness() * DVector::from_column_slice(shape);
                 (rows * self.smoothness.sqrt()).iter().copied().collect()
             }
             _ => Vec::new(),

@@ -10,8 +10,7 @@ use crate::diagnose::free_form::estimation::Curved;
 use crate::diagnose::free_form::left_out::LeftOut;
 use crate::diagnose::free_form::shape::Shape;
 use crate::lti::Body;
-use crate::numeric::spline::roughness_rows;
-use crate::physics::{CurvePort, Sliders};
+use crate::physics::{CurvePort, Knots, Sample, Sliders};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -19,6 +18,10 @@ use rayon::prelude::*;
 const KNOTS: usize = 33;
 const OVER_TIME: usize = 129;
 const SLOW: usize = 9;
+/// Positions of a torque over position and velocity, and speeds either way; how much denser the lower speeds lie than the rows do.
+const POSITIONS: usize = 9;
+const SPEEDS: usize = 6;
+const DENSER: f64 = 1.5;
 /// Share of the rows beyond the first and the last knot.
 const BEYOND: f64 = 1e-3;
 /// Stretches of each record, and parts of them that are left out in turn.
@@ -63,11 +66,11 @@ impl Balance<'_> {
                 .flat_map(|(r, p)| p.rows.iter().map(|&k| of(p, r, k)).collect::<Vec<_>>())
                 .collect()
         };
-        if port != Some(CurvePort::TorqueOverVelocity) {
+        if !matches!(port, Some(CurvePort::TorqueOverVelocity | CurvePort::TorqueOverMotion)) {
             plant.push(raw(&|p, _, k| -p.samples[k].v));
         }
         let free = matches!(self.data.form.given.body, Body::FreeInertia { .. });
-        if !free && port != Some(CurvePort::TorqueOverPosition) {
+        if !free && !matches!(port, Some(CurvePort::TorqueOverPosition | CurvePort::TorqueOverMotion)) {
             plant.push(raw(&|p, r, k| self.means[r].origin - p.samples[k].x));
         }
         for own in 0..self.parts.len() {
@@ -99,23 +102,45 @@ impl Balance<'_> {
     }
 
     /// Knots over what the rows go over.
-    fn knots(&self, port: CurvePort) -> Option<Vec<f64>> {
+    fn knots(&self, port: CurvePort) -> Option<Knots> {
         let arm = self.arm(port);
-        let rows = self.parts.iter().flat_map(|p| p.rows.iter().map(move |&k| p.sharp[k].scaled(arm)));
-        let mut all: Vec<f64> = rows.map(|s| port.argument(&s)).filter(|a| a.is_finite()).collect();
-        all.sort_by(f64::total_cmp);
-        let off = (BEYOND * all.len() as f64) as usize;
-        let [low, high] = [*all.get(off)?, *all.get(all.len().checked_sub(off + 1)?)?];
+        let sorted = |of: &dyn Fn(&Sample) -> f64| {
+            let rows = self.parts.iter().flat_map(|p| p.rows.iter().map(move |&k| p.sharp[k].scaled(arm)));
+            let mut all: Vec<f64> = rows.map(|s| of(&s)).filter(|a| a.is_finite()).collect();
+            all.sort_by(f64::total_cmp);
+            all
+        };
+        let off = |count: usize| (BEYOND * count as f64) as usize;
         if port == CurvePort::TorqueOverLoading {
             let records = self.parts.iter().map(|p| p.sharp.iter().map(|s| arm * s.x).collect::<Vec<_>>());
-            return Shape::loading_knots(records, KNOTS);
+            return Shape::loading_knots(records, KNOTS).map(Knots::line);
+        }
+        let all = sorted(&|s| port.argument(s));
+        let [low, high] = [*all.get(off(all.len()))?, *all.get(all.len().checked_sub(off(all.len()) + 1)?)?];
+        if low >= high {
+            return None;
+        }
+        if port == CurvePort::TorqueOverMotion {
+            // Where the machine moves, and closer together where laws turn.
+            let speeds = sorted(&|s| s.v.abs());
+            let last = speeds.len() - 1 - off(speeds.len());
+            let share = |k: usize| (k as f64 / SPEEDS as f64).powf(DENSER);
+            let mut up: Vec<f64> = (1..=SPEEDS).map(|k| speeds[(share(k) * last as f64) as usize]).collect();
+            up.retain(|v| *v > 0.0);
+            up.dedup();
+            let down = up.iter().rev().map(|v| -v);
+            return Some(Knots {
+                at: (0..POSITIONS).map(|k| low + k as f64 / (POSITIONS - 1) as f64 * (high - low)).collect(),
+                velocity: down.chain([0.0]).chain(up.iter().copied()).collect(),
+            })
+            .filter(|k| k.velocity.len() > 2);
         }
         let count = match port {
             CurvePort::TorqueOverTime => OVER_TIME,
             CurvePort::GainOverTime => SLOW,
             _ => KNOTS,
         };
-        (low < high).then(|| Shape::spread_of(port, low, high, count))
+        Some(Knots::line(Shape::spread_of(port, low, high, count)))
     }
 
     fn arm(&self, port: CurvePort) -> f64 {
@@ -123,21 +148,26 @@ impl Balance<'_> {
     }
 
     /// The columns of a curve's values, a command's at this share of the later one.
-    fn curve_columns(&self, port: CurvePort, at: &[f64], weights: &[f64], share: f64) -> Vec<Vec<f64>> {
-        let arm = self.arm(port);
+    fn curve_columns(&self, port: CurvePort, knots: &Knots, weights: &[f64], share: f64) -> Vec<Vec<f64>> {
+        let (arm, at) = (self.arm(port), &knots.at);
         if port == CurvePort::TorqueOverLoading {
             return self.loading_columns(at, weights);
         }
+        let across = knots.velocity.len().max(1);
+        let over = |j: usize, s: &Sample| {
+            let along = hat(at, j / across, port.argument(s));
+            if knots.velocity.is_empty() { along } else { along * hat(&knots.velocity, j % across, s.v) }
+        };
         let acting = |r: usize| -> Vec<f64> {
             let acts = held(&self.means[r].input);
             let (early, late) = (late(&acts, 0), late(&acts, LATER));
             early.iter().zip(&late).map(|(a, b)| (1.0 - share) * a + share * b).collect()
         };
-        (0..at.len())
+        (0..knots.count())
             .into_par_iter()
             .map(|j| {
                 let of = |part: &Smoothed, r: usize| -> Vec<f64> {
-                    let hats = part.sharp.iter().map(|s| hat(at, j, port.argument(&s.scaled(arm))));
+                    let hats = part.sharp.iter().map(|s| over(j, &s.scaled(arm)));
                     match port {
                         CurvePort::AmplifierOverCommand => {
                             let acts = held(&hats.collect::<Vec<_>>());
@@ -199,29 +229,30 @@ impl Balance<'_> {
     /// Plant and curve at a port, beside what the linear balance leaves; none where nothing moves there or nothing can be solved.
     fn curved(&self, port: CurvePort, linear: f64) -> Option<Curved> {
         let weights = weights(self.width);
-        let at = self.knots(port)?;
+        let knots = self.knots(port)?;
         let rows = self.rows(Some(port), &weights);
-        let rough = roughness_rows(&at);
+        let rough = knots.roughness();
         let shares: Vec<f64> = match port.is_of_command() {
             true => (0..DELAYS).map(|k| k as f64 / (DELAYS - 1) as f64).collect(),
             false => vec![0.0],
         };
         let tried = shares.into_iter().filter_map(|share| {
-            let columns = self.curve_columns(port, &at, &weights, share);
+            let columns = self.curve_columns(port, &knots, &weights, share);
             self.foretold(&rows, &columns, &rough).map(|(error, x)| (error, x, share))
         });
         let (error, x, share) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        self.made(port, at, &x, share, rows.plant.len(), error / linear)
+        self.made(port, knots, &x, share, rows.plant.len(), error / linear)
     }
 
     /// The numbers of a balance as a plant and a curve.
-    fn made(&self, port: CurvePort, at: Vec<f64>, x: &[f64], share: f64, from: usize, left: f64) -> Option<Curved> {
+    fn made(&self, port: CurvePort, knots: Knots, x: &[f64], share: f64, from: usize, left: f64) -> Option<Curved> {
+        let at = &knots.at;
         let (own, mut value) = (&x[..from], x[from..].to_vec());
         let mut own = own.iter().copied();
         let (gain, late) = match port {
             CurvePort::AmplifierOverCommand => {
                 // The line of least squares through the curve is the gain.
-                (line(&at, &value), share)
+                (line(at, &value), share)
             }
             CurvePort::GainOverPosition | CurvePort::GainOverTime => {
                 (value.iter().sum::<f64>() / value.len() as f64, share)
@@ -231,9 +262,10 @@ impl Balance<'_> {
                 (early + late, late / (early + late))
             }
         };
-        let viscous = if port == CurvePort::TorqueOverVelocity { 0.0 } else { own.next()? };
+        let both = port == CurvePort::TorqueOverMotion;
+        let viscous = if both || port == CurvePort::TorqueOverVelocity { 0.0 } else { own.next()? };
         let free = matches!(self.data.form.given.body, Body::FreeInertia { .. });
-        let stiffness = if free || port == CurvePort::TorqueOverPosition { 0.0 } else { own.next()? };
+        let stiffness = if free || both || port == CurvePort::TorqueOverPosition { 0.0 } else { own.next()? };
         if !gain.is_normal() {
             return None;
         }
@@ -246,26 +278,34 @@ impl Balance<'_> {
                 let from = at.len() / 2;
                 let rise = line(&at[from..], &value[from..]);
                 stiffness += gain * rise;
-                value.iter_mut().zip(&at).for_each(|(v, a)| *v -= rise * a);
+                value.iter_mut().zip(at).for_each(|(v, a)| *v -= rise * a);
             }
-            CurvePort::TorqueOverVelocity => viscous = (-gain * line(&at, &value)).max(0.0),
-            CurvePort::TorqueOverPosition => stiffness = (-gain * line(&at, &value)).max(0.0),
+            CurvePort::TorqueOverVelocity => viscous = (-gain * line(at, &value)).max(0.0),
+            CurvePort::TorqueOverPosition => stiffness = (-gain * line(at, &value)).max(0.0),
+            CurvePort::TorqueOverMotion => {
+                let place = |axis: usize| (0..value.len()).map(|i| knots.place(i)[axis]).collect::<Vec<_>>();
+                viscous = (-gain * line(&place(1), &value)).max(0.0);
+                stiffness = if free { 0.0 } else { (-gain * line(&place(0), &value)).max(0.0) };
+            }
             _ => {}
         }
         let plant = self.plant(gain, LATER as f64 * late, viscous, stiffness);
         let held = body_numbers(&plant.body);
         let back = match port {
-            CurvePort::TorqueOverVelocity => held.2 / gain,
-            CurvePort::TorqueOverPosition => held.1 / gain,
-            _ => 0.0,
+            CurvePort::TorqueOverVelocity => [held.2 / gain, 0.0],
+            CurvePort::TorqueOverPosition => [held.1 / gain, 0.0],
+            CurvePort::TorqueOverMotion => [held.1 / gain, held.2 / gain],
+            _ => [0.0; 2],
         };
-        value.iter_mut().zip(&at).for_each(|(v, a)| *v += back * a);
+        for (i, v) in value.iter_mut().enumerate() {
+            *v += knots.place(i).iter().zip(back).map(|(a, b)| a * b).sum::<f64>();
+        }
         if port == CurvePort::TorqueOverLoading {
             let first = value[0];
             value.iter_mut().for_each(|v| *v -= first);
         }
         value.iter().all(|v| v.is_finite()).then_some(())?;
-        Some(Curved { plant, shape: Shape::Curve(port, at, value), share: left })
+        Some(Curved { plant, shape: Shape::Curve(port, knots, value), share: left })
     }
 }
 
@@ -299,9 +339,18 @@ fn hat(at: &[f64], j: usize, x: f64) -> f64 {
     }
 }
 
-/// Plants and curves by the balances of some smoothings, the best of each port, those that foretell best first.
+/// Plants and curves over one argument by the balances of some smoothings, the best of each port, those that foretell best first.
 pub(in crate::diagnose) fn curves(balances: &[Balance]) -> Vec<Curved> {
-    let ports = CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition);
+    let other = [CurvePort::SensorOverPosition, CurvePort::TorqueOverMotion];
+    best_of(balances, CurvePort::ALL.into_iter().filter(|p| !other.contains(p)))
+}
+
+/// The same of a torque over position and velocity.
+pub(in crate::diagnose) fn surface(balances: &[Balance]) -> Option<Curved> {
+    best_of(balances, [CurvePort::TorqueOverMotion].into_iter()).pop()
+}
+
+fn best_of(balances: &[Balance], ports: impl Iterator<Item = CurvePort>) -> Vec<Curved> {
     let linear: Vec<Option<f64>> = balances.iter().map(Balance::linear_left).collect();
     let best = |port: CurvePort| {
         let all = balances.iter().zip(&linear).filter_map(|(b, l)| b.curved(port, (*l)?));

@@ -18,10 +18,11 @@ use crate::diagnose::free_form::gauge::Plain;
 use crate::diagnose::free_form::likeness::likeness;
 use crate::diagnose::free_form::shape::{Shape, lag};
 use crate::diagnose::free_form::stretches::Stretches;
+use crate::diagnose::free_form::surface_likeness::surface_likeness;
 use crate::diagnose::rules::{
     CURVE_CLEARLY, CURVE_NAMED, CURVE_NEAR, CURVE_NO_WORSE, LOADING_FALLS, LOADING_LEVEL, NAMED_SHARE,
 };
-use crate::diagnose::search::curve_balance::curves;
+use crate::diagnose::search::curve_balance::{curves, surface};
 use crate::diagnose::search::selection::Selection;
 use crate::diagnose::search::torque_balance::{Balance, SMOOTHINGS, recorded_means};
 use crate::lti::{CurveKnot, PhysicsEntry, Plant};
@@ -135,9 +136,10 @@ fn entry(data: &DiagnosisData, setting: &Setting) -> PhysicsEntry {
 
 fn knots(c: &Plain) -> Vec<CurveKnot> {
     let off = |i: usize| 1.96 * c.spread[i];
-    (0..c.at.len())
+    (0..c.value.len())
         .map(|i| CurveKnot {
-            at: c.at[i],
+            at: c.knots.place(i)[0],
+            velocity: c.knots.velocity.get(i % c.knots.velocity.len().max(1)).copied(),
             value: c.value[i],
             low: Some(c.value[i] - off(i)),
             high: Some(c.value[i] + off(i)),
@@ -155,7 +157,7 @@ fn model(data: &DiagnosisData, best: &Foretelling, c: &Plain) -> Corrected {
     let mut effects: Vec<Setting> = trial.lag_s.filter(|_| behind.is_none()).map(lag).into_iter().collect();
     plant.physics = effects.iter().map(|s| entry(data, s)).collect();
     if curved {
-        let mut curve = c.port.curve(&c.at, &c.value);
+        let mut curve = c.port.curve(&c.knots, &c.value);
         curve.lag_s = behind;
         plant.physics.push(c.port.entry(knots(c), behind, &position, &command));
         effects.push(Setting::fixed(curve));
@@ -172,6 +174,7 @@ pub fn curve_title(port: &str, argument: &str) -> String {
     match (port, argument) {
         ("amplifier", _) => "what the amplifier makes of the command".into(),
         ("gain", argument) => format!("the torque per command over the {argument}"),
+        (_, "position_and_velocity") => "a torque over position and velocity".into(),
         (_, "time") => "a torque over the time of every record".into(),
         (_, "loading") => "a torque that resists over the way since the last turn".into(),
         ("sensor", _) => "what the sensor reads of the position".into(),
@@ -184,7 +187,10 @@ fn described(data: &DiagnosisData, found: &Estimated, explained_share: f64, name
     let form = &data.form.given;
     let [port, argument] = c.port.names();
     let [argument_unit, unit] = c.port.units(&form.position_unit, &form.command_unit);
-    let like = likeness(c);
+    let like = match c.port {
+        CurvePort::TorqueOverMotion => surface_likeness(c, &argument_unit),
+        _ => likeness(c, &argument_unit),
+    };
     let what = curve_title(port, argument);
     let beside = if found.reading.is_some() { "beside the reading that was found" } else { "for it" };
     let begin = match named && found.reading.is_none() {
@@ -265,7 +271,7 @@ fn bearing_finding(data: &DiagnosisData, best: &Foretelling, found: &Estimated) 
     };
     // The way at which the first slope would reach the level; half the level tells the slope better than the first knot.
     let half = (0..=last).find(|&i| c.value[i] >= 0.5 * c.value[last])?;
-    let (way, off) = (c.at[half] * c.value[last] / c.value[half], 1.96 * c.spread[half] / c.value[half]);
+    let (way, off) = (c.knots.at[half] * c.value[last] / c.value[half], 1.96 * c.spread[half] / c.value[half]);
     let length = Estimate { value: way, low: way * (1.0 - off), high: way * (1.0 + off), unit: position.clone() };
     let pivot = way > shortest_loop(&data.scene);
     let facts = if pivot { &pivot_friction::FACTS } else { &coulomb_friction::FACTS };
@@ -327,5 +333,8 @@ fn starts(data: &DiagnosisData, selection: &Selection) -> Vec<Vec<f64>> {
 /// Plants and curves by the balance of torques.
 fn balanced(data: &DiagnosisData) -> Vec<Curved> {
     let means = recorded_means(data);
-    curves(&SMOOTHINGS.map(|width| Balance::of(data, &means, width, 0.0)))
+    let balances = SMOOTHINGS.map(|width| Balance::of(data, &means, width, 0.0));
+    let mut all = curves(&balances);
+    all.extend(surface(&balances));
+    all
 }

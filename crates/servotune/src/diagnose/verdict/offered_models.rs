@@ -14,6 +14,7 @@ use crate::diagnose::fit::simulation::{SimulatedModel, errors, floor, rms, size}
 use crate::diagnose::rules::{REFIT_BETTER, REFIT_FAR, SIMULATION_ALIKE, SIMULATION_SAMPLING};
 use crate::diagnose::search::selection::Selection;
 use crate::lti::Plant;
+use crate::numeric::digits::said;
 use crate::recording::Role;
 
 /// Stretches that records are cut into where there are fewer of them.
@@ -66,12 +67,9 @@ fn worse(one: f64, than: f64, samples: usize) -> bool {
     !one.is_finite() || one > than * (1.0 + SIMULATION_ALIKE.max(SIMULATION_SAMPLING / (samples as f64).sqrt()))
 }
 
-/// A figure as a person says it.
-fn said(v: f64) -> String {
-    match v.is_finite() && v < 1e6 {
-        true => format!("{v:.*}", (2.0 - v.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize),
-        false => "a motion without bound".into(),
-    }
+/// An error as a person says it.
+fn error_said(v: f64) -> String {
+    if v.is_finite() && v < 1e6 { said(v, 3) } else { "a motion without bound".into() }
 }
 
 impl<'a> Reporting<'a> {
@@ -180,8 +178,8 @@ impl Reporting<'_> {
         worse(own, given, self.samples(Role::Holdout)).then(|| {
             format!(
                 "{what} is withdrawn: it simulates the hold-out records with an error of {} {unit} rms where the given model leaves {} {unit}",
-                said(own),
-                said(given)
+                error_said(own),
+                error_said(given)
             )
         })
     }
@@ -214,16 +212,16 @@ impl Reporting<'_> {
                 Some((o, _)) => {
                     remarks.push(format!(
                         "the linear refit is by simulation error (output error): the one by whitened error leaves {} {unit} rms on the fit records, this one {} {unit}",
-                        said(left),
-                        said(self.rms(&o, &fit))
+                        error_said(left),
+                        error_said(self.rms(&o, &fit))
                     ));
                     offer = (o, true);
                 }
                 None if !sound => {
                     remarks.push(format!(
                         "no linear refit is adopted: on the fit records it leaves {} {unit} rms where the given model leaves {} {unit}",
-                        said(left),
-                        said(of_given.fit)
+                        error_said(left),
+                        error_said(of_given.fit)
                     ));
                     offer = (given.clone(), false);
                 }
@@ -257,8 +255,8 @@ impl Reporting<'_> {
             let Some(other) = other else {
                 let why = format!(
                     "the model with findings is withdrawn: it simulates the fit records with an error of {} {unit} rms, the model without them with {} {unit}",
-                    said(of_offer.fit),
-                    said(least)
+                    error_said(of_offer.fit),
+                    error_said(least)
                 );
                 return (linear.clone(), Some(why));
             };
