@@ -12,6 +12,7 @@ use crate::diagnose::fit::shock::{DetectedShock, beyond};
 use crate::diagnose::fit::simulation::{SimulatedModel, errors, rms};
 use crate::diagnose::free_form::estimation::may_fold;
 use crate::diagnose::noise::torque_noise::torque_noise;
+use crate::diagnose::rules::NAME_YIELDS;
 use crate::diagnose::search::select::select;
 use crate::diagnose::search::select_settings::SelectSettings;
 use crate::diagnose::search::selection::Selection;
@@ -21,7 +22,8 @@ use crate::diagnose::verdict::diagnosis_json::Diagnosis;
 use crate::diagnose::verdict::finding::{NextExperiment, Tried, Verdict};
 use crate::diagnose::verdict::fit_report::{Errors, figures_of, fit_report};
 use crate::diagnose::verdict::held_out::{held_out, mean};
-use crate::diagnose::verdict::judgement::{ByOthers, judge};
+
+use crate::diagnose::verdict::judgement::{ByOthers, judge, named_far_from_noise, yield_to_curve};
 use crate::diagnose::verdict::log_checks::LogChecks;
 use crate::diagnose::verdict::missing_curve::{StandIn, Standing, enter, stand_in};
 use crate::diagnose::verdict::next_experiment::propose;
@@ -53,12 +55,19 @@ fn settled(d: &Diagnosis) -> bool {
     !matches!(d.verdict, Verdict::LocatedUnexplained | Verdict::Undecidable)
 }
 
+/// Error (rms) of the records that judge, out of those of all.
+fn judged(data: &DiagnosisData, errors: &[Vec<f64>]) -> f64 {
+    rms(&data.judging().iter().map(|&i| errors[i].clone()).collect::<Vec<_>>())
+}
+
 impl Trial<'_> {
-    /// The search, with a curve where it ends without a name, or cannot tell what is left from noise, and one is worth it.
+    /// The search, with a curve where it ends without a name or with one that leaves much, or cannot tell what is left from noise, and one is
+    /// worth it.
     pub fn best(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
         let cut = data.runs.clone();
         let (mut first, open) = self.made(data, progress)?;
-        if !open_to_play(&first.diagnosis) {
+        let (far, joint) = (named_far_from_noise(&first.diagnosis, &first.data), open_to_play(&first.diagnosis));
+        if !far && !joint {
             return Ok(first);
         }
         // The search may have been made on excerpts: so are observers and curves; what they come to is judged on the whole.
@@ -66,38 +75,50 @@ impl Trial<'_> {
         // A reading that folds turns round like a play; simulated, it leaves nothing.
         let folds = may_fold(&searched);
         let mut curve = if folds { self.curve(&first, &searched, progress) } else { None };
-        if let Some(found) = curve.take_if(|found| found.finding.is_some()) {
+        if let Some(found) = curve.take_if(|found| found.finding.is_some() && !far) {
             return Ok(self.with_curve(first, open, found));
         }
-        progress("a play under an observer");
-        let beside_laws = searched.form.plant(&first.selection.last().refitted.p);
-        let plants = [self.given.clone(), first.refitted.clone(), searched.form.given.clone(), beside_laws];
-        if let Some(play) = observed_play(&searched, &plants, self.settings.select.iterations) {
-            play.enter(&mut first.diagnosis);
-            self.offer(&mut first, open, play.corrected);
-            propose(&mut first.diagnosis, &first.data, &first.selection);
-            return Ok(first);
+        if joint {
+            progress("a play under an observer");
+            let beside_laws = searched.form.plant(&first.selection.last().refitted.p);
+            let plants = [self.given.clone(), first.refitted.clone(), searched.form.given.clone(), beside_laws];
+            if let Some(play) = observed_play(&searched, &plants, self.settings.select.iterations) {
+                play.enter(&mut first.diagnosis);
+                self.offer(&mut first, open, play.corrected);
+                propose(&mut first.diagnosis, &first.data, &first.selection);
+                return Ok(first);
+            }
         }
-        if settled(&first.diagnosis) {
+        if settled(&first.diagnosis) && !far {
             return Ok(first);
         }
         if !folds {
             curve = self.curve(&first, &searched, progress);
         }
         Ok(match curve {
+            Some(found) if far => self.unless_outdone(first, open, found),
             Some(found) => self.with_curve(first, open, found),
             None => first,
         })
     }
 
+    /// The diagnosis with its names, or with a curve in their place that leaves far less of the records that were not used.
+    fn unless_outdone(&self, mut named: Diagnosed, open: Errors, found: StandIn) -> Diagnosed {
+        let left = [&named.errors[2], &found.errors[0]].map(|e| judged(&named.data, e));
+        if left[1].is_nan() || left[1] > NAME_YIELDS * left[0] {
+            return named;
+        }
+        let floor = named.diagnosis.fit.holdout.unwrap_or(named.diagnosis.fit.fit).noise_floor;
+        yield_to_curve(&mut named.diagnosis, &named.data, &named.selection, left.map(|v| v / floor));
+        self.with_curve(named, open, found)
+    }
+
     /// Offers another model where it simulates no record that was not used worse than the one that is offered.
     fn offer(&self, made: &mut Diagnosed, mut open: Errors, model: Corrected) {
         let every: Vec<&Run> = made.data.runs.iter().collect();
-        let which = made.data.judging();
-        let of = |e: &[Vec<f64>]| rms(&which.iter().map(|&i| e[i].clone()).collect::<Vec<_>>());
         let simulated = |closed: Option<&Law>| errors(&model.alone(&made.data), &every, closed);
         let shown = simulated(self.closed);
-        let (offered, after) = (of(&made.errors[2]), of(&shown));
+        let (offered, after) = (judged(&made.data, &made.errors[2]), judged(&made.data, &shown));
         if after.is_nan() || after > offered {
             made.diagnosis.remarks.push(
                 "the corrected plant carries what stood in for the play before: a free simulation of it is no nearer to the records"

@@ -4,20 +4,20 @@
 //! the numbers. Near its end a fit is straight in its numbers: what it would be without a part follows from the normal equations of the
 //! others, without a simulation more (Wahba 1990, Spline Models for Observational Data, ch. 4, for the choice of the smoothness).
 
+use crate::numeric::dense::positive_solve;
 use nalgebra::{DMatrix, DVector};
 
-/// Normal equations of one block.
-struct Block {
-    part: usize,
+/// Normal equations of the blocks of one part.
+#[derive(Clone)]
+struct Part {
     gram: DMatrix<f64>,
     right: DVector<f64>,
     square: f64,
 }
 
-/// The normal equations of a fit, block by block.
+/// The normal equations of a fit, part by part.
 pub(in crate::diagnose) struct LeftOut {
-    blocks: Vec<Block>,
-    parts: usize,
+    parts: Vec<Part>,
     /// Roughness as a quadratic form in all numbers.
     rough: DMatrix<f64>,
     /// The numbers.
@@ -36,44 +36,49 @@ impl LeftOut {
     /// Of a fit at `x` whose rows stand in blocks, each with its length and the part that it belongs to; `rough` belongs to the last numbers.
     pub fn new(of: &[(usize, usize)], r: &[f64], j: &DMatrix<f64>, x: &[f64], rough: &DMatrix<f64>) -> LeftOut {
         let (m, mut from) = (x.len(), 0);
-        let mut blocks = Vec::new();
+        let nothing = Part { gram: DMatrix::zeros(m, m), right: DVector::zeros(m), square: 0.0 };
+        let mut parts = vec![nothing; of.iter().map(|b| b.1 + 1).max().unwrap_or(0)];
         for &(len, part) in of {
             let own = j.rows(from, len);
             let left = DVector::from_column_slice(&r[from..from + len]);
-            blocks.push(Block { part, gram: own.tr_mul(&own), right: own.tr_mul(&left), square: left.norm_squared() });
+            parts[part].gram += own.tr_mul(&own);
+            parts[part].right += own.tr_mul(&left);
+            parts[part].square += left.norm_squared();
             from += len;
         }
         let mut all = DMatrix::zeros(m, m);
         let at = m - rough.ncols();
         all.view_mut((at, at), (rough.ncols(), rough.ncols())).copy_from(&rough.tr_mul(rough));
-        let parts = of.iter().map(|b| b.1 + 1).max().unwrap_or(0);
-        LeftOut { blocks, parts, rough: all, x: DVector::from_column_slice(x) }
+        LeftOut { parts, rough: all, x: DVector::from_column_slice(x) }
     }
 
-    /// The normal matrix of all blocks but those of one part, and the right-hand side.
+    /// The normal matrix of all parts but one, and the right-hand side.
     fn without(&self, part: Option<usize>) -> (DMatrix<f64>, DVector<f64>) {
         let m = self.x.len();
-        let kept = self.blocks.iter().filter(|b| Some(b.part) != part);
-        kept.fold((DMatrix::zeros(m, m), DVector::zeros(m)), |(g, r), b| (g + &b.gram, r + &b.right))
+        let (mut gram, mut right) = (DMatrix::zeros(m, m), DVector::zeros(m));
+        for (_, p) in self.parts.iter().enumerate().filter(|(k, _)| Some(*k) != part) {
+            gram += &p.gram;
+            right += &p.right;
+        }
+        (gram, right)
     }
 
     /// Sum of squares over all parts, each under the fit to the others.
     pub fn error(&self, smoothness: f64) -> f64 {
-        let one = |part: usize| {
-            let (gram, right) = self.without(Some(part));
-            let rough = &self.rough * smoothness;
-            let Some(step) = solved(&(gram + &rough), &(right + &rough * &self.x)) else { return f64::INFINITY };
-            let own = self.blocks.iter().filter(|b| b.part == part);
-            own.map(|b| b.square - 2.0 * step.dot(&b.right) + step.dot(&(&b.gram * &step))).sum::<f64>()
+        let rough = &self.rough * smoothness;
+        let one = |(k, own): (usize, &Part)| {
+            let (gram, right) = self.without(Some(k));
+            let Some(step) = solved(gram + &rough, &(right + &rough * &self.x)) else { return f64::INFINITY };
+            own.square - 2.0 * step.dot(&own.right) + step.dot(&(&own.gram * &step))
         };
-        (0..self.parts).map(one).sum()
+        self.parts.iter().enumerate().map(one).sum()
     }
 
     /// Where a fit that is straight in its numbers ends.
     pub fn solution(&self, smoothness: f64) -> Option<Vec<f64>> {
         let (gram, right) = self.without(None);
         let rough = &self.rough * smoothness;
-        let step = solved(&(gram + &rough), &(right + &rough * &self.x))?;
+        let step = solved(gram + &rough, &(right + &rough * &self.x))?;
         Some((&self.x - step).iter().copied().collect())
     }
 
@@ -99,27 +104,28 @@ impl LeftOut {
         let noise = coloured.tr_mul(&coloured) * sigma2;
         let level = noise.trace() / gram.trace().max(f64::MIN_POSITIVE);
         let middle = noise + &rough * level;
-        let held = held(&(gram + rough));
+        let held = held(gram + rough);
         held.cholesky()
             .map_or_else(|| DMatrix::from_element(m, m, f64::INFINITY), |c| c.solve(&c.solve(&middle).transpose()))
     }
 }
 
-fn held(a: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut a = a.clone();
+fn held(mut a: DMatrix<f64>) -> DMatrix<f64> {
     let most = a.diagonal().max();
     (0..a.nrows()).for_each(|i| a[(i, i)] += HELD * a[(i, i)].max(HELD * most));
     a
 }
 
 /// -A⁻¹ b changes the sign of the right-hand side: the step of a least-squares fit is against its gradient.
-fn solved(a: &DMatrix<f64>, b: &DVector<f64>) -> Option<DVector<f64>> {
+fn solved(mut a: DMatrix<f64>, b: &DVector<f64>) -> Option<DVector<f64>> {
     // Numbers of one size each, so that a lag and a torque share a matrix.
-    let scale: Vec<f64> = a.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt().recip() } else { 0.0 }).collect();
-    let unit = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale[i] * scale[j]);
-    let right = DVector::from_fn(b.len(), |i, _| b[i] * scale[i]);
-    let y = held(&(unit + DMatrix::identity(a.nrows(), a.ncols()) * HELD)).cholesky()?.solve(&right);
-    Some(DVector::from_fn(b.len(), |i, _| y[i] * scale[i]))
+    let scale = a.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 });
+    for j in 0..a.ncols() {
+        (0..a.nrows()).for_each(|i| a[(i, j)] *= scale[i] * scale[j]);
+        a[(j, j)] += HELD;
+    }
+    let (y, _) = positive_solve(&held(a), &b.component_mul(&scale))?;
+    Some(y.component_mul(&scale))
 }
 
 /// The autoregression of a series (Levinson and Durbin) and the variance of what drives it.

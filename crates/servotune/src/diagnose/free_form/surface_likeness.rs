@@ -23,13 +23,29 @@ impl Drag {
     }
 }
 
-/// Positions at which strengths are compared, over the range.
+/// Positions at which strengths are compared, and the share of the samples that may lie beyond the first or the last of them.
 const LOOKED: usize = 9;
+const SELDOM: f64 = 0.03;
 
 fn drags() -> impl Iterator<Item = Drag> {
     let dry = KINKS.map(|s| Drag { facts: &coulomb_friction::FACTS, words: "dry friction", turn: Some(s) });
     let air = Drag { facts: &aerodynamic_drag::FACTS, words: "drag of the air", turn: None };
     dry.into_iter().chain([air])
+}
+
+/// How many shares from an end on hold few samples.
+fn seldom<'a>(shares: impl Iterator<Item = &'a f64>) -> usize {
+    let sums = shares.scan(0.0, |sum, s| {
+        *sum += s;
+        Some(*sum)
+    });
+    sums.take_while(|sum| *sum < SELDOM).count()
+}
+
+/// Between which positions the machine was, but for few samples.
+fn often(c: &Plain) -> [f64; 2] {
+    let share: Vec<f64> = c.weight.chunks(c.knots.velocity.len()).map(|w| w.iter().sum()).collect();
+    [c.knots.at[seldom(share.iter())], c.knots.at[share.len() - 1 - seldom(share.iter().rev())]]
 }
 
 /// The law that the surface is most like; the unit is that of positions.
@@ -63,7 +79,8 @@ pub(in crate::diagnose) fn surface_likeness(c: &Plain, unit: &str) -> Likeness {
         return Likeness { effect: drag.facts.name, share, says };
     }
     let strength = |side: &[f64], x: f64| side[0] + along(x) * (side[1] + along(x) * side[2]);
-    let at = (0..LOOKED).map(|k| low + (high - low) * k as f64 / (LOOKED - 1) as f64);
+    let [first, last] = often(c);
+    let at = (0..LOOKED).map(|k| first + (last - first) * k as f64 / (LOOKED - 1) as f64);
     let mean = |x: f64| 0.5 * (strength(&shares[3..6], x) + strength(&shares[6..], x));
     let places: Vec<(f64, f64)> = at.map(|x| (x, mean(x))).collect();
     let most = places.iter().copied().fold(places[0], |m, p| if p.1 > m.1 { p } else { m });

@@ -85,6 +85,12 @@ rules! {
     LOOP_EXPLAINS_HALF: f64 = 0.5, "share",
         "that share",
         "the larger part is more than half";
+    NAME_FAR: f64 = 3.0, "noise",
+        "error that a named law leaves on held-out records from which a curve is looked for in its place, where the noise is what repeats differ by",
+        "as in closed loop: several times the noise is something that nobody explained";
+    NAME_YIELDS: f64 = 0.25, "share",
+        "error that such a curve leaves over that of the names, below which it takes their place",
+        "a curve of many numbers must be far better than a name";
     HELD_OUT_DOWN: f64 = 1.05, "noise",
         "error over the noise floor that is down to it",
         "judgement: the floor errs by some per cent";

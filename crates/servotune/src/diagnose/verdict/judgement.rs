@@ -14,12 +14,13 @@ use crate::diagnose::fit::simulation::Simulation;
 use crate::diagnose::rules::{
     BELOW_NOISE, BOOTSTRAP_CHANCE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, DECISIVE_LEFT, DECISIVE_RIVAL,
     DECISIVE_SHARE, GIVEN_FAR, HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LEFTOVER,
-    LOOP_EXPLAINS, LOOP_EXPLAINS_HALF, LOOP_LEFT, LOOP_LEFT_TWICE, NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO,
-    RESTLESS_SIGMA, SEEN_CHANCE, WIND_LEFT,
+    LOOP_EXPLAINS, LOOP_EXPLAINS_HALF, LOOP_LEFT, LOOP_LEFT_TWICE, NAME_FAR, NAMED_SHARE, NAMED_SHARE_OF_SEVERAL,
+    RESTLESS_RATIO, RESTLESS_SIGMA, SEEN_CHANCE, WIND_LEFT,
 };
 use crate::diagnose::search::selection::Selection;
 use crate::diagnose::search::shortlist::same_drag;
 use crate::lti::Plant;
+use crate::numeric::digits::said;
 use crate::physics::{AnyLaw, Port, library};
 
 /// Findings that the search has no part in.
@@ -249,6 +250,32 @@ fn far_from_noise(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection
     d.remarks.push(format!("{times:.1} times the noise stay in the simulation{beside}: something else acts"));
     d.verdict = Verdict::LocatedUnexplained;
     d.findings = vec![unexplained(data, selection, figures.explained_share.clamp(0.0, 1.0))];
+}
+
+/// Whether names stand that leave several times what repeats differ by.
+pub(in crate::diagnose) fn named_far_from_noise(d: &Diagnosis, data: &DiagnosisData) -> bool {
+    let f = d.fit.holdout.unwrap_or(d.fit.fit);
+    let named = matches!(d.verdict, Verdict::Named | Verdict::Family);
+    named && data.levels.from_repeats && f.rms_after > NAME_FAR * f.noise_floor
+}
+
+/// Takes names back whose model leaves so many times the noise, for a curve that leaves this many.
+pub(in crate::diagnose) fn yield_to_curve(
+    d: &mut Diagnosis,
+    data: &DiagnosisData,
+    selection: &Selection,
+    [names_leave, curve_leaves]: [f64; 2],
+) {
+    let names: Vec<&str> = d.findings.iter().map(|f| f.effect.as_str()).collect();
+    d.remarks.push(format!(
+        "{} is near to what acts, and not it: it leaves {} times the noise on records that were not fitted, a curve without a name {} times",
+        names.join(", "),
+        said(names_leave, 3),
+        said(curve_leaves, 3)
+    ));
+    let share = d.fit.holdout.unwrap_or(d.fit.fit).explained_share.clamp(0.0, 1.0);
+    d.verdict = Verdict::LocatedUnexplained;
+    d.findings = vec![unexplained(data, selection, share)];
 }
 
 /// Whether these figures, of records in closed loop, leave several times the noise and much of what the given plant leaves.
