@@ -12,7 +12,7 @@ use crate::diagnose::fit::shock::{DetectedShock, beyond};
 use crate::diagnose::fit::simulation::{SimulatedModel, errors, rms};
 use crate::diagnose::free_form::estimation::may_fold;
 use crate::diagnose::noise::torque_noise::torque_noise;
-use crate::diagnose::rules::NAME_YIELDS;
+use crate::diagnose::rules::{CLEAN, NAME_YIELDS};
 use crate::diagnose::search::select::select;
 use crate::diagnose::search::select_settings::SelectSettings;
 use crate::diagnose::search::selection::Selection;
@@ -67,7 +67,9 @@ impl Trial<'_> {
         let cut = data.runs.clone();
         let (mut first, open) = self.made(data, progress)?;
         let (far, joint) = (named_far_from_noise(&first.diagnosis, &first.data), open_to_play(&first.diagnosis));
-        if !far && !joint {
+        // What no fitted record shows, none can tell the form of.
+        let shown = first.selection.baseline.excess_sigma() >= CLEAN;
+        if !(far || joint && shown) {
             return Ok(first);
         }
         // The search may have been made on excerpts: so are observers and curves; what they come to is judged on the whole.
