@@ -177,7 +177,7 @@ fn rising(x: f64, v: f64) -> f64 {
 fn a_friction_that_changes_along_the_stroke_is_recovered_over_both() {
     let machine = Machine { torque: rising, ..SOUND };
     let d = machine.diagnosed().diagnosis;
-    // Dry friction is near to it, and leaves a hundred times the noise.
+    // Dry friction is near to it, and leaves many times the noise.
     assert_eq!(d.verdict, Verdict::LocatedUnexplained, "{:?}", d.findings);
     let curve = d.free_form.as_ref().unwrap();
     assert_eq!((curve.port, curve.argument), ("torque", "position_and_velocity"), "{:?}", curve.ports);
@@ -203,7 +203,9 @@ fn a_friction_that_changes_along_the_stroke_is_recovered_over_both() {
     let beyond = |all: DVector<f64>| (&all - &plane * plane.clone().svd(true, true).solve(&all, 1e-12).unwrap()).norm();
     let missed = beyond(DVector::from_fn(knots.len(), |i, _| weigh(i, knots[i].value - truth(i))));
     let whole = beyond(DVector::from_fn(knots.len(), |i, _| weigh(i, truth(i))));
+    // Straight pieces between velocities round the turn off: 4 % were measured here, 7 % of one at 500 um/s; twice that.
     assert!(missed < 0.15 * whole, "{}", missed / whole);
+    // The noise is 1, what the surface misses the rest: 3.4 were measured with the turn at 500 um/s.
     let held = d.fit.holdout.unwrap();
     assert!(held.rms_after < 5.0 * NOISE && curve.explained_share > 0.99, "{held:?}");
 }

@@ -12,8 +12,6 @@ use servotune::recording::{Case, Record, RecordEntry, Role};
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-/// Held-out records of a trial, by their places in it.
-const HELD: [usize; 2] = [10, 11];
 /// Lines of an excitation.
 const LINES: usize = 70;
 
@@ -122,10 +120,10 @@ impl Trial {
         1000 + 100 * self.seed + record as u64
     }
 
-    /// Noise of the encoder in the held-out records as it was drawn (rms): what nothing explains.
-    pub fn held_noise(&self) -> f64 {
-        let squares = HELD.map(|i| self.machine.noise_drawn(self.samples, self.noise_seed(i)));
-        (squares.iter().sum::<f64>() / (HELD.len() * self.samples) as f64).sqrt()
+    /// Noise of the encoder in some of the records as it was drawn (mean square): what nothing explains.
+    pub fn noise_drawn(&self, records: &[usize]) -> f64 {
+        let squares = records.iter().map(|i| self.machine.noise_drawn(self.samples, self.noise_seed(*i)));
+        squares.sum::<f64>() / (records.len() * self.samples) as f64
     }
 
     /// The records.

@@ -25,6 +25,13 @@ pub struct Likeness {
 }
 
 impl Likeness {
+    /// Like none of them, the nearest one holding too small a share.
+    pub(super) fn far(facts: &Facts, words: &str, share: f64) -> Likeness {
+        let percent = 100.0 * share;
+        let says = format!("like none of the named laws: the nearest, {words}, holds {percent:.0} % of the curve");
+        Likeness { effect: facts.name, share, says }
+    }
+
     /// Like none of them.
     pub(super) fn none() -> Likeness {
         Likeness { effect: unexplained::FACTS.name, share: 0.0, says: "like none of the named laws".into() }
@@ -44,7 +51,7 @@ struct Form {
 pub(super) const KINKS: [f64; 7] = [0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.75];
 
 /// A shape whose two sides differ by themselves.
-const TWO_GAINS: &str = "an amplifier with another gain each way";
+const TWO_GAINS: &str = "an amplifier with asymmetric gain";
 
 /// First knot, middle and half width of a curve.
 fn range(c: &Plain) -> (f64, f64, f64) {
@@ -226,12 +233,10 @@ pub(in crate::diagnose) fn likeness(c: &Plain, unit: &str) -> Likeness {
         false => lopsided(c, &form).map_or((None, left), |(text, left)| (Some(text), left)),
     };
     let share = if whole > 0.0 { 1.0 - left / whole } else { 0.0 };
-    let percent = 100.0 * share;
     if share < CURVE_LIKE {
-        let says =
-            format!("like none of the named laws: the nearest, {}, holds {percent:.0} % of the curve", form.words);
-        return Likeness { effect: form.facts.name, share, says };
+        return Likeness::far(form.facts, &form.words, share);
     }
+    let percent = 100.0 * share;
     let joint = if form.words == TWO_GAINS { ": it is" } else { ", but" };
     let beside = beside.map_or(String::new(), |text| format!("{joint} {text}"));
     let says = format!("like {}{beside}; that shape holds {percent:.0} % of the curve", form.words);

@@ -72,12 +72,10 @@ pub(in crate::diagnose) fn surface_likeness(c: &Plain, unit: &str) -> Likeness {
     }
     let Some((left, drag, shares)) = best else { return Likeness::none() };
     let share = if whole > 0.0 { 1.0 - left / whole } else { 0.0 };
-    let percent = 100.0 * share;
     if share < CURVE_LIKE {
-        let says =
-            format!("like none of the named laws: the nearest, {}, holds {percent:.0} % of the curve", drag.words);
-        return Likeness { effect: drag.facts.name, share, says };
+        return Likeness::far(drag.facts, drag.words, share);
     }
+    let percent = 100.0 * share;
     let strength = |side: &[f64], x: f64| side[0] + along(x) * (side[1] + along(x) * side[2]);
     let [first, last] = often(c);
     let at = (0..LOOKED).map(|k| first + (last - first) * k as f64 / (LOOKED - 1) as f64);

@@ -90,7 +90,7 @@ rules! {
         "as in closed loop: several times the noise is something that nobody explained";
     NAME_YIELDS: f64 = 0.25, "share",
         "error that such a curve leaves over that of the names, below which it takes their place",
-        "a curve of many numbers must be far better than a name";
+        "judgement: a curve of many numbers must be far better than a name";
     HELD_OUT_DOWN: f64 = 1.05, "noise",
         "error over the noise floor that is down to it",
         "judgement: the floor errs by some per cent";
