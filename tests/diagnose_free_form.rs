@@ -153,6 +153,30 @@ fn a_spring_with_a_bump_is_recovered() {
     assert!(miss < 0.05, "{miss}");
 }
 
+#[test]
+fn a_curve_and_the_run_out_beside_it_are_both_found() {
+    // Neither is small beside the other, and the spindle turns between the lines of the excitation.
+    let (hz, amplitude, phase) = (130.0, 0.05, 0.7);
+    let mut case = Machine { torque: |x, _| bumpy(x), ..SOUND }.case();
+    case.spindle_hz = Some(hz);
+    for (_, record) in &mut case.records {
+        let run_out = |k: usize| amplitude * (TAU * hz * k as f64 * T + phase).cos();
+        record.position.iter_mut().enumerate().for_each(|(k, y)| *y += run_out(k));
+    }
+    let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
+    let told = || format!("{:?} {:?} {:?}", d.findings, d.remarks, d.fit);
+    assert_eq!(d.free_form.as_ref().map(|f| f.argument), Some("position"), "{}", told());
+    let found = d.findings.iter().find(|f| f.effect == "repeatable_runout").unwrap_or_else(|| panic!("{}", told()));
+    let inside = |name: &str, truth: f64| {
+        let e = &found.parameters[name];
+        assert!(e.low <= truth && truth <= e.high && e.high - e.low < 0.2 * truth.abs(), "{name} {e:?}");
+    };
+    inside("amplitude", amplitude);
+    inside("phase_deg", phase.to_degrees());
+    let held = d.fit.holdout.unwrap();
+    assert!(held.rms_after < 1.5 * NOISE && held.rms_refit_linear > amplitude / 2f64.sqrt(), "{held:?}");
+}
+
 /// A drag that peaks and falls again.
 fn peaking(v: f64) -> f64 {
     -0.012 * (v / 700.0) / (1.0 + (v / 700.0).powi(2)).powi(2) * 3.0

@@ -2,8 +2,8 @@
 
 use super::diagnose_error::DiagnoseError;
 use super::preconditions;
-use super::progress::Pace;
-use super::rules::MEASURED_COMMAND;
+use super::progress::{AGAIN, Pace};
+use super::rules::{MEASURED_COMMAND, RUN_OUT_HELPS};
 use super::settings::DiagnoseSettings;
 use super::trial::Trial;
 use crate::controller::{Controller, Law};
@@ -17,6 +17,7 @@ use crate::diagnose::fit::simulation::rms;
 use crate::diagnose::search::cleared_plant::cleared;
 use crate::diagnose::verdict::diagnosed::Diagnosed;
 use crate::diagnose::verdict::log_checks::{LogChecks, check};
+use crate::diagnose::verdict::run_out::RunOut;
 use crate::lti::{Body, Plant};
 use crate::recording::{Case, Role};
 
@@ -44,56 +45,133 @@ pub fn diagnose(
     let law = controller.map(Law::new).transpose()?;
     let log_checks = check(case, &mut all, given, law.as_ref(), sample_time_s)?;
     let mut decoupled = decoupled(all, case, given, &log_checks, sample_time_s, &mut progress);
-    let mut remarks = std::mem::take(&mut decoupled.remarks);
+    let remarks = std::mem::take(&mut decoupled.remarks);
     let mut whole = std::mem::take(&mut decoupled.runs);
-    let cut = excerpts(&whole, sample_time_s);
-    if let Some(cut) = &cut {
-        let kept: usize = cut.iter().filter(|r| r.role == Role::Fit).map(Run::len).sum();
-        remarks.push(format!("the search was made on excerpts of the fit records, {kept} samples together; figures are of the whole records"));
-    }
-    let mut data = DiagnosisData::new(given, cut.unwrap_or_else(|| whole.clone()), sample_time_s, case.spindle_hz)?;
-    preconditions::check(&data)?;
+    let mut ground = Ground {
+        case,
+        given,
+        closed: law.as_ref().filter(|_| log_checks.closed),
+        settings,
+        log_checks: &log_checks,
+        sample_time_s,
+        remarks,
+    };
     if controller.is_none() {
         progress("is the command held between samples, or measured");
-        let (better, measured) = held_or_measured(data, case, given, settings.select.iterations, &mut remarks)?;
-        data = better;
-        if measured {
+        if ground.is_measured(&whole)? {
             whole = whole.iter().map(Run::measured).collect();
         }
     }
-    let sound = log_checks.finding.is_none();
-    let start = sound.then(|| cleared(&data, settings.select.iterations, &mut |step: &str| progress(step))).flatten();
-    if let Some(start) = start {
-        remarks.push(start.says().into());
-        data = DiagnosisData::new(&start.plant, data.runs, sample_time_s, case.spindle_hz)?;
-        if start.bends() {
-            let left = rms(&start.left);
-            if !data.noise_known {
-                data = data.with_noise(start.left);
-            }
-            // In closed loop it is not the open-loop simulation that is reported.
-            if controller.is_none() && data.is_far(left) {
-                data = data.judged_plainly(left);
-                remarks.push(PLAIN.into());
-            }
-        }
-        data.foretold = start.law;
+    let first = ground.searched(whole.clone(), &decoupled, &mut progress)?;
+    ground.with_run_out(first, whole, &decoupled, &mut progress)
+}
+
+/// What every search of a case goes by.
+struct Ground<'a> {
+    case: &'a Case,
+    given: &'a Plant,
+    /// The controller, where records are shown in closed loop.
+    closed: Option<&'a Law<'a>>,
+    settings: &'a DiagnoseSettings,
+    log_checks: &'a LogChecks,
+    sample_time_s: f64,
+    remarks: Vec<String>,
+}
+
+impl Ground<'_> {
+    fn data(&self, plant: &Plant, runs: Vec<Run>) -> Result<DiagnosisData, DiagnoseError> {
+        Ok(DiagnosisData::new(plant, runs, self.sample_time_s, self.case.spindle_hz)?)
     }
-    let (data, shocks) = set_aside(data, given, case.spindle_hz, settings.select.iterations)?;
-    whole.iter_mut().zip(&data.runs).for_each(|(w, r)| w.shocked = r.shocked);
-    let closed = law.as_ref().filter(|_| log_checks.closed);
-    let trial = Trial {
-        case,
-        given,
-        whole: &whole,
-        decoupled: &decoupled.recorded_as(&whole),
-        closed,
-        settings,
-        log_checks: &log_checks,
-        shocks: &shocks,
-        remarks: &remarks,
-    };
-    trial.best(data, &mut progress)
+
+    /// Whether the command fits better as measured at the samples than as held between them.
+    fn is_measured(&mut self, whole: &[Run]) -> Result<bool, DiagnoseError> {
+        let iterations = self.settings.select.iterations;
+        let left = |runs: Vec<Run>| -> Result<f64, DiagnoseError> {
+            let data = self.data(self.given, runs)?;
+            preconditions::check(&data)?;
+            let (data, linear) = refit(data, iterations);
+            Ok(rms(&data.without_starts(data.fit(vec![]).errors(&linear.refitted.p))))
+        };
+        let held: Vec<Run> = excerpts(whole, self.sample_time_s).unwrap_or_else(|| whole.to_vec());
+        let moving = left(held.iter().map(Run::measured).collect())? / left(held)?;
+        let measured = moving < MEASURED_COMMAND;
+        if measured {
+            self.remarks.push(format!(
+                "the command is taken as measured at the samples, not as held between them: the linear refit then leaves {moving:.3} of the error"
+            ));
+        }
+        Ok(measured)
+    }
+
+    /// The search on some runs, from a plant cleared of what bends it where the given one conceals that.
+    fn searched(
+        &self,
+        mut whole: Vec<Run>,
+        decoupled: &Decoupled,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Diagnosed, DiagnoseError> {
+        let (iterations, mut remarks) = (self.settings.select.iterations, self.remarks.clone());
+        let cut = excerpts(&whole, self.sample_time_s);
+        if let Some(cut) = &cut {
+            let kept: usize = cut.iter().filter(|r| r.role == Role::Fit).map(Run::len).sum();
+            remarks.push(format!("the search was made on excerpts of the fit records, {kept} samples together; figures are of the whole records"));
+        }
+        let mut data = self.data(self.given, cut.unwrap_or_else(|| whole.clone()))?;
+        preconditions::check(&data)?;
+        let sound = self.log_checks.finding.is_none();
+        let start = sound.then(|| cleared(&data, iterations, progress)).flatten();
+        if let Some(start) = start {
+            remarks.push(start.says().into());
+            data = self.data(&start.plant, data.runs)?;
+            if start.bends() {
+                let left = rms(&start.left);
+                if !data.noise_known {
+                    data = data.with_noise(start.left);
+                }
+                // In closed loop it is not the open-loop simulation that is reported.
+                if self.closed.is_none() && data.is_far(left) {
+                    data = data.judged_plainly(left);
+                    remarks.push(PLAIN.into());
+                }
+            }
+            data.foretold = start.law;
+        }
+        let (data, shocks) = set_aside(data, self.given, self.case.spindle_hz, iterations)?;
+        whole.iter_mut().zip(&data.runs).for_each(|(w, r)| w.shocked = r.shocked);
+        let trial = Trial {
+            case: self.case,
+            given: self.given,
+            decoupled: &decoupled.recorded_as(&whole),
+            whole: &whole,
+            closed: self.closed,
+            settings: self.settings,
+            log_checks: self.log_checks,
+            shocks: &shocks,
+            remarks: &remarks,
+        };
+        trial.best(data, progress)
+    }
+
+    /// The diagnosis with a run-out beside it that its law hid, where that leaves clearly less.
+    fn with_run_out(
+        &self,
+        first: Diagnosed,
+        whole: Vec<Run>,
+        decoupled: &Decoupled,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Diagnosed, DiagnoseError> {
+        let Some(found) = RunOut::beside(&first) else { return Ok(first) };
+        progress(&format!("{AGAIN}, without the run-out that it left"));
+        let recorded = if decoupled.recorded.is_empty() { whole.clone() } else { decoupled.recorded.clone() };
+        let clean = found.taken_out_of(&whole, self.sample_time_s);
+        let aside = Decoupled { recorded, ..decoupled.clone() };
+        let second = self.searched(clean, &aside, progress)?;
+        if second.judged() > RUN_OUT_HELPS * first.judged() || second.judged().is_nan() {
+            return Ok(first);
+        }
+        let found = found.bettered(&second).unwrap_or(found);
+        Ok(found.entered(second, &whole, self.closed))
+    }
 }
 
 /// The given plant with its resonances in pairs; refused where it holds physics already or no body that laws act on, or the controller runs at
@@ -146,29 +224,4 @@ fn decoupled(
     }
     progress("what further inputs move");
     Decoupled::of(all, given, &case.further_inputs, sample_time_s)
-}
-
-/// The diagnosis data with the command as it fits better: held between samples, or measured at them; and whether it is the latter.
-fn held_or_measured(
-    data: DiagnosisData,
-    case: &Case,
-    given: &Plant,
-    iterations: usize,
-    remarks: &mut Vec<String>,
-) -> Result<(DiagnosisData, bool), DiagnoseError> {
-    let measured: Vec<Run> = data.runs.iter().map(Run::measured).collect();
-    let other = DiagnosisData::new(given, measured, data.scene.sample_time_s, case.spindle_hz)?;
-    let left = |b: &DiagnosisData| {
-        let (b, linear) = refit(b.clone(), iterations);
-        rms(&b.without_starts(b.fit(vec![]).errors(&linear.refitted.p)))
-    };
-    let (held, moving) = (left(&data), left(&other));
-    if moving < MEASURED_COMMAND * held {
-        remarks.push(format!(
-            "the command is taken as measured at the samples, not as held between them: the linear refit then leaves {:.3} of the error",
-            moving / held
-        ));
-        return Ok((other, true));
-    }
-    Ok((data, false))
 }

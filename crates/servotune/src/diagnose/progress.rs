@@ -17,6 +17,9 @@ const STEPS: [(&str, f64); 9] = [
     ("simulating all", 0.9),
 ];
 
+/// How a search begins that is made once more.
+pub(super) const AGAIN: &str = "the search again";
+
 /// The clock of a diagnosis.
 pub(super) struct Pace {
     began: Instant,
@@ -29,7 +32,12 @@ impl Pace {
     }
 
     /// The step with its share and the time left; no time before a tenth is done.
+    ///
+    /// A search that is made again begins anew.
     pub fn says(&mut self, step: &str) -> String {
+        if step.starts_with(AGAIN) {
+            *self = Pace::new();
+        }
         let own = STEPS.iter().find(|(begins, _)| step.starts_with(begins)).map_or(self.share, |s| s.1);
         self.share = self.share.max(own);
         let spent = self.began.elapsed().as_secs_f64();
@@ -53,5 +61,7 @@ mod tests {
         assert_eq!(pace.says("checking the logs"), "checking the logs");
         assert!(pace.says("rivals of the findings").starts_with("rivals of the findings (60 %, about "));
         assert!(pace.says("scan of 25 effects for finding 2").contains("(60 %"));
+        assert_eq!(pace.says("the search again, without a run-out"), "the search again, without a run-out");
+        assert!(pace.says("scan of 25 effects for finding 1").contains("(15 %"));
     }
 }

@@ -9,7 +9,7 @@ use crate::diagnose::fit::coupling::Decoupled;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::repeats_around::repeats_around;
 use crate::diagnose::fit::shock::{DetectedShock, beyond};
-use crate::diagnose::fit::simulation::{SimulatedModel, errors, rms};
+use crate::diagnose::fit::simulation::{SimulatedModel, errors};
 use crate::diagnose::free_form::estimation::may_fold;
 use crate::diagnose::noise::torque_noise::torque_noise;
 use crate::diagnose::rules::{CLEAN, NAME_YIELDS};
@@ -17,12 +17,11 @@ use crate::diagnose::search::select::select;
 use crate::diagnose::search::select_settings::SelectSettings;
 use crate::diagnose::search::selection::Selection;
 use crate::diagnose::verdict::confirmation::confirm;
-use crate::diagnose::verdict::diagnosed::Diagnosed;
+use crate::diagnose::verdict::diagnosed::{Diagnosed, judged};
 use crate::diagnose::verdict::diagnosis_json::Diagnosis;
 use crate::diagnose::verdict::finding::{NextExperiment, Tried, Verdict};
-use crate::diagnose::verdict::fit_report::{Errors, figures_of, fit_report};
+use crate::diagnose::verdict::fit_report::{figures_of, fit_report};
 use crate::diagnose::verdict::held_out::{held_out, mean};
-
 use crate::diagnose::verdict::judgement::{ByOthers, judge, named_far_from_noise, yield_to_curve};
 use crate::diagnose::verdict::log_checks::LogChecks;
 use crate::diagnose::verdict::missing_curve::{StandIn, Standing, enter, stand_in};
@@ -55,17 +54,12 @@ fn settled(d: &Diagnosis) -> bool {
     !matches!(d.verdict, Verdict::LocatedUnexplained | Verdict::Undecidable)
 }
 
-/// Error (rms) of the records that judge, out of those of all.
-fn judged(data: &DiagnosisData, errors: &[Vec<f64>]) -> f64 {
-    rms(&data.judging().iter().map(|&i| errors[i].clone()).collect::<Vec<_>>())
-}
-
 impl Trial<'_> {
     /// The search, with a curve where it ends without a name or with one that leaves much, or cannot tell what is left from noise, and one is
     /// worth it.
     pub fn best(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
         let cut = data.runs.clone();
-        let (mut first, open) = self.made(data, progress)?;
+        let mut first = self.made(data, progress)?;
         let (far, joint) = (named_far_from_noise(&first.diagnosis, &first.data), open_to_play(&first.diagnosis));
         // What no fitted record shows, none can tell the form of.
         let shown = first.selection.baseline.excess_sigma() >= CLEAN;
@@ -78,7 +72,7 @@ impl Trial<'_> {
         let folds = may_fold(&searched);
         let mut curve = if folds { self.curve(&first, &searched, progress) } else { None };
         if let Some(found) = curve.take_if(|found| found.finding.is_some() && !far) {
-            return Ok(self.with_curve(first, open, found));
+            return Ok(self.with_curve(first, found));
         }
         if joint {
             progress("a play under an observer");
@@ -86,7 +80,7 @@ impl Trial<'_> {
             let plants = [self.given.clone(), first.refitted.clone(), searched.form.given.clone(), beside_laws];
             if let Some(play) = observed_play(&searched, &plants, self.settings.select.iterations) {
                 play.enter(&mut first.diagnosis);
-                self.offer(&mut first, open, play.corrected);
+                self.offer(&mut first, play.corrected);
                 propose(&mut first.diagnosis, &first.data, &first.selection);
                 return Ok(first);
             }
@@ -98,25 +92,25 @@ impl Trial<'_> {
             curve = self.curve(&first, &searched, progress);
         }
         Ok(match curve {
-            Some(found) if far => self.unless_outdone(first, open, found),
-            Some(found) => self.with_curve(first, open, found),
+            Some(found) if far => self.unless_outdone(first, found),
+            Some(found) => self.with_curve(first, found),
             None => first,
         })
     }
 
     /// The diagnosis with its names, or with a curve in their place that leaves far less of the records that were not used.
-    fn unless_outdone(&self, mut named: Diagnosed, open: Errors, found: StandIn) -> Diagnosed {
+    fn unless_outdone(&self, mut named: Diagnosed, found: StandIn) -> Diagnosed {
         let left = [&named.errors[2], &found.errors[0]].map(|e| judged(&named.data, e));
         if left[1].is_nan() || left[1] > NAME_YIELDS * left[0] {
             return named;
         }
         let floor = named.diagnosis.fit.holdout.unwrap_or(named.diagnosis.fit.fit).noise_floor;
         yield_to_curve(&mut named.diagnosis, &named.data, &named.selection, left.map(|v| v / floor));
-        self.with_curve(named, open, found)
+        self.with_curve(named, found)
     }
 
     /// Offers another model where it simulates no record that was not used worse than the one that is offered.
-    fn offer(&self, made: &mut Diagnosed, mut open: Errors, model: Corrected) {
+    fn offer(&self, made: &mut Diagnosed, model: Corrected) {
         let every: Vec<&Run> = made.data.runs.iter().collect();
         let simulated = |closed: Option<&Law>| errors(&model.alone(&made.data), &every, closed);
         let shown = simulated(self.closed);
@@ -128,8 +122,8 @@ impl Trial<'_> {
             );
             return;
         }
-        [open[2], made.errors[2]] = [simulated(None), shown];
-        made.diagnosis.fit = figures_of(&made.data, &every, [&open, &made.errors], self.closed.is_some());
+        [made.open[2], made.errors[2]] = [simulated(None), shown];
+        made.diagnosis.fit = figures_of(&made.data, &every, [&made.open, &made.errors], self.closed.is_some());
         made.corrected = model;
     }
 
@@ -141,18 +135,18 @@ impl Trial<'_> {
     }
 
     /// The diagnosis with that curve.
-    fn with_curve(&self, mut made: Diagnosed, mut open: Errors, found: StandIn) -> Diagnosed {
+    fn with_curve(&self, mut made: Diagnosed, found: StandIn) -> Diagnosed {
         enter(&mut made.diagnosis, &found);
-        [made.errors[2], open[2]] = found.errors;
+        [made.errors[2], made.open[2]] = found.errors;
         let every: Vec<&Run> = made.data.runs.iter().collect();
-        made.diagnosis.fit = figures_of(&made.data, &every, [&open, &made.errors], self.closed.is_some());
+        made.diagnosis.fit = figures_of(&made.data, &every, [&made.open, &made.errors], self.closed.is_some());
         made.corrected = found.corrected;
         propose(&mut made.diagnosis, &made.data, &made.selection);
         made
     }
 
-    /// One search and what it comes to, with the errors of all runs in open loop.
-    fn made(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<(Diagnosed, Errors), DiagnoseError> {
+    /// One search and what it comes to.
+    fn made(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Diagnosed, DiagnoseError> {
         let mut remarks = self.remarks.to_vec();
         // Records whose samples slipped hold nothing that a model could be fitted to.
         // A log that slipped or is in other units is no ground for the long way.
@@ -171,7 +165,7 @@ impl Trial<'_> {
         let fixed = corrected(&data.form, &last.refitted.p, &last.chosen, &data.scene);
         let refitted = corrected(&data.form, &selection.baseline.refitted.p, &[], &data.scene);
         let couplings = &self.decoupled.couplings;
-        let recorded = if couplings.is_empty() { self.whole } else { &self.decoupled.recorded };
+        let recorded = if self.decoupled.recorded.is_empty() { self.whole } else { &self.decoupled.recorded };
         let reporting =
             Reporting { data: &data, selection: &selection, runs: self.whole, recorded, closed: self.closed, sound };
         let reported = reporting.offered(self.given);
@@ -215,7 +209,7 @@ impl Trial<'_> {
         // Pictures are of the whole records.
         let data = DiagnosisData { runs: self.whole.to_vec(), ..data };
         let (corrected, refitted) = (reported.fixed.made, reported.refitted.made.plant);
-        Ok((Diagnosed { diagnosis, data, selection, corrected, refitted, errors }, open))
+        Ok(Diagnosed { diagnosis, data, selection, corrected, refitted, errors, open })
     }
 }
 

@@ -87,6 +87,18 @@ impl Run {
         }
     }
 
+    /// The same run without a motion of the position that the controller goes on hearing.
+    pub fn without(&self, motion: &[f64]) -> Run {
+        let position = self.position.iter().zip(motion).map(|(y, m)| y - m).collect();
+        let origin =
+            self.origin - mean(&motion[..quiet(self.reference.as_deref().unwrap_or_default(), &self.excitation)]);
+        let coupled = match self.coupled.is_empty() {
+            true => motion.to_vec(),
+            false => self.coupled.iter().zip(motion).map(|(c, m)| c + m).collect(),
+        };
+        Run { position, origin, coupled, ..self.clone() }
+    }
+
     /// Samples.
     pub fn len(&self) -> usize {
         self.position.len()
@@ -129,7 +141,7 @@ fn still(series: &[f64]) -> usize {
 }
 
 /// Samples from the start for which reference and excitation stand still; at least one.
-pub fn quiet(reference: &[f64], excitation: &[f64]) -> usize {
+fn quiet(reference: &[f64], excitation: &[f64]) -> usize {
     still(reference).min(still(excitation)).max(1).min(excitation.len())
 }
 

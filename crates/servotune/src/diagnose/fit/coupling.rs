@@ -7,7 +7,7 @@
 use super::lagged_regression::{LaggedRegression, Padded, Responses};
 use super::simulation::{SimulatedModel, errors};
 use crate::diagnose::data::linear_form::free_motions;
-use crate::diagnose::data::run::{Run, quiet};
+use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::scene;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{COUPLING_CHANCE, COUPLING_LEFT_OUT, COUPLING_SHORTER};
@@ -43,6 +43,7 @@ pub struct Coupling {
 }
 
 /// Runs of a case without what further inputs move.
+#[derive(Clone)]
 pub(in crate::diagnose) struct Decoupled {
     /// The runs, what couples taken out of their position.
     pub runs: Vec<Run>,
@@ -106,10 +107,10 @@ impl Decoupled {
     }
 
     /// The recorded runs with the input as it is held, and marked as shocked, in these.
-    pub fn recorded_as(self, whole: &[Run]) -> Decoupled {
-        let as_whole = |(r, w): (Run, &Run)| Run { input: w.input.clone(), shocked: w.shocked, ..r };
-        let recorded = self.recorded.into_iter().zip(whole).map(as_whole).collect();
-        Decoupled { recorded, ..self }
+    pub fn recorded_as(&self, whole: &[Run]) -> Decoupled {
+        let as_whole = |(r, w): (&Run, &Run)| Run { input: w.input.clone(), shocked: w.shocked, ..r.clone() };
+        let recorded = self.recorded.iter().zip(whole).map(as_whole).collect();
+        Decoupled { recorded, ..self.clone() }
     }
 }
 
@@ -119,9 +120,7 @@ fn cleared(run: &Run, which: &[usize], couplings: &[Coupling]) -> Run {
     for (&j, c) in which.iter().zip(couplings) {
         coupled.iter_mut().zip(answer(&c.response, &run.further[j])).for_each(|(m, v)| *m += v);
     }
-    let position = run.position.iter().zip(&coupled).map(|(y, m)| y - m).collect();
-    let origin = run.origin - mean(&coupled[..quiet(run.reference.as_deref().unwrap_or_default(), &run.excitation)]);
-    Run { position, origin, coupled, ..run.clone() }
+    run.without(&coupled)
 }
 
 /// The motion by an impulse response, the input having stood at its first value.

@@ -7,8 +7,7 @@
 use super::chance::log_tail;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::NuisanceBasis;
-use crate::diagnose::rules::{LINE_CHANCE, LINE_SNAP};
-use crate::diagnose::rules::{MAINS_MULTIPLES, MAINS_OFF_HZ};
+use crate::diagnose::rules::{LINE_CHANCE, LINE_SNAP, MAINS_MULTIPLES, MAINS_OFF_HZ, ORDER_STANDS_OUT};
 use crate::numeric::golden::golden_section;
 use crate::numeric::least_squares::dot;
 use crate::numeric::spectrum::forward;
@@ -139,6 +138,39 @@ pub fn peak(
     })
 }
 
+/// Highest order of the spindle that is looked at, and most orders that are closed.
+const HIGHEST_ORDER: usize = 24;
+/// Quantile of the power around an order that it stands out from: a driven record's error may be all lines, and then the order is to stand out
+/// from them.
+const AROUND: f64 = 0.9;
+
+/// Orders of the spindle that stand out of series, whatever else is in them; strongest first.
+pub fn standing_orders(series: &[Vec<f64>], sample_time_s: f64, spindle_hz: Option<f64>) -> Vec<Line> {
+    let (Some(longest), Some(spindle)) = (series.iter().map(Vec::len).max(), spindle_hz) else { return Vec::new() };
+    let n = 2 * longest;
+    let mut power = vec![0.0; n / 2];
+    for x in series {
+        let mut padded = x.clone();
+        padded.resize(n, 0.0);
+        power.iter_mut().zip(forward(&padded)).for_each(|(p, b)| *p += b.norm_sqr());
+    }
+    let stands_out = |hz: f64| {
+        let k = (hz * n as f64 * sample_time_s).round() as usize;
+        let near = k.saturating_sub(2 * LEVEL[0])..(k + 2 * LEVEL[0]).min(power.len());
+        let mut around: Vec<f64> = near.filter(|j| j.abs_diff(k) > 2 * LEVEL[1] && *j > 2).map(|j| power[j]).collect();
+        around.sort_by(f64::total_cmp);
+        let level = around.get((AROUND * around.len() as f64) as usize)?;
+        let most = power.get(k.checked_sub(1)?..=k + 1)?.iter().fold(0.0f64, |m, p| m.max(*p));
+        Some(most / level).filter(|r| *r > ORDER_STANDS_OUT)
+    };
+    let orders = (1..=HIGHEST_ORDER).map(|order| (order, order as f64 * spindle));
+    let mut found: Vec<(f64, Line)> =
+        orders.filter_map(|(order, hz)| Some((stands_out(hz)?, Line { hz, order: Some(order), log_p: 0.0 }))).collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.truncate(MOST);
+    found.into_iter().map(|f| f.1).collect()
+}
+
 /// A run and its error.
 pub type RunError = (usize, Vec<f64>);
 /// White series of noise, and the group of repeats that each belongs to.
@@ -180,4 +212,41 @@ pub(in crate::diagnose) fn mains(hz: f64) -> bool {
         let k = (hz / base).round();
         (1.0..=MAINS_MULTIPLES).contains(&k) && (hz - k * base).abs() < MAINS_OFF_HZ
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::random::Random;
+
+    const T: f64 = 1e-4;
+
+    /// White noise with a cosine.
+    fn noisy(amplitude: f64, hz: f64, seed: u64) -> Vec<f64> {
+        let mut noise = Random::new(seed);
+        (0..3000).map(|k| noise.normal() + amplitude * (TAU * hz * f64::from(k) * T).cos()).collect()
+    }
+
+    fn found(series: &[Vec<f64>]) -> Vec<Option<usize>> {
+        standing_orders(series, T, Some(90.0)).into_iter().map(|l| l.order).collect()
+    }
+
+    #[test]
+    fn an_order_of_the_spindle_stands_out_of_noise_and_another_line_does_not() {
+        let of = |amplitude, hz| (0..4).map(|i| noisy(amplitude, hz, i)).collect::<Vec<_>>();
+        assert_eq!(found(&of(0.5, 180.0)), [Some(2)]);
+        assert_eq!(found(&of(0.5, 215.0)), []);
+        assert_eq!(standing_orders(&of(0.5, 180.0), T, None).len(), 0);
+    }
+
+    #[test]
+    fn noise_alone_has_no_order_and_one_among_lines_as_strong_as_it_stands_not_out() {
+        for seed in 0..40 {
+            assert_eq!(found(&[noisy(0.0, 0.0, 2 * seed), noisy(0.0, 0.0, 2 * seed + 1)]), [], "seed {seed}");
+        }
+        // Every tenth hertz is driven, 90 among them.
+        let driven =
+            |k: usize| (1..40).map(|h| (TAU * 10.0 * f64::from(h) * k as f64 * T + f64::from(h * h)).cos()).sum();
+        assert_eq!(found(&[(0..3000).map(driven).collect()]), []);
+    }
 }

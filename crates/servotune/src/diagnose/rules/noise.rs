@@ -37,6 +37,9 @@ rules! {
     LINE_CHANCE: f64 = 1e-6, "probability",
         "chance of a false line over all frequencies",
         "judgement: a line is taken out of every record, so chance must not make one";
+    ORDER_STANDS_OUT: f64 = 5.0, "times",
+        "power of an order of the spindle in what the linear refit leaves, over the power that nine in ten frequencies around stay below, from which the order is left out while laws are looked for",
+        "run-out must not choose another law; left out for nothing it costs two numbers a record, and it is looked at again before anything is said";
     LINE_SNAP: f64 = 0.5, "line widths",
         "distance within which a line is an order of the spindle",
         "half the resolution of the record";

@@ -7,6 +7,9 @@ use super::{Floor, Rule, rules};
 
 rules! {
     Floor::Verdict;
+    RUN_OUT_HELPS: f64 = 0.9, "ratio",
+        "error of the records that judge with a run-out that was taken out and all searched again, over that without, below which it is kept",
+        "judgement: an order that another law's form feeds takes little with it";
     FAMILY: f64 = 20.0, "twice log-likelihood",
         "difference of two fits below which they are one family",
         "judgement: odds of e^10; laws differ from machines by more than noise";

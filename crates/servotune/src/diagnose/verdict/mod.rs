@@ -20,4 +20,5 @@ pub(super) mod next_experiment;
 pub(super) mod noise_finding;
 pub(super) mod observed_play;
 pub(super) mod offered_models;
+pub(super) mod run_out;
 mod shock_finding;

@@ -1,0 +1,237 @@
+//! Run-out of the disk that another law hides: orders of the spindle that stand out of what the offered model leaves are fitted to it and taken
+//! out of the records, and what is left of those is diagnosed anew.
+//!
+//! In: a diagnosis. Out: the orders, records without them, and a diagnosis that has them. Convention: a run-out adds to the recorded position
+//! and moves nothing; the controller hears it. Spec: `specs/mismatch.md`, "Run-out beside another law".
+
+use super::diagnosed::Diagnosed;
+use super::finding::{Estimate, Finding, Verdict};
+use super::fit_report::figures_of;
+use super::localisation::place;
+use super::naming::RUNOUT;
+use crate::controller::Law;
+use crate::diagnose::data::linear_form::free_motions;
+use crate::diagnose::data::run::Run;
+use crate::diagnose::data::stacked_records::NuisanceBasis;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::simulation::{SimulatedModel, errors, size};
+use crate::diagnose::noise::chance::log_tail;
+use crate::diagnose::noise::lines::{Line, standing_orders};
+use crate::lti::PhysicsEntry;
+use crate::numeric::least_squares::Qr;
+use crate::physics::repeatable_runout::{FACTS, RepeatableRunout};
+use crate::physics::{Facts, Parameter, Parametric, Setting, Unit};
+use crate::recording::Role;
+use std::collections::BTreeMap;
+
+/// Harmonics of a base order that one run-out holds.
+const HARMONICS: usize = 3;
+
+/// Orders of the spindle in the recorded position.
+#[derive(Clone)]
+pub(in crate::diagnose) struct RunOut {
+    orders: Vec<Line>,
+    /// Cosine and sine of each (position_unit).
+    phasors: Vec<[f64; 2]>,
+    /// Changes of those by one standard error each, along directions that err independently.
+    directions: Vec<Vec<[f64; 2]>>,
+    /// Fall of the sum of squares of the whitened error.
+    gain: f64,
+}
+
+impl RunOut {
+    /// The orders that stand out of what the offered model leaves of the fit records in open loop; none where a run-out is named already, or
+    /// nothing stands out.
+    pub fn beside(made: &Diagnosed) -> Option<RunOut> {
+        let data = &made.data;
+        let named = made.diagnosis.findings.iter().any(|f| f.effect == RUNOUT);
+        if named || made.diagnosis.verdict == Verdict::DataFault {
+            return None;
+        }
+        let left = Left::of(data, &made.open[2])?;
+        let mut orders = standing_orders(&left.errors(), data.scene.sample_time_s, data.scene.spindle_hz);
+        orders.retain(|o| data.lines.iter().all(|l| l.order != o.order));
+        if orders.is_empty() { None } else { left.fitted(orders) }
+    }
+
+    /// The same orders once more, fitted to what is left where they are taken out already.
+    pub fn bettered(&self, made: &Diagnosed) -> Option<RunOut> {
+        let more = Left::of(&made.data, &made.open[2])?.fitted(self.orders.clone())?;
+        let phasors = self.phasors.iter().zip(&more.phasors).map(|(a, b)| [a[0] + b[0], a[1] + b[1]]).collect();
+        Some(RunOut { phasors, gain: self.gain + more.gain, ..more })
+    }
+
+    /// What it adds to the position of a run.
+    fn motion(&self, run: &Run, sample_time_s: f64) -> Vec<f64> {
+        let mut all = vec![0.0; run.len()];
+        for (line, [c, s]) in self.orders.iter().zip(&self.phasors) {
+            let [cos, sin] = line.columns(run, sample_time_s);
+            all.iter_mut().zip(cos.iter().zip(&sin)).for_each(|(m, (a, b))| *m += c * a + s * b);
+        }
+        all
+    }
+
+    /// Runs without it.
+    pub fn taken_out_of(&self, runs: &[Run], sample_time_s: f64) -> Vec<Run> {
+        runs.iter().map(|r| r.without(&self.motion(r, sample_time_s))).collect()
+    }
+
+    /// As effects: base orders with their harmonics, the lowest first, each with the places of its phasors.
+    fn effects(&self, phasors: &[[f64; 2]]) -> Vec<Setting> {
+        let number = |l: &Line| l.order.unwrap_or(0);
+        let mut rest: Vec<usize> = (0..self.orders.len()).collect();
+        rest.sort_by_key(|&i| number(&self.orders[i]));
+        let mut all = Vec::new();
+        while let Some(&first) = rest.first() {
+            let base = &self.orders[first];
+            let mut strengths = vec![0.0; 2 * HARMONICS];
+            rest.retain(|&i| {
+                let own = (1..=HARMONICS).find(|h| h * number(base) == number(&self.orders[i]));
+                own.inspect(|h| strengths[2 * h - 2..2 * h].copy_from_slice(&phasors[i])).is_none()
+            });
+            all.push(Setting::new(RepeatableRunout { base_hz: base.hz }, strengths));
+        }
+        all
+    }
+
+    /// The diagnosis of records without it, made one of the records as they are.
+    pub fn entered(&self, mut made: Diagnosed, recorded: &[Run], closed: Option<&Law>) -> Diagnosed {
+        let effects = self.effects(&self.phasors);
+        for (i, setting) in effects.iter().enumerate() {
+            made.diagnosis.findings.push(self.finding(&made.data, i, setting));
+            let parameters = setting.parameters(&made.data.scene).into_iter().map(|q| (q.name.to_owned(), q.value));
+            made.corrected.plant.physics.push(PhysicsEntry {
+                effect: RUNOUT.into(),
+                parameters: parameters.collect(),
+                curve: None,
+            });
+        }
+        made.corrected.effects.extend(effects);
+        if matches!(made.diagnosis.verdict, Verdict::NoMismatch | Verdict::Refit) {
+            made.diagnosis.verdict = Verdict::Named;
+        }
+        made.diagnosis.remarks.push(
+            "orders of the spindle stood out of what the first search left; they were taken out of the records, and the rest was searched again".into(),
+        );
+        made.data.runs = recorded.to_vec();
+        let every: Vec<&Run> = recorded.iter().collect();
+        let refit = SimulatedModel::of(&made.refitted, &[], &made.data.scene);
+        [made.errors[1], made.open[1]] = [closed, None].map(|law| errors(&refit, &every, law));
+        made.diagnosis.fit = figures_of(&made.data, &every, [&made.open, &made.errors], closed.is_some());
+        made
+    }
+
+    fn finding(&self, data: &DiagnosisData, at: usize, setting: &Setting) -> Finding {
+        let &Facts { name: effect, says, port, .. } = &FACTS;
+        let mut signal = data.stack.series(|i| {
+            let mut motion = self.motion(&data.means[i], data.scene.sample_time_s);
+            data.whitener.apply(&mut motion);
+            motion
+        });
+        data.fit(vec![]).local_basis().project(&mut signal);
+        let place = place(data, &data.stack, &signal);
+        let base = setting.parameters(&data.scene);
+        let moved = |direction: &Vec<[f64; 2]>| {
+            let to: Vec<[f64; 2]> =
+                self.phasors.iter().zip(direction).map(|(p, d)| [p[0] + d[0], p[1] + d[1]]).collect();
+            self.effects(&to)[at].parameters(&data.scene)
+        };
+        let moved: Vec<_> = self.directions.iter().map(moved).collect();
+        let there = setting.strengths.chunks(2).map(|s| s != [0.0; 2]).collect::<Vec<_>>();
+        let estimates = base.iter().enumerate().filter(|(k, _)| *k == 0 || there[(k - 1) / 2]).map(|(k, p)| {
+            let off = 1.96 * moved.iter().map(|m| apart(&m[k], p).powi(2)).sum::<f64>().sqrt();
+            let unit = p.unit.text(&data.form.given.position_unit, &data.form.given.command_unit);
+            (p.name.to_owned(), Estimate { value: p.value, low: p.value - off, high: p.value + off, unit })
+        });
+        let log_p =
+            log_tail(self.gain, 2 * self.orders.len()) + (RepeatableRunout::grid(&data.scene).len().max(1) as f64).ln();
+        Finding {
+            effect: effect.into(),
+            family: vec![effect.into()],
+            port,
+            p_value: log_p.min(0.0).exp().max(1e-300),
+            says: format!("At {} Hz {says}.", frequencies(setting)),
+            parameters: BTreeMap::from_iter(estimates),
+            place,
+        }
+    }
+}
+
+/// By how much a parameter differs; phases by less than a turn.
+fn apart(a: &Parameter, b: &Parameter) -> f64 {
+    let by = a.value - b.value;
+    if a.unit == Unit::Degree { (by + 180.0).rem_euclid(360.0) - 180.0 } else { by }
+}
+
+/// The frequencies of a run-out's harmonics, as a person says them.
+fn frequencies(setting: &Setting) -> String {
+    let base = setting.law.first_number();
+    let all = setting.strengths.chunks(2).enumerate().filter(|(_, s)| *s != [0.0; 2]);
+    let all: Vec<String> = all.map(|(h, _)| crate::numeric::digits::said((h + 1) as f64 * base, 3)).collect();
+    all.join(" and ")
+}
+
+/// What a model leaves of the fit records, whitened, each record's start taken out.
+struct Left<'a> {
+    data: &'a DiagnosisData,
+    runs: Vec<(&'a Run, NuisanceBasis, Vec<f64>)>,
+}
+
+impl<'a> Left<'a> {
+    /// Of the errors of all runs; none where one of them runs away.
+    fn of(data: &'a DiagnosisData, errors: &[Vec<f64>]) -> Option<Left<'a>> {
+        let one = |&r: &usize| {
+            let run = &data.runs[r];
+            let mut basis = NuisanceBasis::default();
+            for mut c in free_motions(&data.form.given.body, data.scene.sample_time_s, run.len()) {
+                data.whitener.apply(&mut c);
+                basis.add_local(0, c);
+            }
+            let mut e = errors[r].clone();
+            data.whitener.apply(&mut e);
+            basis.project(&mut e);
+            e.iter().all(|v| v.is_finite()).then_some((run, basis, e))
+        };
+        let runs = data.of_role(Role::Fit).iter().map(one).collect::<Option<Vec<_>>>()?;
+        Some(Left { data, runs })
+    }
+
+    fn errors(&self) -> Vec<Vec<f64>> {
+        self.runs.iter().map(|r| r.2.clone()).collect()
+    }
+
+    /// Orders fitted to it, one phasor each for all records.
+    fn fitted(&self, orders: Vec<Line>) -> Option<RunOut> {
+        let (rows, cols): (usize, usize) = (self.runs.iter().map(|r| r.2.len()).sum(), 2 * orders.len());
+        if rows <= cols {
+            return None;
+        }
+        let mut columns = vec![Vec::with_capacity(rows); cols];
+        for (run, basis, _) in &self.runs {
+            let all = orders.iter().flat_map(|l| l.columns(run, self.data.scene.sample_time_s));
+            for (column, mut c) in columns.iter_mut().zip(all) {
+                self.data.whitener.apply(&mut c);
+                basis.project(&mut c);
+                column.extend(c);
+            }
+        }
+        let left: Vec<f64> = self.runs.iter().flat_map(|r| r.2.iter().copied()).collect();
+        let mut qr = Qr::default();
+        qr.factor(rows, cols, |a| a.chunks_exact_mut(rows).zip(&columns).for_each(|(a, c)| a.copy_from_slice(c)));
+        let numbers = qr.solve(&mut left.clone());
+        let rest: Vec<f64> =
+            (0..rows).map(|i| left[i] - columns.iter().zip(&numbers).map(|(c, n)| c[i] * n).sum::<f64>()).collect();
+        // What the model leaves beside them may be more than noise.
+        let spread = (size(&rest) / (rows - cols) as f64).sqrt();
+        let pairs = |x: &[f64]| x.chunks_exact(2).map(|p| [p[0], p[1]]).collect::<Vec<_>>();
+        let root = qr.inverse_root();
+        let directions = root.chunks_exact(cols).map(|d| pairs(&d.iter().map(|v| v * spread).collect::<Vec<_>>()));
+        let sound = numbers.iter().all(|v| v.is_finite());
+        sound.then(|| RunOut {
+            orders,
+            phasors: pairs(&numbers),
+            directions: directions.collect(),
+            gain: size(&left) - size(&rest),
+        })
+    }
+}
