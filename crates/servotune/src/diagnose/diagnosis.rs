@@ -47,22 +47,23 @@ pub fn diagnose(
     let mut decoupled = decoupled(all, case, given, &log_checks, sample_time_s, &mut progress);
     let remarks = std::mem::take(&mut decoupled.remarks);
     let mut whole = std::mem::take(&mut decoupled.runs);
-    let mut ground = Ground {
-        case,
-        given,
-        closed: law.as_ref().filter(|_| log_checks.closed),
-        settings,
-        log_checks: &log_checks,
-        sample_time_s,
-        remarks,
-    };
+    let mut ground =
+        Ground { case, given, controller, law: law.as_ref(), settings, log_checks, sample_time_s, remarks };
+    let cut = excerpts(&whole, sample_time_s);
+    if let Some(cut) = &cut {
+        let kept: usize = cut.iter().filter(|r| r.role == Role::Fit).map(Run::len).sum();
+        ground.remarks.push(format!("the search was made on excerpts of the fit records, {kept} samples together; figures are of the whole records"));
+    }
+    let mut data = ground.data(given, cut.unwrap_or_else(|| whole.clone()))?;
+    preconditions::check(&data)?;
     if controller.is_none() {
         progress("is the command held between samples, or measured");
-        if ground.is_measured(&whole)? {
+        if let Some(better) = ground.measured(&data)? {
+            data = better;
             whole = whole.iter().map(Run::measured).collect();
         }
     }
-    let first = ground.searched(whole.clone(), &decoupled, &mut progress)?;
+    let first = ground.searched(data, whole.clone(), &decoupled, &mut progress)?;
     ground.with_run_out(first, whole, &decoupled, &mut progress)
 }
 
@@ -70,10 +71,10 @@ pub fn diagnose(
 struct Ground<'a> {
     case: &'a Case,
     given: &'a Plant,
-    /// The controller, where records are shown in closed loop.
-    closed: Option<&'a Law<'a>>,
+    controller: Option<&'a Controller>,
+    law: Option<&'a Law<'a>>,
     settings: &'a DiagnoseSettings,
-    log_checks: &'a LogChecks,
+    log_checks: LogChecks,
     sample_time_s: f64,
     remarks: Vec<String>,
 }
@@ -83,41 +84,38 @@ impl Ground<'_> {
         Ok(DiagnosisData::new(plant, runs, self.sample_time_s, self.case.spindle_hz)?)
     }
 
-    /// Whether the command fits better as measured at the samples than as held between them.
-    fn is_measured(&mut self, whole: &[Run]) -> Result<bool, DiagnoseError> {
-        let iterations = self.settings.select.iterations;
-        let left = |runs: Vec<Run>| -> Result<f64, DiagnoseError> {
-            let data = self.data(self.given, runs)?;
-            preconditions::check(&data)?;
-            let (data, linear) = refit(data, iterations);
-            Ok(rms(&data.without_starts(data.fit(vec![]).errors(&linear.refitted.p))))
+    /// The controller, where records are shown in closed loop.
+    fn closed(&self) -> Option<&Law<'_>> {
+        self.law.filter(|_| self.log_checks.closed)
+    }
+
+    /// The diagnosis data with the command as measured at the samples, where that fits better than as held between them.
+    fn measured(&mut self, held: &DiagnosisData) -> Result<Option<DiagnosisData>, DiagnoseError> {
+        let other = self.data(self.given, held.runs.iter().map(Run::measured).collect())?;
+        let left = |b: &DiagnosisData| {
+            let (b, linear) = refit(b.clone(), self.settings.select.iterations);
+            rms(&b.without_starts(b.fit(vec![]).errors(&linear.refitted.p)))
         };
-        let held: Vec<Run> = excerpts(whole, self.sample_time_s).unwrap_or_else(|| whole.to_vec());
-        let moving = left(held.iter().map(Run::measured).collect())? / left(held)?;
-        let measured = moving < MEASURED_COMMAND;
-        if measured {
+        let (held, moving) = (left(held), left(&other));
+        if moving < MEASURED_COMMAND * held {
             self.remarks.push(format!(
-                "the command is taken as measured at the samples, not as held between them: the linear refit then leaves {moving:.3} of the error"
+                "the command is taken as measured at the samples, not as held between them: the linear refit then leaves {:.3} of the error",
+                moving / held
             ));
+            return Ok(Some(other));
         }
-        Ok(measured)
+        Ok(None)
     }
 
     /// The search on some runs, from a plant cleared of what bends it where the given one conceals that.
     fn searched(
         &self,
+        mut data: DiagnosisData,
         mut whole: Vec<Run>,
         decoupled: &Decoupled,
         progress: &mut dyn FnMut(&str),
     ) -> Result<Diagnosed, DiagnoseError> {
         let (iterations, mut remarks) = (self.settings.select.iterations, self.remarks.clone());
-        let cut = excerpts(&whole, self.sample_time_s);
-        if let Some(cut) = &cut {
-            let kept: usize = cut.iter().filter(|r| r.role == Role::Fit).map(Run::len).sum();
-            remarks.push(format!("the search was made on excerpts of the fit records, {kept} samples together; figures are of the whole records"));
-        }
-        let mut data = self.data(self.given, cut.unwrap_or_else(|| whole.clone()))?;
-        preconditions::check(&data)?;
         let sound = self.log_checks.finding.is_none();
         let start = sound.then(|| cleared(&data, iterations, progress)).flatten();
         if let Some(start) = start {
@@ -129,7 +127,7 @@ impl Ground<'_> {
                     data = data.with_noise(start.left);
                 }
                 // In closed loop it is not the open-loop simulation that is reported.
-                if self.closed.is_none() && data.is_far(left) {
+                if self.controller.is_none() && data.is_far(left) {
                     data = data.judged_plainly(left);
                     remarks.push(PLAIN.into());
                 }
@@ -143,9 +141,9 @@ impl Ground<'_> {
             given: self.given,
             decoupled: &decoupled.recorded_as(&whole),
             whole: &whole,
-            closed: self.closed,
+            closed: self.closed(),
             settings: self.settings,
-            log_checks: self.log_checks,
+            log_checks: &self.log_checks,
             shocks: &shocks,
             remarks: &remarks,
         };
@@ -165,12 +163,13 @@ impl Ground<'_> {
         let recorded = if decoupled.recorded.is_empty() { whole.clone() } else { decoupled.recorded.clone() };
         let clean = found.taken_out_of(&whole, self.sample_time_s);
         let aside = Decoupled { recorded, ..decoupled.clone() };
-        let second = self.searched(clean, &aside, progress)?;
+        let cut = excerpts(&clean, self.sample_time_s).unwrap_or_else(|| clean.clone());
+        let second = self.searched(self.data(self.given, cut)?, clean, &aside, progress)?;
         if second.judged() > RUN_OUT_HELPS * first.judged() || second.judged().is_nan() {
             return Ok(first);
         }
         let found = found.bettered(&second).unwrap_or(found);
-        Ok(found.entered(second, &whole, self.closed))
+        Ok(found.entered(second, &whole, self.closed()))
     }
 }
 

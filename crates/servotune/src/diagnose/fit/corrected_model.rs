@@ -28,18 +28,19 @@ impl Corrected {
     }
 }
 
+/// The entry of an effect with named parameters.
+pub(in crate::diagnose) fn entry(setting: &Setting, scene: &Scene) -> PhysicsEntry {
+    let parameters = setting.parameters(scene).into_iter().map(|q| (q.name.to_owned(), q.value));
+    PhysicsEntry { effect: setting.facts().name.into(), parameters: parameters.collect(), curve: None }
+}
+
 /// Makes the corrected model of a fit; `per_record` effects belong to records, not to the machine, and stay out.
 pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[SelectedEffect], scene: &Scene) -> Corrected {
     let mut plant = form.plant(p);
     let mut effects: Vec<Setting> = Vec::new();
     let mut entries = Vec::new();
-    let named = |s: &Setting| PhysicsEntry {
-        effect: s.facts().name.into(),
-        parameters: s.parameters(scene).into_iter().map(|q| (q.name.to_owned(), q.value)).collect(),
-        curve: None,
-    };
     for c in chosen.iter().filter(|c| !c.setting.facts().per_record) {
-        entries.push(named(&c.setting));
+        entries.push(entry(&c.setting, scene));
         effects.push(c.setting.clone());
     }
     let nominal = form.nominal(p);
@@ -50,7 +51,7 @@ pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[SelectedEffect], scene:
         plant.body = Body::FreeInertia { acceleration_gain: b, viscous_rate_per_s: viscous.max(0.0) };
         let strength = stiffness / (b * form.given.resonance_gain);
         let spring = Setting::new(CableSpring { creep_time_s: None, centre: 0.0 }, vec![strength, 0.0]);
-        entries.push(named(&spring));
+        entries.push(entry(&spring, scene));
         effects.push(spring);
     }
     plant.physics = entries;

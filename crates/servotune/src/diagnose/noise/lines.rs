@@ -55,6 +55,26 @@ impl Line {
     }
 }
 
+/// Power of all series, each times its scale, on one grid of `n` samples, twice the longest: zeros stand behind the shorter ones, and as
+/// many again, so that no line falls between two bins.
+fn power(series: &[Vec<f64>], n: usize, scales: &[f64]) -> Vec<f64> {
+    let mut power = vec![0.0; n / 2];
+    for (x, scale) in series.iter().zip(scales) {
+        let mut padded = x.clone();
+        padded.resize(n, 0.0);
+        power.iter_mut().zip(forward(&padded)).for_each(|(p, b)| *p += scale * b.norm_sqr());
+    }
+    power
+}
+
+/// The powers around a bin, in ascending order.
+fn around(power: &[f64], k: usize) -> Vec<f64> {
+    let near = k.saturating_sub(2 * LEVEL[0])..(k + 2 * LEVEL[0]).min(power.len());
+    let mut around: Vec<f64> = near.filter(|j| j.abs_diff(k) > 2 * LEVEL[1] && *j > 2).map(|j| power[j]).collect();
+    around.sort_by(f64::total_cmp);
+    around
+}
+
 /// The strongest line of series that hold noise only and are white but for it; `groups` says whose repeat each is.
 ///
 /// The statistic is the power of all series at one frequency over the level around it: chi-square with two numbers for each
@@ -78,25 +98,19 @@ pub fn peak(
     spindle_hz: Option<f64>,
 ) -> Option<Line> {
     let longest = series.iter().map(Vec::len).max()?;
-    // One grid for all lengths: zeros behind the shorter ones, and as many again, so that no line falls between two bins.
     let n = 2 * longest;
-    let mut power = vec![0.0; n / 2];
-    for (x, share) in series.iter().zip(shares) {
+    let scale = |(x, share): (&Vec<f64>, &f64)| {
         let variance = dot(x, x) / x.len() as f64;
-        let mut padded = x.clone();
-        padded.resize(n, 0.0);
-        let scale = share * 2.0 / (x.len() as f64 * variance.max(1e-300));
-        power.iter_mut().zip(forward(&padded)).for_each(|(p, b)| *p += scale * b.norm_sqr());
-    }
+        share * 2.0 / (x.len() as f64 * variance.max(1e-300))
+    };
+    let scales: Vec<f64> = series.iter().zip(shares).map(scale).collect();
+    let power = power(series, n, &scales);
     if numbers == 0 {
         return None;
     }
     let mean = numbers as f64;
     let level = |k: usize| {
-        let near = (k.saturating_sub(2 * LEVEL[0])..(k + 2 * LEVEL[0]).min(power.len()))
-            .filter(|j| j.abs_diff(k) > 2 * LEVEL[1] && *j > 2);
-        let mut around: Vec<f64> = near.map(|j| power[j]).collect();
-        around.sort_by(f64::total_cmp);
+        let around = around(&power, k);
         // The median of chi-square is close to its mean less two thirds.
         around.get(around.len() / 2).copied().unwrap_or(mean) / (1.0 - 2.0 / (9.0 * mean)).powi(3)
     };
@@ -139,7 +153,7 @@ pub fn peak(
 }
 
 /// Highest order of the spindle that is looked at, and most orders that are closed.
-const HIGHEST_ORDER: usize = 24;
+pub const HIGHEST_ORDER: usize = 24;
 /// Quantile of the power around an order that it stands out from: a driven record's error may be all lines, and then the order is to stand out
 /// from them.
 const AROUND: f64 = 0.9;
@@ -148,17 +162,10 @@ const AROUND: f64 = 0.9;
 pub fn standing_orders(series: &[Vec<f64>], sample_time_s: f64, spindle_hz: Option<f64>) -> Vec<Line> {
     let (Some(longest), Some(spindle)) = (series.iter().map(Vec::len).max(), spindle_hz) else { return Vec::new() };
     let n = 2 * longest;
-    let mut power = vec![0.0; n / 2];
-    for x in series {
-        let mut padded = x.clone();
-        padded.resize(n, 0.0);
-        power.iter_mut().zip(forward(&padded)).for_each(|(p, b)| *p += b.norm_sqr());
-    }
+    let power = power(series, n, &vec![1.0; series.len()]);
     let stands_out = |hz: f64| {
         let k = (hz * n as f64 * sample_time_s).round() as usize;
-        let near = k.saturating_sub(2 * LEVEL[0])..(k + 2 * LEVEL[0]).min(power.len());
-        let mut around: Vec<f64> = near.filter(|j| j.abs_diff(k) > 2 * LEVEL[1] && *j > 2).map(|j| power[j]).collect();
-        around.sort_by(f64::total_cmp);
+        let around = around(&power, k);
         let level = around.get((AROUND * around.len() as f64) as usize)?;
         let most = power.get(k.checked_sub(1)?..=k + 1)?.iter().fold(0.0f64, |m, p| m.max(*p));
         Some(most / level).filter(|r| *r > ORDER_STANDS_OUT)

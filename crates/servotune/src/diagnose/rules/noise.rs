@@ -38,8 +38,8 @@ rules! {
         "chance of a false line over all frequencies",
         "judgement: a line is taken out of every record, so chance must not make one";
     ORDER_STANDS_OUT: f64 = 5.0, "times",
-        "power of an order of the spindle in what the linear refit leaves, over the power that nine in ten frequencies around stay below, from which the order is left out while laws are looked for",
-        "run-out must not choose another law; left out for nothing it costs two numbers a record, and it is looked at again before anything is said";
+        "power of an order of the spindle in what the offered model leaves, over the power that nine in ten frequencies around stay below, from which it is taken out and all searched again",
+        "it only opens a second search, which must leave clearly less to stay";
     LINE_SNAP: f64 = 0.5, "line widths",
         "distance within which a line is an order of the spindle",
         "half the resolution of the record";

@@ -9,7 +9,7 @@ use super::finding::{Estimate, Finding, Verdict};
 use super::naming::everywhere;
 use crate::controller::Law;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::corrected_model::Corrected;
+use crate::diagnose::fit::corrected_model::{Corrected, entry};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::{errors, rms};
 use crate::diagnose::free_form::curve::FreeForm;
@@ -25,7 +25,7 @@ use crate::diagnose::rules::{
 use crate::diagnose::search::curve_balance::{curves, surface};
 use crate::diagnose::search::selection::Selection;
 use crate::diagnose::search::torque_balance::{Balance, SMOOTHINGS, recorded_means};
-use crate::lti::{CurveKnot, PhysicsEntry, Plant};
+use crate::lti::{CurveKnot, Plant};
 use crate::physics::sensor_curve::{self, SensorCurve};
 use crate::physics::{CurvePort, Facts, Setting, coulomb_friction, pivot_friction, shortest_loop};
 
@@ -128,12 +128,6 @@ fn shown(
     errors(&model.alone(data), &every, closed)
 }
 
-/// The entry of an effect with named parameters.
-fn entry(data: &DiagnosisData, setting: &Setting) -> PhysicsEntry {
-    let parameters = setting.parameters(&data.scene).into_iter().map(|q| (q.name.to_owned(), q.value));
-    PhysicsEntry { effect: setting.facts().name.into(), parameters: parameters.collect(), curve: None }
-}
-
 fn knots(c: &Plain) -> Vec<CurveKnot> {
     let off = |i: usize| 1.96 * c.spread[i];
     (0..c.value.len())
@@ -155,7 +149,7 @@ fn model(data: &DiagnosisData, best: &Foretelling, c: &Plain) -> Corrected {
     let (position, command) = (plant.position_unit.clone(), plant.command_unit.clone());
     let behind = trial.lag_s.filter(|_| curved && c.port == CurvePort::AmplifierOverCommand);
     let mut effects: Vec<Setting> = trial.lag_s.filter(|_| behind.is_none()).map(lag).into_iter().collect();
-    plant.physics = effects.iter().map(|s| entry(data, s)).collect();
+    plant.physics = effects.iter().map(|s| entry(s, &data.scene)).collect();
     if curved {
         let mut curve = c.port.curve(&c.knots, &c.value);
         curve.lag_s = behind;
@@ -163,7 +157,7 @@ fn model(data: &DiagnosisData, best: &Foretelling, c: &Plain) -> Corrected {
         effects.push(Setting::fixed(curve));
     }
     if let Some(s) = trial.reading.effect() {
-        plant.physics.push(entry(data, &s));
+        plant.physics.push(entry(&s, &data.scene));
         effects.push(s);
     }
     Corrected { plant, effects }

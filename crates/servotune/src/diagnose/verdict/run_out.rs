@@ -12,20 +12,18 @@ use super::naming::RUNOUT;
 use crate::controller::Law;
 use crate::diagnose::data::linear_form::free_motions;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::data::stacked_records::NuisanceBasis;
+use crate::diagnose::fit::corrected_model::entry;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::{SimulatedModel, errors, size};
 use crate::diagnose::noise::chance::log_tail;
-use crate::diagnose::noise::lines::{Line, standing_orders};
-use crate::lti::PhysicsEntry;
+use crate::diagnose::noise::lines::{HIGHEST_ORDER, Line, standing_orders};
+use crate::diagnose::noise::repeats::without_start;
+use crate::numeric::digits::said;
 use crate::numeric::least_squares::Qr;
 use crate::physics::repeatable_runout::{FACTS, RepeatableRunout};
-use crate::physics::{Facts, Parameter, Parametric, Setting, Unit};
+use crate::physics::{Facts, Parameter, Setting, Unit};
 use crate::recording::Role;
 use std::collections::BTreeMap;
-
-/// Harmonics of a base order that one run-out holds.
-const HARMONICS: usize = 3;
 
 /// Orders of the spindle in the recorded position.
 #[derive(Clone)]
@@ -49,7 +47,7 @@ impl RunOut {
             return None;
         }
         let left = Left::of(data, &made.open[2])?;
-        let mut orders = standing_orders(&left.errors(), data.scene.sample_time_s, data.scene.spindle_hz);
+        let mut orders = standing_orders(&left.errors, data.scene.sample_time_s, data.scene.spindle_hz);
         orders.retain(|o| data.lines.iter().all(|l| l.order != o.order));
         if orders.is_empty() { None } else { left.fitted(orders) }
     }
@@ -76,7 +74,7 @@ impl RunOut {
         runs.iter().map(|r| r.without(&self.motion(r, sample_time_s))).collect()
     }
 
-    /// As effects: base orders with their harmonics, the lowest first, each with the places of its phasors.
+    /// As effects: base orders with their harmonics, the lowest first.
     fn effects(&self, phasors: &[[f64; 2]]) -> Vec<Setting> {
         let number = |l: &Line| l.order.unwrap_or(0);
         let mut rest: Vec<usize> = (0..self.orders.len()).collect();
@@ -84,9 +82,9 @@ impl RunOut {
         let mut all = Vec::new();
         while let Some(&first) = rest.first() {
             let base = &self.orders[first];
-            let mut strengths = vec![0.0; 2 * HARMONICS];
+            let mut strengths = vec![0.0; FACTS.columns];
             rest.retain(|&i| {
-                let own = (1..=HARMONICS).find(|h| h * number(base) == number(&self.orders[i]));
+                let own = (1..=FACTS.columns / 2).find(|h| h * number(base) == number(&self.orders[i]));
                 own.inspect(|h| strengths[2 * h - 2..2 * h].copy_from_slice(&phasors[i])).is_none()
             });
             all.push(Setting::new(RepeatableRunout { base_hz: base.hz }, strengths));
@@ -99,12 +97,7 @@ impl RunOut {
         let effects = self.effects(&self.phasors);
         for (i, setting) in effects.iter().enumerate() {
             made.diagnosis.findings.push(self.finding(&made.data, i, setting));
-            let parameters = setting.parameters(&made.data.scene).into_iter().map(|q| (q.name.to_owned(), q.value));
-            made.corrected.plant.physics.push(PhysicsEntry {
-                effect: RUNOUT.into(),
-                parameters: parameters.collect(),
-                curve: None,
-            });
+            made.corrected.plant.physics.push(entry(setting, &made.data.scene));
         }
         made.corrected.effects.extend(effects);
         if matches!(made.diagnosis.verdict, Verdict::NoMismatch | Verdict::Refit) {
@@ -113,8 +106,10 @@ impl RunOut {
         made.diagnosis.remarks.push(
             "orders of the spindle stood out of what the first search left; they were taken out of the records, and the rest was searched again".into(),
         );
-        made.data.runs = recorded.to_vec();
-        let every: Vec<&Run> = recorded.iter().collect();
+        // Which of them a push fell into, the search found.
+        let known = |(r, found): (&Run, &Run)| Run { shocked: found.shocked, ..r.clone() };
+        made.data.runs = recorded.iter().zip(&made.data.runs).map(known).collect();
+        let every: Vec<&Run> = made.data.runs.iter().collect();
         let refit = SimulatedModel::of(&made.refitted, &[], &made.data.scene);
         [made.errors[1], made.open[1]] = [closed, None].map(|law| errors(&refit, &every, law));
         made.diagnosis.fit = figures_of(&made.data, &every, [&made.open, &made.errors], closed.is_some());
@@ -143,8 +138,7 @@ impl RunOut {
             let unit = p.unit.text(&data.form.given.position_unit, &data.form.given.command_unit);
             (p.name.to_owned(), Estimate { value: p.value, low: p.value - off, high: p.value + off, unit })
         });
-        let log_p =
-            log_tail(self.gain, 2 * self.orders.len()) + (RepeatableRunout::grid(&data.scene).len().max(1) as f64).ln();
+        let log_p = log_tail(self.gain, 2 * self.orders.len()) + self.orders.len() as f64 * (HIGHEST_ORDER as f64).ln();
         Finding {
             effect: effect.into(),
             family: vec![effect.into()],
@@ -167,55 +161,46 @@ fn apart(a: &Parameter, b: &Parameter) -> f64 {
 fn frequencies(setting: &Setting) -> String {
     let base = setting.law.first_number();
     let all = setting.strengths.chunks(2).enumerate().filter(|(_, s)| *s != [0.0; 2]);
-    let all: Vec<String> = all.map(|(h, _)| crate::numeric::digits::said((h + 1) as f64 * base, 3)).collect();
+    let all: Vec<String> = all.map(|(h, _)| said((h + 1) as f64 * base, 3)).collect();
     all.join(" and ")
 }
 
 /// What a model leaves of the fit records, whitened, each record's start taken out.
 struct Left<'a> {
     data: &'a DiagnosisData,
-    runs: Vec<(&'a Run, NuisanceBasis, Vec<f64>)>,
+    /// Which records they are.
+    runs: Vec<usize>,
+    errors: Vec<Vec<f64>>,
+}
+
+/// Series that each belong to a record, whitened, the record's start taken out.
+fn seen(data: &DiagnosisData, series: &[(usize, Vec<f64>)]) -> Vec<Vec<f64>> {
+    let free = |n: usize| free_motions(&data.form.given.body, data.scene.sample_time_s, n).to_vec();
+    without_start(series, &free, &|x| data.whitener.apply(x)).into_iter().map(|s| s.1).collect()
 }
 
 impl<'a> Left<'a> {
     /// Of the errors of all runs; none where one of them runs away.
     fn of(data: &'a DiagnosisData, errors: &[Vec<f64>]) -> Option<Left<'a>> {
-        let one = |&r: &usize| {
-            let run = &data.runs[r];
-            let mut basis = NuisanceBasis::default();
-            for mut c in free_motions(&data.form.given.body, data.scene.sample_time_s, run.len()) {
-                data.whitener.apply(&mut c);
-                basis.add_local(0, c);
-            }
-            let mut e = errors[r].clone();
-            data.whitener.apply(&mut e);
-            basis.project(&mut e);
-            e.iter().all(|v| v.is_finite()).then_some((run, basis, e))
-        };
-        let runs = data.of_role(Role::Fit).iter().map(one).collect::<Option<Vec<_>>>()?;
-        Some(Left { data, runs })
-    }
-
-    fn errors(&self) -> Vec<Vec<f64>> {
-        self.runs.iter().map(|r| r.2.clone()).collect()
+        let runs = data.of_role(Role::Fit);
+        let errors = seen(data, &runs.iter().map(|&r| (r, errors[r].clone())).collect::<Vec<_>>());
+        errors.iter().flatten().all(|v| v.is_finite()).then_some(Left { data, runs, errors })
     }
 
     /// Orders fitted to it, one phasor each for all records.
     fn fitted(&self, orders: Vec<Line>) -> Option<RunOut> {
-        let (rows, cols): (usize, usize) = (self.runs.iter().map(|r| r.2.len()).sum(), 2 * orders.len());
+        let left = self.errors.concat();
+        let (rows, cols) = (left.len(), 2 * orders.len());
         if rows <= cols {
             return None;
         }
-        let mut columns = vec![Vec::with_capacity(rows); cols];
-        for (run, basis, _) in &self.runs {
-            let all = orders.iter().flat_map(|l| l.columns(run, self.data.scene.sample_time_s));
-            for (column, mut c) in columns.iter_mut().zip(all) {
-                self.data.whitener.apply(&mut c);
-                basis.project(&mut c);
-                column.extend(c);
-            }
-        }
-        let left: Vec<f64> = self.runs.iter().flat_map(|r| r.2.iter().copied()).collect();
+        let columns = |&r: &usize| {
+            let all = orders.iter().flat_map(|l| l.columns(&self.data.runs[r], self.data.scene.sample_time_s));
+            all.map(|c| (r, c)).collect::<Vec<_>>()
+        };
+        let all = seen(self.data, &self.runs.iter().flat_map(columns).collect::<Vec<_>>());
+        let columns: Vec<Vec<f64>> =
+            (0..cols).map(|j| all.iter().skip(j).step_by(cols).flatten().copied().collect()).collect();
         let mut qr = Qr::default();
         qr.factor(rows, cols, |a| a.chunks_exact_mut(rows).zip(&columns).for_each(|(a, c)| a.copy_from_slice(c)));
         let numbers = qr.solve(&mut left.clone());
@@ -223,15 +208,9 @@ impl<'a> Left<'a> {
             (0..rows).map(|i| left[i] - columns.iter().zip(&numbers).map(|(c, n)| c[i] * n).sum::<f64>()).collect();
         // What the model leaves beside them may be more than noise.
         let spread = (size(&rest) / (rows - cols) as f64).sqrt();
-        let pairs = |x: &[f64]| x.chunks_exact(2).map(|p| [p[0], p[1]]).collect::<Vec<_>>();
-        let root = qr.inverse_root();
-        let directions = root.chunks_exact(cols).map(|d| pairs(&d.iter().map(|v| v * spread).collect::<Vec<_>>()));
+        let pairs = |x: &[f64], by: f64| x.chunks_exact(2).map(|p| [by * p[0], by * p[1]]).collect::<Vec<_>>();
+        let directions = qr.inverse_root().chunks_exact(cols).map(|d| pairs(d, spread)).collect();
         let sound = numbers.iter().all(|v| v.is_finite());
-        sound.then(|| RunOut {
-            orders,
-            phasors: pairs(&numbers),
-            directions: directions.collect(),
-            gain: size(&left) - size(&rest),
-        })
+        sound.then(|| RunOut { orders, phasors: pairs(&numbers, 1.0), directions, gain: size(&left) - size(&rest) })
     }
 }
