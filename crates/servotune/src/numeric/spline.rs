@@ -3,7 +3,7 @@
 //! In: points in ascending order. Out: value and slope anywhere; the roughness (integral of the squared second derivative) as a
 //! quadratic form in the values. Source: Green & Silverman, Nonparametric Regression and Generalized Linear Models, 1994, ch. 2.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// A curve through points.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,33 +22,64 @@ pub struct Spline {
 /// Buckets to an interval.
 const BUCKETS: usize = 4;
 
-/// Second differences of the values, and the matrix that turns second derivatives into them: R c = Qᵀ f.
-fn bands(at: &[f64]) -> (DMatrix<f64>, DMatrix<f64>) {
-    let inner = at.len().saturating_sub(2);
-    let (mut q, mut r) = (DMatrix::zeros(inner, at.len()), DMatrix::zeros(inner, inner));
-    for i in 0..inner {
-        let (before, after) = (at[i + 1] - at[i], at[i + 2] - at[i + 1]);
-        q[(i, i)] = before.recip();
-        q[(i, i + 1)] = -before.recip() - after.recip();
-        q[(i, i + 2)] = after.recip();
-        r[(i, i)] = (before + after) / 3.0;
-        if i + 1 < inner {
-            r[(i, i + 1)] = after / 6.0;
-            r[(i + 1, i)] = after / 6.0;
+/// Second derivatives c of the curve at its inner points, R c = Qᵀ f: Qᵀ takes second differences of the values f, and R is of three
+/// diagonals, kept as its Cholesky factor of two.
+struct Bands {
+    /// Of each inner point: the weights of the values before, at and after it.
+    q: Vec<[f64; 3]>,
+    /// Diagonal of the factor, and what stands left of it.
+    factor: Vec<[f64; 2]>,
+}
+
+impl Bands {
+    fn of(at: &[f64]) -> Bands {
+        let mut bands = Bands { q: Vec::with_capacity(at.len()), factor: Vec::with_capacity(at.len()) };
+        let mut above = 1.0;
+        for (i, w) in at.windows(3).enumerate() {
+            let (before, after) = (w[1] - w[0], w[2] - w[1]);
+            bands.q.push([before.recip(), -before.recip() - after.recip(), after.recip()]);
+            let left = if i == 0 { 0.0 } else { before / 6.0 / above };
+            above = ((before + after) / 3.0 - left * left).sqrt();
+            bands.factor.push([above, left]);
+        }
+        bands
+    }
+
+    /// L x = b in place.
+    fn forward(&self, x: &mut [f64]) {
+        let mut before = 0.0;
+        for (x, [on, left]) in x.iter_mut().zip(&self.factor) {
+            *x = (*x - left * before) / on;
+            before = *x;
         }
     }
-    (q, r)
+
+    /// Lᵀ x = b in place.
+    fn backward(&self, x: &mut [f64]) {
+        let (mut after, mut below) = (0.0, 0.0);
+        for (x, [on, left]) in x.iter_mut().zip(&self.factor).rev() {
+            *x = (*x - below * after) / on;
+            (after, below) = (*x, *left);
+        }
+    }
+
+    /// Second derivatives at all points, naught at the ends.
+    fn second_derivatives(&self, value: &[f64]) -> Vec<f64> {
+        let mut c = vec![0.0; value.len()];
+        let inner = &mut c[1..=self.q.len()];
+        for ((c, q), f) in inner.iter_mut().zip(&self.q).zip(value.windows(3)) {
+            *c = q[0] * f[0] + q[1] * f[1] + q[2] * f[2];
+        }
+        self.forward(inner);
+        self.backward(inner);
+        c
+    }
 }
 
 impl Spline {
     /// Through these points, at least two, `at` strictly ascending.
     pub fn new(at: Vec<f64>, value: Vec<f64>) -> Spline {
-        let (q, r) = bands(&at);
-        let mut curvature = vec![0.0; at.len()];
-        let right = q * DVector::from_column_slice(&value);
-        if let Some(solved) = r.cholesky().map(|c| c.solve(&right)) {
-            curvature[1..=solved.len()].copy_from_slice(solved.as_slice());
-        }
+        let curvature = Bands::of(&at).second_derivatives(&value);
         let cubic: Vec<[f64; 4]> = (0..at.len() - 1)
             .map(|i| {
                 let h = at[i + 1] - at[i];
@@ -127,16 +158,19 @@ impl Spline {
 
 /// Rows whose squares, times the values at the points, add up to the roughness.
 pub fn roughness_rows(at: &[f64]) -> DMatrix<f64> {
-    let (q, r) = bands(at);
-    match r.cholesky() {
-        Some(c) => c.l().solve_lower_triangular(&q).unwrap_or(q),
-        None => q,
+    let bands = Bands::of(at);
+    let mut rows = DMatrix::zeros(bands.q.len(), at.len());
+    for (i, q) in bands.q.iter().enumerate() {
+        (0..3).for_each(|k| rows[(i, i + k)] = q[k]);
     }
+    rows.as_mut_slice().chunks_exact_mut(bands.q.len().max(1)).for_each(|column| bands.forward(column));
+    rows
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::DVector;
 
     #[test]
     fn a_line_is_a_line_inside_and_beyond_and_has_no_roughness() {

@@ -269,8 +269,8 @@ impl Search<'_> {
         }
         progress("fit by simulation");
         let mut simulated = simulated(&data, &model);
+        spare(&data, &mut model, &mut simulated, &mut rivals, &steps, baseline.cost, iterations);
         if let Some(s) = &mut simulated {
-            spare(&data, &mut model, s, &mut rivals, &steps, baseline.cost, iterations);
             by_simulation(&data, &mut model, s, &mut rivals, &steps);
         }
         let limit = settings.false_alarm.ln();
