@@ -9,9 +9,8 @@ use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::begun;
 use crate::diagnose::fit::fitted_model::{fitted, fitted_from_both};
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::output_error_fit::{simulated, simulation_error};
+use crate::diagnose::fit::output_error_fit::simulated;
 use crate::diagnose::fit::selected_effect::SelectedEffect;
-use crate::diagnose::fit::simulation::size;
 use crate::diagnose::rules::{
     OWN_OF_RECORD, RIVAL_BETTER, RIVAL_TRIED, RIVAL_TRIED_WITHOUT_REPEATS, SECOND_ADDS, SMALL_BESIDE_DRAG,
 };
@@ -44,11 +43,11 @@ pub(super) fn prune(data: &DiagnosisData, model: &mut Model, before: f64, iterat
 }
 
 /// Takes out what stands beside a drag only because the drag's column, made along a noisy motion, falls short of the drag: simulated,
-/// the model does without. A model that no fit by simulation betters is judged by its simulation as it stands.
+/// the model does without.
 pub(super) fn spare(
     data: &DiagnosisData,
     model: &mut Model,
-    by_simulation: &mut Option<Model>,
+    by_simulation: &mut Model,
     rivals: &mut Vec<Vec<Rival>>,
     steps: &[Step],
     before: f64,
@@ -58,10 +57,6 @@ pub(super) fn spare(
     let most = model.chosen.iter().map(|c| gain_of(steps, c)).fold(0.0, f64::max);
     let small = |c: &SelectedEffect| gain_of(steps, c) < SMALL_BESIDE_DRAG * most;
     let price = (data.stack.total as f64).ln();
-    if model.chosen.len() < 2 {
-        return;
-    }
-    let mut left = by_simulation.as_ref().map_or_else(|| size(&simulation_error(data, model)), |s| s.cost);
     while model.chosen.len() > 1 && model.chosen.iter().any(drag) {
         let mut without = Vec::new();
         for at in (0..model.chosen.len()).filter(|&i| !drag(&model.chosen[i]) && small(&model.chosen[i])) {
@@ -73,12 +68,11 @@ pub(super) fn spare(
             }
         }
         let Some((at, less, s)) = without.into_iter().min_by(|a, b| a.2.cost.total_cmp(&b.2.cost)) else { return };
-        if s.cost - left > worth(&model.chosen[at], price, before - s.cost) {
+        if s.cost - by_simulation.cost > worth(&model.chosen[at], price, before - s.cost) {
             return;
         }
         rivals.remove(at);
-        left = s.cost;
-        (*model, *by_simulation) = (less, Some(s));
+        (*model, *by_simulation) = (less, s);
     }
 }
 

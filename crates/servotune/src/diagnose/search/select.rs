@@ -23,7 +23,7 @@ use crate::diagnose::fit::output_error_fit::simulated;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{
     BESIDE_DRAG, DOWN_TO_NOISE, FORM_OF_SIMULATED, FOURTH_ADDS, LINEAR_FURTHER, LINEAR_OF_GAIN, OWN_OF_RECORD,
-    REST_BESIDE_DRAG, SECOND_ADDS, THIRD_ADDS, WAVE_STANDS_OUT,
+    REST_BESIDE_DRAG, SECOND_ADDS, THIRD_ADDS, WAVE_STANDS_OUT, WAVE_TAKES,
 };
 use crate::physics::Effect;
 
@@ -183,7 +183,8 @@ impl Search<'_> {
         let asked = share * (model.excess() - 2.0 * model.sigma).max(0.0);
         let minor = ADDS.get(model.chosen.len()).copied().unwrap_or(0.0) * explained;
         let wave = c.effect().is_wave_over_position();
-        let apart = self.own_period_only && (!wave || c.stands_out > WAVE_STANDS_OUT);
+        let clear_wave = c.stands_out > WAVE_STANDS_OUT && gain > WAVE_TAKES * model.excess();
+        let apart = self.own_period_only && (!wave || clear_wave);
         let enough = apart || gain > asked && gain > minor;
         (self.chance(c, gain) < settings.false_alarm.ln() && enough).then(|| next.clone())
     }
@@ -269,8 +270,8 @@ impl Search<'_> {
         }
         progress("fit by simulation");
         let mut simulated = simulated(&data, &model);
-        spare(&data, &mut model, &mut simulated, &mut rivals, &steps, baseline.cost, iterations);
         if let Some(s) = &mut simulated {
+            spare(&data, &mut model, s, &mut rivals, &steps, baseline.cost, iterations);
             by_simulation(&data, &mut model, s, &mut rivals, &steps);
         }
         let limit = settings.false_alarm.ln();
