@@ -61,8 +61,8 @@ impl Trial<'_> {
         let cut = data.runs.clone();
         let mut first = self.made(data, progress)?;
         let (far, joint) = (named_far_from_noise(&first.diagnosis, &first.data), open_to_play(&first.diagnosis));
-        // What no fitted record shows, none can tell the form of.
-        let shown = first.selection.baseline.excess_sigma() >= CLEAN;
+        // What no fitted record shows, none can tell the form of; without repeats the noise is what the model leaves, and tells nothing.
+        let shown = !first.data.noise_known || first.selection.baseline.excess_sigma() >= CLEAN;
         if !(far || joint && shown) {
             return Ok(first);
         }
