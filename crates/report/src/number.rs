@@ -3,6 +3,8 @@
 //! In: a number and how many digits are worth reading. Out: text with an ASCII minus, for a terminal, or with the
 //! typographic minus, for a page. Spec: `specs/report.md`.
 
+use servotune::numeric::digits::said;
+
 /// What stands where a number is missing or not finite.
 pub const MISSING: &str = "—";
 
@@ -65,26 +67,7 @@ fn not_finite(value: f64) -> String {
 }
 
 fn significant(value: f64, digits: u8) -> String {
-    if !value.is_finite() {
-        return not_finite(value);
-    }
-    let digits = usize::from(digits.max(1));
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    // The exponent after rounding: 9.996 with three digits is 10.0, not 10.00.
-    let scientific = format!("{value:.*e}", digits - 1);
-    let Some((mantissa, exponent)) = scientific.split_once('e') else {
-        return scientific;
-    };
-    let Ok(power) = exponent.parse::<i32>() else {
-        return scientific;
-    };
-    if !(-4..=6).contains(&power) {
-        return format!("{mantissa}e{power}");
-    }
-    let behind = (digits as i32 - 1 - power).max(0) as usize;
-    format!("{value:.behind$}")
+    if value.is_finite() { said(value, usize::from(digits)) } else { not_finite(value) }
 }
 
 #[cfg(test)]

@@ -92,4 +92,23 @@ impl Parameter {
     pub fn new(name: &'static str, value: f64, unit: Unit) -> Parameter {
         Parameter { name, value, unit }
     }
+
+    /// By how much it exceeds another; phases by half a turn at most, either way.
+    pub fn beyond(&self, other: &Parameter) -> f64 {
+        let by = self.value - other.value;
+        if self.unit == Unit::Degree { (by + 180.0).rem_euclid(360.0) - 180.0 } else { by }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn phases_on_either_side_of_half_a_turn_are_near_each_other() {
+        let of = |value, unit| Parameter::new("phase_deg", value, unit);
+        assert_eq!(of(179.0, Unit::Degree).beyond(&of(-178.0, Unit::Degree)), -3.0);
+        assert_eq!(of(-178.0, Unit::Degree).beyond(&of(179.0, Unit::Degree)), 3.0);
+        assert_eq!(of(400.0, Unit::Hertz).beyond(&of(20.0, Unit::Hertz)), 380.0);
+    }
 }

@@ -15,6 +15,7 @@ use crate::diagnose::rules::{
 use crate::diagnose::search::rival_model::{Rival, family_width};
 use crate::diagnose::search::selection::Selection;
 use crate::diagnose::search::shortlist::same_drag;
+use crate::numeric::digits::said;
 use crate::physics::{
     AnyLaw, Effect, Entry, Facts, Parameter, Setting, Share, coulomb_friction, facts, library, line_disturbance,
     linear_parameters, repeatable_runout, unexplained,
@@ -32,12 +33,6 @@ pub(super) const RUNOUT: &str = repeatable_runout::FACTS.name;
 
 pub(super) fn text_of(name: &str) -> (&'static str, crate::physics::Port) {
     facts(name).map_or(("something that the model does not hold", crate::physics::Port::Torque), |f| (f.says, f.port))
-}
-
-/// A frequency to three digits, as a person says it.
-fn hertz(value: f64) -> String {
-    let places = (2.0 - value.abs().max(1e-3).log10().floor()).clamp(0.0, 5.0) as usize;
-    format!("{value:.places$}")
 }
 
 pub(in crate::diagnose) fn plain(value: f64, unit: &str) -> Estimate {
@@ -117,7 +112,7 @@ pub(in crate::diagnose) fn finding(data: &DiagnosisData, selection: &Selection, 
         family,
         port,
         p_value: log_p.min(0.0).exp().max(1e-300),
-        says: format!("Between {} and {} Hz {says}{when}.", hertz(band[0]), hertz(band[1])),
+        says: format!("Between {} and {} Hz {says}{when}.", said(band[0], 3), said(band[1], 3)),
         parameters,
         place,
     })
@@ -214,7 +209,7 @@ fn estimates(data: &DiagnosisData, selection: &Selection, at: usize) -> BTreeMap
         .iter()
         .enumerate()
         .map(|(k, p)| {
-            let off = moved.iter().map(|m| m.get(k).map_or(0.0, |q| (q.value - p.value).powi(2))).sum::<f64>();
+            let off = moved.iter().map(|m| m.get(k).map_or(0.0, |q| q.beyond(p).powi(2))).sum::<f64>();
             let exact = nudged.get(k).is_none_or(|q| q.value == p.value);
             let form = if exact {
                 0.0
@@ -265,8 +260,8 @@ pub(in crate::diagnose) fn unexplained(data: &DiagnosisData, selection: &Selecti
         p_value: log_tail(model.excess() + model.freedom, model.freedom as usize).min(0.0).exp().max(1e-300),
         says: format!(
             "Between {} and {} Hz something acts that the library does not hold: {nearest}.",
-            hertz(band[0]),
-            hertz(band[1]),
+            said(band[0], 3),
+            said(band[1], 3),
         ),
         parameters: BTreeMap::new(),
         place,
@@ -276,5 +271,5 @@ pub(in crate::diagnose) fn unexplained(data: &DiagnosisData, selection: &Selecti
 /// What is left in per cent, to three digits; along the recorded motion a law may leave more than there was.
 fn percent(explained: f64) -> String {
     let left = 100.0 * (1.0 - explained);
-    if left > 1000.0 { "more than 1000".into() } else { hertz(left) }
+    if left > 1000.0 { "more than 1000".into() } else { said(left, 3) }
 }

@@ -21,7 +21,7 @@ use crate::diagnose::noise::repeats::without_start;
 use crate::numeric::digits::said;
 use crate::numeric::least_squares::Qr;
 use crate::physics::repeatable_runout::{FACTS, RepeatableRunout};
-use crate::physics::{Facts, Parameter, Setting, Unit};
+use crate::physics::{Facts, Setting};
 use crate::recording::Role;
 use std::collections::BTreeMap;
 
@@ -134,7 +134,7 @@ impl RunOut {
         let moved: Vec<_> = self.directions.iter().map(moved).collect();
         let there = setting.strengths.chunks(2).map(|s| s != [0.0; 2]).collect::<Vec<_>>();
         let estimates = base.iter().enumerate().filter(|(k, _)| *k == 0 || there[(k - 1) / 2]).map(|(k, p)| {
-            let off = 1.96 * moved.iter().map(|m| apart(&m[k], p).powi(2)).sum::<f64>().sqrt();
+            let off = 1.96 * moved.iter().map(|m| m[k].beyond(p).powi(2)).sum::<f64>().sqrt();
             let unit = p.unit.text(&data.form.given.position_unit, &data.form.given.command_unit);
             (p.name.to_owned(), Estimate { value: p.value, low: p.value - off, high: p.value + off, unit })
         });
@@ -149,12 +149,6 @@ impl RunOut {
             place,
         }
     }
-}
-
-/// By how much a parameter differs; phases by less than a turn.
-fn apart(a: &Parameter, b: &Parameter) -> f64 {
-    let by = a.value - b.value;
-    if a.unit == Unit::Degree { (by + 180.0).rem_euclid(360.0) - 180.0 } else { by }
 }
 
 /// The frequencies of a run-out's harmonics, as a person says them.
