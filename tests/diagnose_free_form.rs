@@ -1,6 +1,6 @@
 //! Curves without a name, against machines of laws that the library does not have: integrated here (Runge-Kutta, 16 steps a sample), no
 //! code shared with the program.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 use nalgebra::{DMatrix, DVector};
 use servotune::diagnose::{DiagnoseSettings, Diagnosed, FreeForm, Verdict, diagnose, missing_curve};
@@ -273,4 +273,38 @@ fn a_sound_machine_has_no_curve() {
     assert_eq!(made.diagnosis.verdict, Verdict::NoMismatch, "{:?}", made.diagnosis.findings);
     assert!(made.diagnosis.free_form.is_none());
     assert!(missing_curve(&made.data, &made.selection).is_none());
+}
+
+/// A real drive whose speed sensor does not see the sign (Wigren & Schoukens 2017): 300 samples of each record fitted, 200 held out. No record
+/// repeats, so that nothing but the models' own rest tells the noise.
+#[test]
+fn a_real_sensor_without_a_sign_is_a_reading_that_folds() {
+    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data/ced_prbs/ced_prbs.csv");
+    let Ok(text) = std::fs::read_to_string(&file) else {
+        eprintln!("SKIPPED: data/ced_prbs/ced_prbs.csv is not here");
+        return;
+    };
+    let (header, rows) = text.split_once('\n').unwrap();
+    let column = |name: &str| -> Vec<f64> {
+        let at = header.trim().split(',').position(|h| h == name).unwrap();
+        rows.lines().map(|l| l.split(',').nth(at).unwrap().trim().parse().unwrap()).collect()
+    };
+    let mut case = SOUND.case();
+    case.records.clear();
+    for size in ["1V", "1p5V", "0p5V"] {
+        let (u, z) = (column(&format!("u_{size}")), column(&format!("z_{size}")));
+        for (role, rows) in [(Role::Fit, 0..300), (Role::Holdout, 300..500)] {
+            let file = PathBuf::from(format!("{size}_{role:?}.csv"));
+            let made = Record { sample_time_s: 0.02, ..record(file.clone(), &u[rows.clone()], z[rows].to_vec()) };
+            case.records.push((RecordEntry { file, role, repeat_group: None }, made));
+        }
+    }
+    let body = Body::SecondOrder { dc_gain: 1.0, natural_frequency_rad_s: 8.0, damping_ratio: 0.2 };
+    let plant = Plant { position_unit: "tick/s".into(), command_unit: "V".into(), body, ..plant() };
+    let d = diagnose(&case, &plant, None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
+    assert_eq!(d.verdict, Verdict::Named, "{:?}", d.remarks);
+    assert_eq!(d.findings[0].effect, "sensor_curve");
+    // The best linear model leaves about 1 tick/s.
+    let held = d.fit.holdout.unwrap();
+    assert!(held.rms_after < 0.4, "{held:?}");
 }
