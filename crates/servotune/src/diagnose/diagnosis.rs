@@ -37,7 +37,7 @@ pub fn diagnose(
     let mut progress = |step: &str| say(&pace.says(step));
     let sample_time_s = case.records[0].1.sample_time_s;
     let given = &usable(given, controller, sample_time_s)?;
-    let mut all = runs(case);
+    let mut all = runs(case, controller.is_some());
     driven(&all, case)?;
     // Digits of the printed clock do not matter once a controller says what the sample time is.
     let sample_time_s = controller.map_or(sample_time_s, |c| c.sample_time_s);

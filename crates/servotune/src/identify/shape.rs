@@ -94,6 +94,7 @@ impl Shape {
             BodyForm::SecondOrder | BodyForm::Without => {
                 let w0 = x[1].exp();
                 Body::SecondOrder { dc_gain: gain / (w0 * w0), natural_frequency_rad_s: w0, damping_ratio: x[2].exp() }
+                    .on_a_spring()
             }
             BodyForm::FreeInertia => Body::FreeInertia { acceleration_gain: gain, viscous_rate_per_s: x[1] },
         };

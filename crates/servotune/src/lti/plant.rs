@@ -31,6 +31,25 @@ pub enum Body {
     Rational(Rational),
 }
 
+impl Body {
+    /// The same acceleration and viscous rate on a spring that a plant may have: a fit may end at none, which neither limit of
+    /// [`Plant::check`] lets through. What moves lies below 1e-4 rad/s, or below 3e-9 of the viscous rate.
+    pub fn on_a_spring(self) -> Body {
+        let Body::SecondOrder { dc_gain, natural_frequency_rad_s: w, damping_ratio } = self else { return self };
+        let by = (PLANT_RAD_S[0] / w).max(damping_ratio / DAMPING);
+        if by.is_nan() || by <= 1.0 {
+            return self;
+        }
+        // Clear of the limits by more than a product rounds.
+        let by = by * (1.0 + 1e-12);
+        Body::SecondOrder {
+            dc_gain: dc_gain / (by * by),
+            natural_frequency_rad_s: w * by,
+            damping_ratio: damping_ratio / by,
+        }
+    }
+}
+
 /// One monic resonance pair of eq. (2): (s² + 2 ζz ωz s + ωz²)/(s² + 2 ζp ωp s + ωp²).
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -281,5 +300,30 @@ impl FrequencyResponse for Plant {
     fn at(&self, w: f64) -> Complex<f64> {
         let modes: Complex<f64> = self.modes.iter().map(|m| m.at(w)).product();
         self.resonance_gain * self.body.at(w) * modes * Complex::from_polar(1.0, -w * self.delay_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Body;
+    use crate::document::size_limits::{DAMPING, PLANT_RAD_S};
+    use nalgebra::Complex;
+
+    #[test]
+    fn a_spring_that_a_fit_lost_is_one_that_a_plant_may_have() {
+        // Slower than any, and damped more than any; 2 zeta w is the viscous rate, dc_gain w^2 the acceleration.
+        for (w, damping_ratio) in [(1e-6, 2e6), (1e-3, 3e4), (3e-5, 0.1)] {
+            let dc_gain = 50.0 / (w * w);
+            let body = Body::SecondOrder { dc_gain, natural_frequency_rad_s: w, damping_ratio }.on_a_spring();
+            let Body::SecondOrder { natural_frequency_rad_s, damping_ratio: damping, .. } = body else {
+                panic!("{body:?}")
+            };
+            assert!(natural_frequency_rad_s >= PLANT_RAD_S[0] && damping <= DAMPING, "{body:?}");
+            let s = Complex::new(0.0, 5.0);
+            let free = 50.0 / (s * (s + 2.0 * damping_ratio * w));
+            assert!((body.at(5.0) / free - 1.0).norm() < 1e-6, "{w}");
+        }
+        let sound = Body::SecondOrder { dc_gain: 75.0, natural_frequency_rad_s: 369.0, damping_ratio: 0.22 };
+        assert_eq!(sound.clone().on_a_spring(), sound);
     }
 }

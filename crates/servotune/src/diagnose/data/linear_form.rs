@@ -149,6 +149,7 @@ impl LinearForm {
                     natural_frequency_rad_s: w0,
                     damping_ratio: (viscous / (2.0 * w0)).max(1e-6 * (k0 / k).sqrt()),
                 }
+                .on_a_spring()
             }
             Body::FreeInertia { .. } => {
                 Body::FreeInertia { acceleration_gain: gain, viscous_rate_per_s: viscous.max(0.0) }

@@ -145,13 +145,21 @@ fn quiet(reference: &[f64], excitation: &[f64]) -> usize {
     still(reference).min(still(excitation)).max(1).min(excitation.len())
 }
 
+/// The reference of a record, where it tells what drives the machine.
+///
+/// Without a controller, columns of reference and excitation that never move were filled in by whoever wrote the log: the command is the drive,
+/// and where they stand still the machine need not.
+fn told_reference(record: &Record, controlled: bool) -> Option<&[f64]> {
+    let moves = |x: &[f64]| x.iter().any(|v| *v != x[0]);
+    record.reference.as_deref().filter(|r| controlled || moves(r) || moves(&record.excitation))
+}
+
 /// Position and command before a record began.
 ///
 /// Their means as long as reference and excitation stand still: what the controller held against springs and cables. An excitation that sets in
 /// at once leaves of the position the first sample; the command that held the arm is then the mean of all that was put in, where the reference
 /// never moves.
-fn stood(record: &Record) -> [f64; 2] {
-    let reference = record.reference.as_deref().unwrap_or_default();
+fn stood(record: &Record, reference: &[f64]) -> [f64; 2] {
     let quiet = quiet(reference, &record.excitation);
     let origin = mean(&record.position[..quiet]);
     let held = still(reference) >= AT_REST && quiet < AT_REST && reference.iter().all(|r| *r == reference[0]);
@@ -159,8 +167,8 @@ fn stood(record: &Record) -> [f64; 2] {
     [origin, before]
 }
 
-/// The records of a case as runs, groups numbered in the order of their first record.
-pub fn runs(case: &Case) -> Vec<Run> {
+/// The records of a case as runs, groups numbered in the order of their first record; `controlled` where a controller made the command.
+pub fn runs(case: &Case, controlled: bool) -> Vec<Run> {
     let mut groups: Vec<String> = Vec::new();
     let mut session_s = 0.0;
     case.records
@@ -174,7 +182,8 @@ pub fn runs(case: &Case) -> Vec<Run> {
             });
             let began_s = session_s;
             session_s += record.len() as f64 * record.sample_time_s;
-            let [origin, before] = stood(record);
+            let reference = told_reference(record, controlled);
+            let [origin, before] = stood(record, reference.unwrap_or_default());
             let input: Vec<f64> = record.command.iter().zip(&record.excitation).map(|(c, e)| c + e).collect();
             Run {
                 name: entry.name(),
@@ -182,11 +191,11 @@ pub fn runs(case: &Case) -> Vec<Run> {
                 began_s,
                 from_s: 0.0,
                 group,
-                rested: still(record.reference.as_deref().unwrap_or_default()) >= AT_REST.min(record.position.len()),
+                rested: still(reference.unwrap_or_default()) >= AT_REST.min(record.position.len()),
                 shocked: false,
                 before,
                 origin,
-                reference: record.reference.clone(),
+                reference: reference.map(<[f64]>::to_vec),
                 command: record.command.clone(),
                 excitation: record.excitation.clone(),
                 input,

@@ -5,7 +5,7 @@
 //! simulates far better than the best linear plant. It names nothing: the search begins anew from the plant alone.
 
 use super::curve_balance::curves;
-use super::torque_balance::{Balance, Balanced, SLOWEST_RAD_S, recorded_means, smoothings, with_freedom};
+use super::torque_balance::{Balance, Balanced, recorded_means, smoothings, with_freedom};
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
@@ -15,7 +15,7 @@ use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::fit::simulation::size;
 use crate::diagnose::free_form::estimation::Curved;
 use crate::diagnose::rules::{CLEARED_BETTER, CLEARED_BY_CURVE, CLEARED_FAR, CLEARED_FULLER, CLEARED_TELLS};
-use crate::lti::{Body, Plant};
+use crate::lti::Plant;
 use crate::physics::{AnyLaw, Setting};
 
 /// Laws that are tried by simulation, as they stand and fitted.
@@ -142,7 +142,7 @@ impl Tried<'_> {
         };
         let left = self.whole.iter().map(own).collect();
         let law = best.model.chosen.first().filter(|_| !best.curve).cloned();
-        Cleared { plant: not_too_slow(best.ground.form.plant(&best.model.refitted.p)), law, curve: best.curve, left }
+        Cleared { plant: best.ground.form.plant(&best.model.refitted.p), law, curve: best.curve, left }
     }
 
     /// A plant with a law beside it, and the ground around it.
@@ -211,17 +211,6 @@ impl Tried<'_> {
         }
         best
     }
-}
-
-/// The same acceleration and viscous rate on a spring that a plant may have: a fit may end at none.
-fn not_too_slow(plant: Plant) -> Plant {
-    let Body::SecondOrder { dc_gain, natural_frequency_rad_s: w, damping_ratio } = plant.body else { return plant };
-    let by = SLOWEST_RAD_S / w;
-    if by <= 1.0 {
-        return plant;
-    }
-    let (dc_gain, damping_ratio) = (dc_gain / (by * by), damping_ratio / by);
-    Plant { body: Body::SecondOrder { dc_gain, natural_frequency_rad_s: SLOWEST_RAD_S, damping_ratio }, ..plant }
 }
 
 /// The same ground around another plant, for simulations of plain errors: its noise and its motion stay.

@@ -24,7 +24,7 @@ const ROWS: f64 = 0.5;
 const SHARP: [f64; 6] = [1.0, 1.5, 2.5, 4.0, 6.0, 10.0];
 const BLUR: f64 = 0.03;
 /// Least natural frequency of a body that is made (rad/s): plants go down to a tenth of it.
-pub(super) const SLOWEST_RAD_S: f64 = 1e-3;
+const SLOWEST_RAD_S: f64 = 1e-3;
 /// A record's mean run, smoothed: its motion and what stands on both sides of the balance.
 pub(in crate::diagnose) struct Smoothed {
     pub samples: Vec<Sample>,
@@ -254,7 +254,7 @@ impl<'a> Balance<'a> {
                 let slowest = (std::f64::consts::PI / self.data.scene.duration_s.max(t)).powi(2);
                 let k = stiffness.max(1e-2 * slowest).max(SLOWEST_RAD_S * SLOWEST_RAD_S);
                 let damping_ratio = (0.5 * viscous / k.sqrt()).max(1e-3);
-                Body::SecondOrder { dc_gain: gain / k, natural_frequency_rad_s: k.sqrt(), damping_ratio }
+                Body::SecondOrder { dc_gain: gain / k, natural_frequency_rad_s: k.sqrt(), damping_ratio }.on_a_spring()
             }
         };
         Plant { body, delay_s: (delay_samples * t).clamp(0.0, 3.0 * LATER as f64 * t), ..given.clone() }
