@@ -4,7 +4,7 @@
 //! Between its lines nothing is left out; what is neglected: images above half the sample rate, the output limit, and the rest
 //! of one move that the next one still sees. Noise enters as expected power. Spec: `specs/tuning.md`, "The measured route".
 
-use super::spectral_slopes::Adjoint;
+use super::spectral_adjoint::Adjoint;
 use super::window_frame::{FrameKey, LANES, WindowFrame, frame, kernel};
 use super::{PesError, Profile, Reference, WindowDft};
 use crate::controller::{Controller, Feedforward};

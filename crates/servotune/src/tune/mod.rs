@@ -60,12 +60,12 @@ pub use pareto::{ParetoPoint, ParetoSettings, pareto};
 pub use physical::{
     PhysicalProof, PhysicalTuning, TUNED_AMPLITUDES, equivalent_responses, judge_physical, tune_physical,
 };
-pub use problem::{TuningProblem, TuningWork};
+pub use problem::{TuningProblem, TuningWork, ranges};
 pub use requirements::{CurveFound, Found, Judged, JudgedLimit, MET, Requirement, Side, What};
 pub use score::Score;
 pub use spec::{GUARD, Search, Spec};
 pub use spec_error::SpecError;
 pub use structure::{Kind, Setting, Structure};
 pub use tune_error::TuneError;
-pub use tuning::{TuneSettings, ranges, sample_time_s, tune, tune_from, tune_jointly, tune_watched};
+pub use tuning::{TuneSettings, sample_time_s, tune, tune_from, tune_jointly, tune_watched};
 pub use watch::{SearchStep, SearchWatch, unwatched};

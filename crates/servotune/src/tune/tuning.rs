@@ -1,6 +1,5 @@
 //! `tune`: search, exact judgement, back-off, verdict.
 
-use super::bounds::{Ranges, crossover_hz};
 use super::ending::{Ending, Settled};
 use super::feedforward::best_feedforward;
 use super::found::{Effort, Found};
@@ -10,6 +9,7 @@ use super::neighbours::{BETTER, spread};
 use super::outcome::{Outcome, Reached, Tuned, Work};
 use super::parameters::PID_FILTER;
 use super::polish::{Goal, polish};
+use super::problem::ranges;
 use super::score::UNSTABLE;
 use super::search::search;
 use super::structure::{Kind, Setting};
@@ -337,14 +337,6 @@ pub(super) fn prepare(
         return Err(TuneError::NothingFree);
     }
     Ok(parameters)
-}
-
-/// The ranges that a search on these machines has at this sample time (s).
-pub fn ranges(machines: &[Machine<'_>], spec: &Spec, sample_time_s: f64) -> Ranges {
-    let gains: Vec<Box<dyn Fn(f64) -> f64 + '_>> =
-        machines.iter().map(|m| Box::new(|w: f64| m.gain(w)) as Box<dyn Fn(f64) -> f64 + '_>).collect();
-    let gains: Vec<&dyn Fn(f64) -> f64> = gains.iter().map(|g| g.as_ref()).collect();
-    spec.search.bounds.ranges(&gains, crossover_hz(spec, sample_time_s), sample_time_s)
 }
 
 /// The controller's sample time: of the start controller, the spec or the settings; refused where none says it and where two disagree.
