@@ -19,15 +19,12 @@ import tempfile
 import time
 from pathlib import Path
 
+from imports import circles, without_tests
+
 ROOT = Path(__file__).resolve().parent.parent
 PUBLIC = re.compile(r"^\s*pub (?:const fn|fn|struct|enum|trait|const|type|static|unsafe fn) ", re.M)
 FUNCTION = re.compile(r"^( *)(?:pub(?:\([a-z]+\))? )?(?:const )?fn (\w+)")
 LONG_FUNCTION, LONG_SENTENCE = 80, 40
-
-
-def without_tests(text: str) -> str:
-    """A file up to its unit tests."""
-    return text.split("#[cfg(test)]\nmod ", 1)[0]
 
 
 def installed(root: Path) -> dict[str, str]:
@@ -46,59 +43,6 @@ def functions(text: str) -> list[tuple[int, str]]:
             end = next((j for j in range(i, len(lines)) if lines[j] == m.group(1) + "}"), i)
             found.append((end - i + 1, m.group(2)))
     return found
-
-
-def paths(text: str) -> list[str]:
-    """Paths that begin with `super::` or `crate::`, groups in braces taken apart."""
-    code = "\n".join(line for line in text.splitlines() if not line.lstrip().startswith("//"))
-    found = []
-    for m in re.finditer(r"(?<![\w:])(?:super|crate)::[\w:]*", code):
-        end, depth = m.end(), 0
-        if code[end : end + 1] == "{" and m.group().endswith("::"):
-            while depth or end == m.end():
-                depth += (code[end] == "{") - (code[end] == "}")
-                end += 1
-        found += apart(re.sub(r"\s", "", code[m.start() : end]))
-    return found
-
-
-def apart(tree: str) -> list[str]:
-    """`a::{b, c::{d, e}}` as `a::b`, `a::c::d`, `a::c::e`."""
-    head, brace, group = tree.partition("{")
-    if not brace:
-        return [tree]
-    depth, parts = 0, [""]
-    for c in group[:-1]:
-        depth += (c == "{") - (c == "}")
-        parts += [""] if c == "," and not depth else []
-        parts[-1] += c if c != "," or depth else ""
-    return [head + p for part in parts if part for p in apart(part)]
-
-
-def circles(root: Path) -> int:
-    """Files that import one another in a circle within their crate."""
-    count = 0
-    for source in [root / "src", *sorted(root.glob("crates/*/src"))]:
-        files = {f.relative_to(source).with_suffix("").parts: f for f in source.rglob("*.rs") if f.stem not in ("mod", "lib", "main")}
-        edges = {place: set() for place in files}
-        for place, file in files.items():
-            for path in paths(without_tests(file.read_text())):
-                full = list(place)
-                for part in filter(None, path.split("::")):
-                    full = [] if part == "crate" else full[:-1] if part == "super" else [*full, part]
-                ends = [tuple(full[:n]) for n in range(len(full), 0, -1) if tuple(full[:n]) in files]
-                edges[place] |= set(ends[:1]) - {place}
-
-        def reached(start: tuple[str, ...]) -> set[tuple[str, ...]]:
-            seen, todo = set(), [start]
-            while todo:
-                for m in edges[todo.pop()] - seen:
-                    seen.add(m)
-                    todo.append(m)
-            return seen
-
-        count += sum(n in reached(n) for n in files)
-    return count
 
 
 def sentences(text: str) -> list[str]:
@@ -147,7 +91,7 @@ def figures(root: Path) -> list[tuple[str, str]]:
         ("lines of the installed product, tests left out", f"{lines}"),
         ("files", f"{len(files)}"),
         ("public items", f"{sum(len(PUBLIC.findall(t)) for t in code.values())}"),
-        ("files in circles of imports within their crate", f"{circles(root)}"),
+        ("files in circles of imports within their crate", f"{len(circles(root))}"),
         ("longest function, lines", f"{longest[0]} (`{longest[1]}`, {longest[2]})"),
         (f"functions above {LONG_FUNCTION} lines", f"{len(long)}"),
         ("of these in `diagnose`", f"{sum('/diagnose/' in f[2] for f in long)}"),

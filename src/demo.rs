@@ -8,9 +8,9 @@ use super::tune_text::text;
 use super::{Ending, Failure, Screen, demo_diagnosis, demo_fleet, demo_gate, gated};
 use serde::Serialize;
 use servotune::document::{FileSet, read_text, sha256_hex, write_text, write_whole};
-use servotune::frf::{PhaseDisplay, ReadSettings, read_file, write_bod_as};
-use servotune::identify::{IdentifySettings, identify};
-use servotune::lti::PlantFile;
+use servotune::frf::{PhaseDisplay, ReadSettings, Sweep, read_file, write_bod_as};
+use servotune::identify::{Identified, IdentifySettings, identify};
+use servotune::lti::{Plant, PlantFile};
 use servotune::numeric::random::Random;
 use servotune::tune::{InputDigest, Machine, Outcome, Spec, TuneError, TuneSettings, tune};
 use servotune::twin::plants::{log_grid, measure};
@@ -20,7 +20,7 @@ use servotune_answer::Proof;
 use servotune_answer::slot::provenance;
 use servotune_answer::slot::{self, Slot};
 use servotune_report::identified::identified_sentences;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Noise of the sweep (ratio) and its seed.
 const NOISE: f64 = 0.01;
@@ -46,24 +46,8 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let machine = paper_machine(MachineClass::Tunable)?;
     let start = nominal_controller()?;
     let spec_text = include_str!("../specs/limits/paper.toml").replace("../profiles/spiral.toml", "profile.toml");
-    screen.say(&format!("1/7 sweep of the paper's tunable machine, 40-5000 Hz, 400 points, {} % noise", 100.0 * NOISE));
-    let taken = measure(&machine, &log_grid(40.0, 5000.0, 400), NOISE, &mut Random::new(1))?;
-    let mut bod = Vec::new();
-    write_bod_as(&taken, PhaseDisplay::Margin, &mut bod)?;
-    begin(a, &spec_text, &bod, screen)?;
-    let sweep = read_file(&file("response.bod"), &ReadSettings::default())?;
-    for note in &sweep.notes {
-        screen.say(&format!("    {note}"));
-    }
-
-    screen.say("2/7 identification");
-    let id = identify(&sweep.frf, &IdentifySettings::default())
-        .map_err(|source| Failure::Identify { file: file("response.bod"), source })?;
-    for sentence in identified_sentences(&id) {
-        screen.say(&format!("    {sentence}"));
-    }
-    let plant = toml::to_string(&PlantFile::from(&id.plant)).map_err(|source| Failure::Toml { source })?;
-    write_text(&file("plant.toml"), &plant)?;
+    let sweep = sweep(a, &machine, &spec_text, screen)?;
+    let id = identified(a, &sweep, screen)?;
 
     screen.say("3/7 tuning, straight on the measured response and over the model");
     let spec = Spec::read(&file("spec.toml")).map_err(TuneError::from)?;
@@ -116,22 +100,9 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     let found = demo_diagnosis::run(&a.out, &machine, &start, screen)?;
     screen.say("7/7 a tester of sixteen slots: gate, identification, tables for each slot and shared ones");
     let floor = demo_fleet::run(&a.out, screen)?;
-    let words = text(&outcome, Some(&start), &spec, slot::units(&id.plant))?;
     let ending = if outcome.tuned().is_some() { Ending::Accepted } else { Ending::Rejected };
-    let shown = format!(
-        "{words}\n{}\n{} {}\nOpen this table: {}\n\nRecords that the model does not explain\n{}Open this report: {}\n\nA tester of sixteen slots\n{}Open this page: {}\n\nGain table: {}\n{}\nOpen this report: {}\n",
-        gated::sheet(&judged.rows)?.text(),
-        gated::summary(&judged.rows),
-        judged.table.display(),
-        judged.page.display(),
-        found.text,
-        found.report.display(),
-        floor.text,
-        floor.page.display(),
-        gain_table.display(),
-        says,
-        report.display()
-    );
+    let words = text(&outcome, Some(&start), &spec, slot::units(&id.plant))?;
+    let shown = shown(&words, &judged, &found, &floor, &gain_table, &says, &report)?;
     let document = Document {
         outcome: &outcome,
         gain_table,
@@ -147,6 +118,59 @@ pub(super) fn run(a: &DemoArguments, screen: &mut Screen) -> Result<Ending, Fail
     };
     screen.result(&document, &shown)?;
     Ok(ending)
+}
+
+/// All that the demo says of its results.
+fn shown(
+    words: &str,
+    judged: &demo_gate::Judged,
+    found: &demo_diagnosis::Made,
+    floor: &demo_fleet::Made,
+    gain_table: &Path,
+    says: &str,
+    report: &Path,
+) -> Result<String, Failure> {
+    Ok(format!(
+        "{words}\n{}\n{} {}\nOpen this table: {}\n\nRecords that the model does not explain\n{}Open this report: {}\n\nA tester of sixteen slots\n{}Open this page: {}\n\nGain table: {}\n{}\nOpen this report: {}\n",
+        gated::sheet(&judged.rows)?.text(),
+        gated::summary(&judged.rows),
+        judged.table.display(),
+        judged.page.display(),
+        found.text,
+        found.report.display(),
+        floor.text,
+        floor.page.display(),
+        gain_table.display(),
+        says,
+        report.display()
+    ))
+}
+
+/// The sweep of the machine, as it was read back from its file.
+fn sweep(a: &DemoArguments, machine: &Plant, spec: &str, screen: &mut Screen) -> Result<Sweep, Failure> {
+    screen.say(&format!("1/7 sweep of the paper's tunable machine, 40-5000 Hz, 400 points, {} % noise", 100.0 * NOISE));
+    let taken = measure(machine, &log_grid(40.0, 5000.0, 400), NOISE, &mut Random::new(1))?;
+    let mut bod = Vec::new();
+    write_bod_as(&taken, PhaseDisplay::Margin, &mut bod)?;
+    begin(a, spec, &bod, screen)?;
+    let sweep = read_file(&a.out.join("response.bod"), &ReadSettings::default())?;
+    for note in &sweep.notes {
+        screen.say(&format!("    {note}"));
+    }
+    Ok(sweep)
+}
+
+/// The plant of the sweep, written down.
+fn identified(a: &DemoArguments, sweep: &Sweep, screen: &mut Screen) -> Result<Identified, Failure> {
+    screen.say("2/7 identification");
+    let id = identify(&sweep.frf, &IdentifySettings::default())
+        .map_err(|source| Failure::Identify { file: a.out.join("response.bod"), source })?;
+    for sentence in identified_sentences(&id) {
+        screen.say(&format!("    {sentence}"));
+    }
+    let plant = toml::to_string(&PlantFile::from(&id.plant)).map_err(|source| Failure::Toml { source })?;
+    write_text(&a.out.join("plant.toml"), &plant)?;
+    Ok(id)
 }
 
 /// Writes what the demo begins with, unless a person's files stand there.

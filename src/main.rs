@@ -18,6 +18,7 @@ mod demo_gate;
 mod diagnose;
 mod diagnose_arguments;
 mod diagnose_rules;
+mod ending;
 mod export;
 mod export_c;
 mod export_fixed;
@@ -64,18 +65,10 @@ mod verify_arguments;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
+use ending::Ending;
 use failure::Failure;
 use screen::{Screen, Volume};
 use std::process::ExitCode;
-
-/// What a command that ran has to say by its exit code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Ending {
-    /// 0: done, all accepted.
-    Accepted,
-    /// 1: done, and something was rejected, infeasible, abstained or failed.
-    Rejected,
-}
 
 fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {

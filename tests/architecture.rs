@@ -1,7 +1,7 @@
 //! The house keeps its plan: arrows point downwards, outside crates have one home, files stay short.
 #![allow(clippy::unwrap_used)]
 
-use std::collections::{BTreeMap, BTreeSet};
+use crate::architecture_imports::{House, place};
 use std::path::{Path, PathBuf};
 
 /// Rooms of the library by rank; a room uses lower ranks only (`specs/decisions/rooms.md`). Between crates the manifests hold the direction.
@@ -84,7 +84,8 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-fn each_source(mut look: impl FnMut(&str, &str)) {
+/// Every source file of the house, tests left out: its name and its text.
+pub fn each_source(mut look: impl FnMut(&str, &str)) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut files = Vec::new();
     sources(&root.join("src"), &mut files);
@@ -170,132 +171,25 @@ fn files_stay_short_and_say_what_they_are() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Paths that begin with `super::` or `crate::`, groups in braces taken apart; unit tests and comments left out.
-fn paths(text: &str) -> Vec<String> {
-    let text = text.split("#[cfg(test)]\nmod ").next().unwrap();
-    let code: Vec<&str> = text.lines().filter(|l| !l.trim_start().starts_with("//")).collect();
-    let code = code.join("\n");
-    let mut all = Vec::new();
-    for (at, _) in code.match_indices("super::").chain(code.match_indices("crate::")) {
-        let inside = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
-        if code[..at].chars().next_back().is_some_and(inside) {
-            continue;
-        }
-        let rest = &code[at..];
-        let mut end = rest.find(|c| !inside(c)).unwrap_or(rest.len());
-        if rest[end..].starts_with('{') && rest[..end].ends_with("::") {
-            let mut depth = 0;
-            let closes = |c: char| {
-                depth += i32::from(c == '{') - i32::from(c == '}');
-                depth == 0
-            };
-            end += rest[end..].find(closes).unwrap() + 1;
-        }
-        take_apart("", &rest[..end], &mut all);
-    }
-    all
-}
-
-/// `a::{b, c::{d, e}}` as `a::b`, `a::c::d`, `a::c::e`.
-fn take_apart(before: &str, tree: &str, all: &mut Vec<String>) {
-    let Some((head, group)) = tree.split_once('{') else { return all.push(format!("{before}{}", tree.trim())) };
-    let (before, mut depth) = (format!("{before}{}", head.trim()), 0);
-    let parts = group.trim_end().strip_suffix('}').unwrap().split(|c| {
-        depth += i32::from(c == '{') - i32::from(c == '}');
-        c == ',' && depth == 0
-    });
-    parts.filter(|p| !p.trim().is_empty()).for_each(|p| take_apart(&before, p, all));
-}
-
-/// The folder of a crate's sources, and where a file stands below it: `diagnose/fit/model.rs` is `[diagnose, fit, model]`.
-fn module(name: &str) -> (String, Vec<String>) {
-    let (krate, below) = name.split_once("src/").unwrap();
-    let mut place: Vec<String> = below.trim_end_matches(".rs").split('/').map(str::to_owned).collect();
-    if ["mod", "lib", "main"].contains(&place.last().unwrap().as_str()) {
-        place.pop();
-    }
-    (format!("{krate}src/"), place)
-}
-
-/// A path as it reads from the root of the crate.
-fn from_root(place: &[String], path: &str) -> Vec<String> {
-    let mut full = place.to_vec();
-    for part in path.split("::").filter(|p| !p.is_empty()) {
-        match part {
-            "crate" => full.clear(),
-            "super" => drop(full.pop()),
-            _ => full.push(part.to_owned()),
-        }
-    }
-    full
-}
-
-#[test]
-fn paths_are_read_as_the_compiler_reads_them() {
-    let text = "use super::{\n    a::{B, c},\n    d,\n};\nfn f() { super::super::g::h(crate::i::J) }\n// super::k\n#[cfg(test)]\nmod tests { use super::l; }";
-    let place = module("crates/servotune/src/diagnose/fit/model.rs").1;
-    let mut read: Vec<String> = paths(text).iter().map(|p| from_root(&place, p).join("/")).collect();
-    read.sort();
-    assert_eq!(read, ["diagnose/fit/a/B", "diagnose/fit/a/c", "diagnose/fit/d", "diagnose/g/h", "i/J"]);
-}
-
 #[test]
 fn a_floor_of_the_diagnosis_uses_lower_floors_only() {
     let (mut wrong, mut arrows) = (Vec::new(), 0);
-    each_source(|name, text| {
+    let house = House::ours();
+    each_source(|name, _| {
         let Some((folder, _)) = name.strip_prefix(DIAGNOSE).and_then(|n| n.split_once('/')) else { return };
         let own = FLOORS.iter().position(|f| *f == folder);
         let own = own.unwrap_or_else(|| panic!("{name}: `{folder}` is no floor"));
-        let place = module(name).1;
-        for path in paths(text) {
-            let full = from_root(&place, &path);
-            if full.len() > 1 && full[0] == "diagnose" {
-                arrows += 1;
-                // What `diagnose/mod.rs` hands out comes from any floor.
-                if !FLOORS[..=own].contains(&full[1].as_str()) {
-                    wrong.push(format!("{name}: {path}"));
-                }
+        for path in house.paths(place(name)) {
+            let Some(used) = path.strip_prefix(DIAGNOSE) else { continue };
+            arrows += 1;
+            // What `diagnose/mod.rs` hands out comes from any floor.
+            if !FLOORS[..=own].contains(&used.split('/').next().unwrap()) {
+                wrong.push(format!("{name}: {path}"));
             }
         }
     });
     assert!(arrows > 400, "{arrows} imports seen");
     assert!(wrong.is_empty(), "arrows upward:\n{}", wrong.join("\n"));
-}
-
-#[test]
-fn no_files_import_each_other_in_a_circle() {
-    let mut files: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    each_source(|name, text| {
-        let (folder, place) = module(name);
-        if !["mod.rs", "lib.rs", "main.rs"].contains(&name.rsplit('/').next().unwrap()) {
-            let used = paths(text).iter().map(|p| format!("{folder}{}", from_root(&place, p).join("/"))).collect();
-            files.insert(format!("{folder}{}", place.join("/")), used);
-        }
-    });
-    // A path goes on inside a file: the file is its longest beginning that is one.
-    let known: BTreeSet<String> = files.keys().cloned().collect();
-    let file = |path: &String| {
-        let ends = path.match_indices('/').map(|(at, _)| at).chain([path.len()]);
-        ends.map(|end| &path[..end]).rfind(|p| known.contains(*p)).map(str::to_owned)
-    };
-    for (own, used) in &mut files {
-        *used = used.iter().filter_map(file).filter(|f| f != own).collect();
-    }
-    let arrows: usize = files.values().map(Vec::len).sum();
-    assert!(arrows > 1000, "{arrows} imports seen");
-    // Files that import none of those that are left go; what stays imports in a circle, or a circle.
-    loop {
-        let free: Vec<String> = files
-            .iter()
-            .filter(|(_, used)| !used.iter().any(|u| files.contains_key(u)))
-            .map(|(file, _)| file.clone())
-            .collect();
-        if free.is_empty() {
-            break;
-        }
-        free.iter().for_each(|f| drop(files.remove(f)));
-    }
-    assert!(files.is_empty(), "{}", files.keys().cloned().collect::<Vec<_>>().join("\n"));
 }
 
 #[test]

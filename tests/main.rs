@@ -4,6 +4,7 @@
 #![allow(missing_docs)]
 
 mod architecture;
+mod architecture_imports;
 mod command_line;
 mod diagnose_cases;
 mod diagnose_common;

@@ -8,7 +8,7 @@ use super::prove::WorstCase;
 use super::row::{SlotRow, Verdict};
 use super::share::assigned;
 use super::store_run::json;
-use super::{Context, FleetError, Store};
+use super::{Context, FleetError, Library, Shared, Store, WorkItem};
 use servotune::controller::Controller;
 use servotune::document::{DocumentError, Temporary, below, check_name};
 use servotune::gate::features::csv_field;
@@ -230,26 +230,14 @@ pub fn write_tables(
         files.push(out.join(name));
         Ok(())
     };
-    let mut coverage = "tables,slots_served,share,no_choice_serves_more_than,candidates\n".to_owned();
-    for c in &shared.curve {
-        let share = c.served as f64 / shared.slots.max(1) as f64;
-        let names: Vec<&str> = c.tables.iter().map(|&t| library.tables[t].origin.as_str()).collect();
-        coverage +=
-            &format!("{},{},{share},{},{}\n", c.tables.len(), c.served, c.at_most, csv_field(&names.join("; ")));
-    }
-    text("coverage.csv", &coverage)?;
+    text("coverage.csv", &coverage_csv(&library, &shared))?;
     for &c in &chosen {
         if let (Some(name), Some(candidate)) = (name(c), library.tables.get(c)) {
             text(&format!("shared/{name}.toml"), &super::table_text(&candidate.gains)?.0)?;
         }
     }
     text("shared.json", &(pretty(&shared)? + "\n"))?;
-    let mut work = "slot,gain,dft_now,dft_after,work,why\n".to_owned();
-    for w in super::work_list(store, run)? {
-        let fields = [w.slot, format!("{}", w.gain), number(w.dft_now), number(w.dft_after), w.work, w.why];
-        work += &(fields.map(|f| csv_field(&f)).join(",") + "\n");
-    }
-    text("work_list.csv", &work)?;
+    text("work_list.csv", &work_csv(super::work_list(store, run)?))?;
     let explained: Vec<super::Explained> = store.explanations(run)?.into_iter().map(|(_, e)| e).collect();
     text("untunable.json", &(pretty(&explained)? + "\n"))?;
     if !asked.before.is_empty() {
@@ -273,6 +261,25 @@ pub fn write_tables(
 
 fn pretty(value: &impl serde::Serialize) -> Result<String, FleetError> {
     serde_json::to_string_pretty(value).map_err(|source| FleetError::Json { source })
+}
+
+fn coverage_csv(library: &Library, shared: &Shared) -> String {
+    let mut text = "tables,slots_served,share,no_choice_serves_more_than,candidates\n".to_owned();
+    for c in &shared.curve {
+        let share = c.served as f64 / shared.slots.max(1) as f64;
+        let names: Vec<&str> = c.tables.iter().map(|&t| library.tables[t].origin.as_str()).collect();
+        text += &format!("{},{},{share},{},{}\n", c.tables.len(), c.served, c.at_most, csv_field(&names.join("; ")));
+    }
+    text
+}
+
+fn work_csv(list: Vec<WorkItem>) -> String {
+    let mut text = "slot,gain,dft_now,dft_after,work,why\n".to_owned();
+    for w in list {
+        let fields = [w.slot, format!("{}", w.gain), number(w.dft_now), number(w.dft_after), w.work, w.why];
+        text += &(fields.map(|f| csv_field(&f)).join(",") + "\n");
+    }
+    text
 }
 
 fn drift_csv(all: &[SlotDrift]) -> String {

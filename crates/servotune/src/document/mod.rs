@@ -13,6 +13,6 @@ mod write;
 
 pub use bounded::{Bounded, OverLimit};
 pub use digest::sha256_hex;
-pub use name::{A_NAME, LONGEST_NAME, NameError, below, check_name, printable};
+pub use name::{A_NAME, LONGEST_NAME, NameError, check_name, printable};
 pub use read::{DocumentError, parse_toml, read_table, read_text, read_toml, way_on};
-pub use write::{FileSet, Temporary, check_target, clear_abandoned, write_text, write_whole};
+pub use write::{FileSet, Temporary, below, check_target, clear_abandoned, write_text, write_whole};

@@ -3,8 +3,6 @@
 //! In: a name from outside. Out: nothing, or a [`NameError`] that says what was found and what was expected. One alphabet and one length hold
 //! for every such name, so that no name is a path, a formula of a spreadsheet or a device of any system. Spec: `specs/files.md`, "Names".
 
-use super::DocumentError;
-use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Longest name (characters): two of them and an ending fit into one name of a file on every system.
@@ -90,19 +88,6 @@ pub fn printable(text: &str) -> String {
         return text.to_owned();
     }
     text.chars().map(|c| if hidden(c) { c.escape_unicode().to_string() } else { c.to_string() }).collect()
-}
-
-/// The path of `names` below `folder`. Each is held to the alphabet, and none that is there may be a link: what is written there stays in the folder.
-pub fn below(folder: &Path, names: &[&str]) -> Result<PathBuf, DocumentError> {
-    let mut path = folder.to_path_buf();
-    for name in names {
-        check_name(name).map_err(|source| DocumentError::Name { folder: folder.into(), source })?;
-        path.push(name);
-        if path.symlink_metadata().is_ok_and(|m| m.file_type().is_symlink()) {
-            return Err(DocumentError::Link { file: path });
-        }
-    }
-    Ok(path)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //!
 //! A temporary file is locked while it is written, so that what a dead process left behind can be told from what a living one writes.
 
-use super::DocumentError;
+use super::{DocumentError, check_name};
 use std::fs::File;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -10,6 +10,19 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Files begun by this process: two threads that write one file must not share its temporary name.
 static BEGUN: AtomicUsize = AtomicUsize::new(0);
+
+/// The path of `names` below `folder`. Each is held to the alphabet, and none that is there may be a link: what is written there stays in the folder.
+pub fn below(folder: &Path, names: &[&str]) -> Result<PathBuf, DocumentError> {
+    let mut path = folder.to_path_buf();
+    for name in names {
+        check_name(name).map_err(|source| DocumentError::Name { folder: folder.into(), source })?;
+        path.push(name);
+        if path.symlink_metadata().is_ok_and(|m| m.file_type().is_symlink()) {
+            return Err(DocumentError::Link { file: path });
+        }
+    }
+    Ok(path)
+}
 
 /// A file that is not whole yet, under a hidden name beside its own, gone when it is dropped before [`Temporary::place`].
 #[derive(Debug)]

@@ -4,7 +4,7 @@
 //! Above the last point nothing is claimed. What the search finds is judged over the sweep by [`super::MeasuredLoop`]. Spec: `specs/tuning.md`, "The measured route".
 
 use super::cubic::Cubic;
-use super::{FeedbackError, SampledPlant, hold};
+use super::{FeedbackError, SampledPlant};
 use crate::frf::Frf;
 use crate::lti::{DiscretePlant, FrequencyResponse};
 use nalgebra::Complex;
@@ -151,4 +151,10 @@ impl FrequencyResponse for ResponseCurve {
         let ys = std::array::from_fn(|k| self.ln_p[first + k]);
         Cubic::through(xs, ys).at(x).0.exp()
     }
+}
+
+/// The zero-order hold's response, (1 - e^{-jx})/(jx) with x = w T.
+pub fn hold(x: f64) -> Complex<f64> {
+    let half = 0.5 * x;
+    Complex::from_polar(half.sin() / half, -half)
 }

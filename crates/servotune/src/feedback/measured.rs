@@ -159,12 +159,6 @@ impl<'a> MeasuredLoop<'a> {
     }
 }
 
-/// The zero-order hold's response, (1 - e^{-jx})/(jx) with x = w T.
-pub fn hold(x: f64) -> Complex<f64> {
-    let half = 0.5 * x;
-    Complex::from_polar(half.sin() / half, -half)
-}
-
 /// The angle moved by whole turns into -270 to +90 deg.
 pub fn from_rest(angle: f64) -> f64 {
     let a = angle - TAU * ((angle + 1.5 * PI) / TAU).floor();

@@ -71,26 +71,8 @@ pub(super) fn columns(
     let options = said(file, line, words)?;
     let rows = rows(file, text)?;
     let width = rows.first().map_or(0, |(_, row)| row.len());
-    let ports = match (ports(file), width) {
-        (Some(1) | None, 3) => 1,
-        (Some(2) | None, 9) => 2,
-        _ => {
-            let (line, found) = rows.first().map_or((line, 0), |(line, _)| (*line, width));
-            let found = format!("{found} numbers");
-            let expected = "3 numbers a row for one port, 9 for two";
-            return Err(FrfError::Touchstone { file: file.to_owned(), line, found, expected });
-        }
-    };
-    // Two ports are written S11, S21, S12, S22.
-    let names: &[&str] = if ports == 1 { &["S11"] } else { &["S11", "S21", "S12", "S22"] };
-    let listed = || names.iter().enumerate().map(|(i, n)| format!("{}: {n}", i + 1)).collect::<Vec<_>>();
-    let choice = |wanted| FrfError::ResponseChoice { file: file.to_owned(), wanted, responses: listed() };
-    let at = match settings.dataset {
-        Some(n) => n.checked_sub(1).filter(|i| *i < names.len()).ok_or_else(|| choice(Some(n)))?,
-        None if ports == 1 => 0,
-        None => return Err(choice(None)),
-    };
-    notes.push(Note::Dataset { number: at + 1, of: names.len(), title: names[at].to_owned() });
+    let ports = ports_of_rows(file, &rows, line, width)?;
+    let at = chosen(file, ports, settings, notes)?;
     let unit =
         Meaning { name: format!("# {}", options.words), role: Role::Frequency, unit: Some(Unit::Hertz), margin: false };
     let mut out = Columns {
@@ -144,6 +126,35 @@ pub(super) fn columns(
         return Err(FrfError::NoRows { file: file.to_owned(), lines: text.lines().count() as u64 });
     }
     Ok(out)
+}
+
+/// Ports by the name and the width of the rows; `line` is the one that is shown where there are none.
+fn ports_of_rows(file: &str, rows: &[(u64, Vec<f64>)], line: u64, width: usize) -> Result<usize, FrfError> {
+    match (ports(file), width) {
+        (Some(1) | None, 3) => Ok(1),
+        (Some(2) | None, 9) => Ok(2),
+        _ => {
+            let (line, found) = rows.first().map_or((line, 0), |(line, _)| (*line, width));
+            let found = format!("{found} numbers");
+            let expected = "3 numbers a row for one port, 9 for two";
+            Err(FrfError::Touchstone { file: file.to_owned(), line, found, expected })
+        }
+    }
+}
+
+/// Which parameter is read, from 0.
+fn chosen(file: &str, ports: usize, settings: &ReadSettings, notes: &mut Vec<Note>) -> Result<usize, FrfError> {
+    // Two ports are written S11, S21, S12, S22.
+    let names: &[&str] = if ports == 1 { &["S11"] } else { &["S11", "S21", "S12", "S22"] };
+    let listed = || names.iter().enumerate().map(|(i, n)| format!("{}: {n}", i + 1)).collect::<Vec<_>>();
+    let choice = |wanted| FrfError::ResponseChoice { file: file.to_owned(), wanted, responses: listed() };
+    let at = match settings.dataset {
+        Some(n) => n.checked_sub(1).filter(|i| *i < names.len()).ok_or_else(|| choice(Some(n)))?,
+        None if ports == 1 => 0,
+        None => return Err(choice(None)),
+    };
+    notes.push(Note::Dataset { number: at + 1, of: names.len(), title: names[at].to_owned() });
+    Ok(at)
 }
 
 /// The option line: what is not said is GHz, S, MA, 50 ohm by the format.

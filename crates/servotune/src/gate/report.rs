@@ -255,6 +255,23 @@ pub fn decisions(truth: &[usize], said: &[(usize, Action)], classes: &Classes, c
     d
 }
 
+impl ConformalReport {
+    fn of(gate: &Gate, judged: &[super::judge::Judged], truth: &[usize]) -> ConformalReport {
+        let n = truth.len().max(1) as f64;
+        let share = |count: usize| count as f64 / n;
+        ConformalReport {
+            coverage: gate.conformal.coverage,
+            test_coverage: share(judged.iter().zip(truth).filter(|(j, t)| j.set.contains(t)).count()),
+            test_coverage_bare: share(
+                judged.iter().zip(truth).filter(|(j, t)| j.set.contains(t) && (j.class != **t || j.conforms)).count(),
+            ),
+            test_set_size: judged.iter().map(|j| j.set.len()).sum::<usize>() as f64 / n,
+            own_reference: gate.conformal.own_reference.clone(),
+            enough: gate.conformal.enough,
+        }
+    }
+}
+
 impl TrainReport {
     pub(super) fn of(
         job: &Job<'_>,
@@ -309,20 +326,7 @@ impl TrainReport {
                 test_error_before: calibration_error(&before, &truth),
                 test_error_after: calibration_error(&after, &truth),
             },
-            conformal: ConformalReport {
-                coverage: gate.conformal.coverage,
-                test_coverage: share(judged.iter().zip(&truth).filter(|(j, t)| j.set.contains(t)).count()),
-                test_coverage_bare: share(
-                    judged
-                        .iter()
-                        .zip(&truth)
-                        .filter(|(j, t)| j.set.contains(t) && (j.class != **t || j.conforms))
-                        .count(),
-                ),
-                test_set_size: judged.iter().map(|j| j.set.len()).sum::<usize>() as f64 / n,
-                own_reference: gate.conformal.own_reference.clone(),
-                enough: gate.conformal.enough,
-            },
+            conformal: ConformalReport::of(gate, &judged, &truth),
             novelty: NoveltyReport {
                 level: gate.novelty.level,
                 features: gate.novelty.features.len(),

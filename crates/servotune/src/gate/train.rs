@@ -19,7 +19,7 @@ use super::member::{Ensemble, Member};
 use super::network::Workspace;
 use super::novelty::{MOST_FEATURES, MOST_LOOKED_AT, Novelty};
 use super::parallel::each;
-use super::prepare::{PATIENCE, prepare, reach};
+use super::prepare::{PATIENCE, Prepared, prepare, reach};
 use super::report::{Baseline, Candidate, Parts, Published, TrainReport};
 use super::settings::TrainSettings;
 use super::split::{folds, split};
@@ -94,6 +94,31 @@ pub fn train(table: &Table, settings: &TrainSettings) -> Result<Trained, GateErr
     let (mix, calibration) = Ensemble::of(&said, &of_held);
     let held_p: Vec<Vec<f64>> = said.iter().map(|s| mix.probabilities(s)).collect();
 
+    let (watched, roots) = watched(table, &p);
+    let gate = Gate {
+        program: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: settings.seed,
+        table_sha256: table.sha256().to_owned(),
+        label: settings.label.clone(),
+        conformal: Conformal::of(&held_p, &of_held, &fold_of_held, k, settings.coverage),
+        novelty: Novelty::of(&watched, roots, &taught, &known.class, k, &deal, settings.novelty_level),
+        evidence: Evidence::of(&p.evidence, &taught, &known.class, k, &deal),
+        drift: drift(&watched[..roots], &p, &taught),
+        main,
+        members,
+        mix,
+        classes,
+        calibration,
+        costs,
+    };
+    let lda = Baseline::of(&job, &p)?;
+    let parts = Parts { published, candidates, folds: fold_list, lda, held: &held, held_p: &held_p };
+    let report = TrainReport::of(&job, &p, &fitted, job.confusions(&p, &fitted), &gate, parts)?;
+    Ok(Trained { gate, report })
+}
+
+/// The columns whose distribution the gate watches, and how many of them it watches in combination.
+fn watched<'a>(table: &'a Table, p: &Prepared<'a>) -> (Vec<&'a Column>, usize) {
     // Chosen features are always looked at, then the plant's, then the rest by importance: the most in combination, others one by one.
     let rest = p.kept.iter().skip(p.chosen.len());
     let mut watched: Vec<&Column> = p.chosen.iter().chain(&p.evidence).chain(rest).copied().collect();
@@ -107,29 +132,13 @@ pub fn train(table: &Table, settings: &TrainSettings) -> Result<Trained, GateErr
         watched.extend(table.columns().iter().find(|c| c.name == r.feature));
     }
     watched.truncate(MOST_LOOKED_AT.max(p.chosen.len()));
-    // The plant's columns may be absent in another table, and a single value has no distribution.
-    let moved: Vec<&Column> =
-        watched.iter().take(roots).copied().filter(|c| !p.evidence.iter().any(|e| e.name == c.name)).collect();
-    let gate = Gate {
-        program: env!("CARGO_PKG_VERSION").to_owned(),
-        seed: settings.seed,
-        table_sha256: table.sha256().to_owned(),
-        label: settings.label.clone(),
-        conformal: Conformal::of(&held_p, &of_held, &fold_of_held, k, settings.coverage),
-        novelty: Novelty::of(&watched, roots, &taught, &known.class, k, &deal, settings.novelty_level),
-        evidence: Evidence::of(&p.evidence, &taught, &known.class, k, &deal),
-        drift: moved.iter().map(|c| DriftReference::of(c, &taught)).collect(),
-        main,
-        members,
-        mix,
-        classes,
-        calibration,
-        costs,
-    };
-    let lda = Baseline::of(&job, &p)?;
-    let parts = Parts { published, candidates, folds: fold_list, lda, held: &held, held_p: &held_p };
-    let report = TrainReport::of(&job, &p, &fitted, job.confusions(&p, &fitted), &gate, parts)?;
-    Ok(Trained { gate, report })
+    (watched, roots)
+}
+
+/// What drift is measured against. The plant's columns may be absent in another table, and a single value has no distribution.
+fn drift(watched: &[&Column], p: &Prepared<'_>, taught: &[usize]) -> Vec<DriftReference> {
+    let moved = watched.iter().filter(|c| !p.evidence.iter().any(|e| e.name == c.name));
+    moved.map(|c| DriftReference::of(c, taught)).collect()
 }
 
 /// The published network, what was tried, and the hidden layers that won.

@@ -35,42 +35,13 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
     let long = gathered(frf);
     let sweep = Sweep::new(long.as_ref().map_or(frf, |g| &g.frf), settings)?;
     let n = sweep.len();
-    let (low, high) = (sweep.w[0], sweep.w[n - 1]);
-    let ranges = Ranges {
-        // A pair just outside the sweep still bends the response inside it.
-        mode: ((0.7 * low).ln(), (1.3 * high).ln()),
-        body: ((1e-2 * low).ln(), (1.3 * high).ln()),
-        delay: settings.delay_limit_s,
-        zero_damping: match settings.zeros {
-            ZeroSide::Either => -2.0,
-            ZeroSide::Left => 1e-5,
-        },
-    };
+    let ranges = ranges(&sweep, settings);
     let steps = ladder::build(&sweep, settings);
     let mut memory = Workspace::default();
-    let mut starts = body_start::find(&sweep, settings, steps.as_ref(), ranges, &mut memory).into_iter();
-    let weight: Vec<f64> = match &sweep.relative_std {
-        // While modes are missing, their absence is the larger error: the deviations are levelled by their median.
-        Some(s) => {
-            let middle = median(s).unwrap_or(0.0);
-            s.iter().map(|s| std::f64::consts::SQRT_2 / s.hypot(middle)).collect()
-        }
-        None => vec![1.0; n],
-    };
+    let starts = body_start::find(&sweep, settings, steps.as_ref(), ranges, &mut memory);
     let work = Work { linear_fits: steps.as_ref().map_or(0, |l| l.fits), ..Work::default() };
-    let mut joint = Joint { sweep: &sweep, target: vec![], weight, ranges, memory, work };
-    let mut best = Climb::from(&mut joint, starts.next().unwrap_or_else(|| flat(&sweep)), settings);
-    for start in starts.take(STARTS - 1) {
-        // A later start is tried only where the best one has left more than noise.
-        if !best.left {
-            break;
-        }
-        let other = Climb::from(&mut joint, start, settings);
-        if other.cost() < best.cost() {
-            best = other;
-        }
-    }
-    let Climb { start, stages, last, .. } = best;
+    let mut joint = Joint { sweep: &sweep, target: vec![], weight: levelled(&sweep), ranges, memory, work };
+    let Climb { start, stages, last, .. } = Climb::best(&mut joint, starts, settings);
     joint.target = sweep.value.iter().map(|v| v * start.sign).collect();
     let (chosen, held_out) = choose(&stages, last, joint.weight[0]);
     let Stage { mut shape, mut x, .. } = stages[chosen].clone();
@@ -135,6 +106,33 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
     })
 }
 
+/// Where the numbers of a fit may lie.
+fn ranges(sweep: &Sweep, settings: &IdentifySettings) -> Ranges {
+    let (low, high) = (sweep.w[0], sweep.w[sweep.len() - 1]);
+    Ranges {
+        // A pair just outside the sweep still bends the response inside it.
+        mode: ((0.7 * low).ln(), (1.3 * high).ln()),
+        body: ((1e-2 * low).ln(), (1.3 * high).ln()),
+        delay: settings.delay_limit_s,
+        zero_damping: match settings.zeros {
+            ZeroSide::Either => -2.0,
+            ZeroSide::Left => 1e-5,
+        },
+    }
+}
+
+/// Weight of each point while modes are missing.
+fn levelled(sweep: &Sweep) -> Vec<f64> {
+    match &sweep.relative_std {
+        // While modes are missing, their absence is the larger error: the deviations are levelled by their median.
+        Some(s) => {
+            let middle = median(s).unwrap_or(0.0);
+            s.iter().map(|s| std::f64::consts::SQRT_2 / s.hypot(middle)).collect()
+        }
+        None => vec![1.0; sweep.len()],
+    }
+}
+
 /// One start with all that grew from it.
 struct Climb {
     start: Start,
@@ -146,6 +144,24 @@ struct Climb {
 }
 
 impl Climb {
+    /// The start from which the fit leaves least.
+    fn best(joint: &mut Joint, starts: Vec<Start>, settings: &IdentifySettings) -> Climb {
+        let mut starts = starts.into_iter();
+        let first = starts.next().unwrap_or_else(|| flat(joint.sweep));
+        let mut best = Climb::from(joint, first, settings);
+        for start in starts.take(STARTS - 1) {
+            // A later start is tried only where the best one has left more than noise.
+            if !best.left {
+                break;
+            }
+            let other = Climb::from(joint, start, settings);
+            if other.cost() < best.cost() {
+                best = other;
+            }
+        }
+        best
+    }
+
     fn from(joint: &mut Joint, mut start: Start, settings: &IdentifySettings) -> Climb {
         body_start::polish(joint.sweep, &mut start, joint.ranges, &mut joint.memory);
         joint.target = joint.sweep.value.iter().map(|v| v * start.sign).collect();

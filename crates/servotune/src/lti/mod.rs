@@ -5,6 +5,7 @@
 
 mod curve_entry;
 mod discrete;
+mod error;
 mod lanes;
 mod many;
 mod modal;
@@ -27,11 +28,12 @@ mod term_answers;
 
 pub use curve_entry::{CurveEntry, CurveKnot};
 pub use discrete::{DiscretePlant, Intersample, RealForm};
+pub use error::LtiError;
 pub use lanes::{CHUNK, LaneChunk, PlantLanes};
 pub(crate) use many::chain_at_each;
 pub use modal::{ModalForm, ModalTerm};
 pub use physics_entry::PhysicsEntry;
-pub use plant::{Body, LtiError, Mode, Plant};
+pub use plant::{Body, Mode, Plant};
 pub use plant_file::PlantFile;
 pub use plant_import::imported_plant;
 pub use rational::Rational;

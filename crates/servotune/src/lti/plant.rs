@@ -3,10 +3,9 @@
 //! P(s) = resonance_gain exp(-delay s) body(s) Π (s² + 2 ζz ωz s + ωz²)/(s² + 2 ζp ωp s + ωp²), eqs. (21), (29), (30).
 
 use super::PhysicsEntry;
-use super::{FrequencyResponse, Rational};
+use super::{FrequencyResponse, LtiError, Rational};
 use crate::document::size_limits::{DAMPING, PLANT_MODES, PLANT_RAD_S, VALUE};
 use nalgebra::Complex;
-use thiserror::Error;
 
 /// The low-frequency part of the plant, or all of its rational part.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,37 +80,6 @@ pub struct Plant {
     pub modes: Vec<Mode>,
     /// Effects beyond linear. The linear functions of this room leave them out; a caller that cannot use them refuses.
     pub physics: Vec<PhysicsEntry>,
-}
-
-/// Why numbers do not make a model.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[allow(missing_docs, reason = "each field is named in the message")]
-pub enum LtiError {
-    /// A number is out of its range.
-    #[error("{key} = {found}: expected {expected}")]
-    Range { key: String, found: f64, expected: &'static str },
-    /// More delay than any machine of this kind has.
-    #[error("delay of {delay_s} s is {samples:.0} samples of {sample_time_s} s: expected at most {limit} samples")]
-    Delay { delay_s: f64, sample_time_s: f64, samples: f64, limit: usize },
-    /// Four or more poles in one place, whose partial fractions f64 cannot carry.
-    #[error("{count} poles coincide near {pole_rad_s} rad/s: merge modes that repeat one another")]
-    Coincident { pole_rad_s: f64, count: usize },
-    /// Keys that do not go together, or none that make a plant.
-    #[error("[plant]: found {found}; expected {expected}")]
-    Keys { found: String, expected: &'static str },
-    /// A complex root without its conjugate: the response to a real command would not be real.
-    #[error(
-        "{key}: the root {re} {im:+}j has no conjugate beside it; list both, or only those with positive imaginary parts"
-    )]
-    Conjugate { key: String, re: f64, im: f64 },
-    /// More zeros than a plant can have.
-    #[error("plant: {zeros} zeros and {poles} poles; expected fewer zeros than poles, and at most {limit} poles")]
-    Proper { zeros: usize, poles: usize, limit: usize },
-    /// A change of form lost digits.
-    #[error(
-        "{what}: the response found is off by {found:.1e} of itself at {at_rad_s:.4} rad/s; expected at most {limit:.0e}: {advice}"
-    )]
-    Digits { what: &'static str, found: f64, at_rad_s: f64, limit: f64, advice: &'static str },
 }
 
 /// The two roots of s² + 2 ζ ω s + ω², the one with the positive imaginary part first.
@@ -242,7 +210,7 @@ impl Plant {
     pub fn paired(&self) -> Plant {
         let mut plant = self.clone();
         if let Body::Rational(r) = &self.body {
-            let (body, modes) = r.paired();
+            let (body, modes) = pairs_taken_out(r);
             plant.body = body;
             plant.modes.extend(modes);
         }
@@ -293,6 +261,49 @@ impl Plant {
         }
         Ok(())
     }
+}
+
+/// What is left as a body, and the resonance pairs taken out of it, see [`Plant::paired`].
+fn pairs_taken_out(of: &Rational) -> (Body, Vec<Mode>) {
+    let (mut zeros, mut poles) = (of.zeros.clone(), of.poles.clone());
+    let mut modes = Vec::new();
+    loop {
+        let upper =
+            |all: &[Complex<f64>]| -> Vec<Complex<f64>> { all.iter().copied().filter(|r| r.im > 0.0).collect() };
+        let damped: Vec<Complex<f64>> = upper(&poles).into_iter().filter(|p| p.re < 0.0).collect();
+        let all = upper(&zeros).into_iter().flat_map(|z| damped.iter().map(move |&p| (z, p)));
+        let apart = |(z, p): &(Complex<f64>, Complex<f64>)| (z.norm() / p.norm()).ln().abs();
+        let Some((z, p)) = all.min_by(|a, b| apart(a).total_cmp(&apart(b))) else { break };
+        for (list, root) in [(&mut zeros, z), (&mut poles, p)] {
+            for one in [root, root.conj()] {
+                if let Some(at) = list.iter().position(|r| *r == one) {
+                    list.swap_remove(at);
+                }
+            }
+        }
+        modes.push(Mode {
+            zero_rad_s: z.norm(),
+            zero_damping_ratio: -z.re / z.norm(),
+            pole_rad_s: p.norm(),
+            pole_damping_ratio: -p.re / p.norm(),
+        });
+    }
+    modes.sort_by(|a, b| a.pole_rad_s.total_cmp(&b.pole_rad_s));
+    let gain = of.gain;
+    let body = match poles[..] {
+        [p, q] if zeros.is_empty() && p.re <= 0.0 && q.re <= 0.0 => {
+            let squared = (p * q).re;
+            if squared > 0.0 {
+                let w = squared.sqrt();
+                let damping_ratio = -0.5 * (p.re + q.re) / w;
+                Body::SecondOrder { dc_gain: gain / squared, natural_frequency_rad_s: w, damping_ratio }
+            } else {
+                Body::FreeInertia { acceleration_gain: gain, viscous_rate_per_s: (p.re + q.re).abs() }
+            }
+        }
+        _ => Body::Rational(Rational { gain, zeros, poles }),
+    };
+    (body, modes)
 }
 
 impl FrequencyResponse for Plant {

@@ -3,7 +3,7 @@
 //! In: gain and complete lists of roots (rad/s). Out: its response, its counts, and its resonance pairs. Convention: real roots
 //! have imaginary part 0, complex ones stand beside their exact conjugates. Spec: `specs/files.md`, "plant.toml".
 
-use super::{Body, LtiError, Mode};
+use super::LtiError;
 use nalgebra::Complex;
 
 /// Poles and zeros with a gain.
@@ -101,49 +101,6 @@ impl Rational {
             None => Ok(()),
         }
     }
-
-    /// What is left as a body, and the resonance pairs taken out of it, see [`super::Plant::paired`].
-    pub(super) fn paired(&self) -> (Body, Vec<Mode>) {
-        let (mut zeros, mut poles) = (self.zeros.clone(), self.poles.clone());
-        let mut modes = Vec::new();
-        loop {
-            let upper =
-                |all: &[Complex<f64>]| -> Vec<Complex<f64>> { all.iter().copied().filter(|r| r.im > 0.0).collect() };
-            let damped: Vec<Complex<f64>> = upper(&poles).into_iter().filter(|p| p.re < 0.0).collect();
-            let all = upper(&zeros).into_iter().flat_map(|z| damped.iter().map(move |&p| (z, p)));
-            let apart = |(z, p): &(Complex<f64>, Complex<f64>)| (z.norm() / p.norm()).ln().abs();
-            let Some((z, p)) = all.min_by(|a, b| apart(a).total_cmp(&apart(b))) else { break };
-            for (list, root) in [(&mut zeros, z), (&mut poles, p)] {
-                for one in [root, root.conj()] {
-                    if let Some(at) = list.iter().position(|r| *r == one) {
-                        list.swap_remove(at);
-                    }
-                }
-            }
-            modes.push(Mode {
-                zero_rad_s: z.norm(),
-                zero_damping_ratio: -z.re / z.norm(),
-                pole_rad_s: p.norm(),
-                pole_damping_ratio: -p.re / p.norm(),
-            });
-        }
-        modes.sort_by(|a, b| a.pole_rad_s.total_cmp(&b.pole_rad_s));
-        let gain = self.gain;
-        let body = match poles[..] {
-            [p, q] if zeros.is_empty() && p.re <= 0.0 && q.re <= 0.0 => {
-                let squared = (p * q).re;
-                if squared > 0.0 {
-                    let w = squared.sqrt();
-                    let damping_ratio = -0.5 * (p.re + q.re) / w;
-                    Body::SecondOrder { dc_gain: gain / squared, natural_frequency_rad_s: w, damping_ratio }
-                } else {
-                    Body::FreeInertia { acceleration_gain: gain, viscous_rate_per_s: (p.re + q.re).abs() }
-                }
-            }
-            _ => Body::Rational(Rational { gain, zeros, poles }),
-        };
-        (body, modes)
-    }
 }
 
 /// Roots this close to the real axis, as a share of their size, are a double real root that rounding has split: moving them onto the axis
@@ -194,7 +151,7 @@ pub(super) fn worst_on_grid(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::lti::{FrequencyResponse, ModalForm, Plant};
+    use crate::lti::{Body, FrequencyResponse, ModalForm, Plant};
 
     fn c(re: f64, im: f64) -> Complex<f64> {
         Complex::new(re, im)

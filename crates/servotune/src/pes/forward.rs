@@ -34,6 +34,30 @@ impl Loop {
         }
     }
 
+    /// Reading `next` of each record, from the states of its plant and what acts on it now and acted before.
+    #[inline(always)]
+    fn read<const R: usize>(
+        &self,
+        next: usize,
+        chunks: usize,
+        states: &[States<R>],
+        [now, before]: [[f64; R]; 2],
+        tracks: &mut [&mut Track; R],
+    ) {
+        let reading = &self.readings[next];
+        let weights = &self.weights[next * chunks..(next + 1) * chunks];
+        let mut sum = [[0.0; CHUNK]; R];
+        for (s, [wr, wi]) in states.iter().zip(weights) {
+            for r in 0..R {
+                sum[r] = fused(*wr, s[0][r], fused(*wi, s[1][r], sum[r]));
+            }
+        }
+        for r in 0..R {
+            let driven = reading.gains[0].mul_add(now[r], reading.gains[1] * before[r]);
+            tracks[r].readings[next] = reading.target - (across(&sum[r]) + driven);
+        }
+    }
+
     #[inline(always)]
     fn ahead<const R: usize, C: AsRef<[LaneChunk]> + ?Sized, S: AsMut<[States<R>]> + ?Sized>(
         &self,
@@ -45,15 +69,10 @@ impl Loop {
         states: &mut S,
     ) {
         let (chunks, states) = (chunks.as_ref(), states.as_mut());
-        let (first, end, sections) = (drive.first.min(run.end), run.end, run.chain.len());
+        let (first, end) = (drive.first.min(run.end), run.end);
         let lag = self.plant.whole + 1;
         let limit = run.limit;
-        b.law.clear();
-        b.law.extend(run.chain.iter().map(|s| [s.b0, s.b1, s.b2, -s.a1, -s.a2]));
-        b.memory.clear();
-        b.memory.resize(sections, [[0.0; R]; 2]);
-        b.acting.clear();
-        b.acting.resize(end + lag, [0.0; R]);
+        b.begin(run, end + lag);
         for t in &mut tracks {
             t.prepare(first, run, self.readings.len());
         }
@@ -101,24 +120,10 @@ impl Loop {
             for r in 0..R {
                 tracks[r].command[k] = command[r];
             }
-            if due == k {
-                let now = acting[k + 1];
-                while due == k {
-                    let reading = &self.readings[next];
-                    let weights = &self.weights[next * chunks.len()..(next + 1) * chunks.len()];
-                    let mut sum = [[0.0; CHUNK]; R];
-                    for (s, [wr, wi]) in states.iter().zip(weights) {
-                        for r in 0..R {
-                            sum[r] = fused(*wr, s[0][r], fused(*wi, s[1][r], sum[r]));
-                        }
-                    }
-                    for r in 0..R {
-                        let driven = reading.gains[0].mul_add(now[r], reading.gains[1] * before[r]);
-                        tracks[r].readings[next] = reading.target - (across(&sum[r]) + driven);
-                    }
-                    next += 1;
-                    due = due_at(next);
-                }
+            while due == k {
+                self.read(next, chunks.len(), states, [acting[k + 1], before], &mut tracks);
+                next += 1;
+                due = due_at(next);
             }
             let mut sum = [[0.0; CHUNK]; R];
             for (s, chunk) in states.iter_mut().zip(chunks) {

@@ -72,6 +72,18 @@ pub(super) struct Buffers<const R: usize> {
     pub rows: Vec<f64>,
 }
 
+impl<const R: usize> Buffers<R> {
+    /// Ready for a run of `acting` samples that act on the plant.
+    pub fn begin(&mut self, run: &Run<'_>, acting: usize) {
+        self.law.clear();
+        self.law.extend(run.chain.iter().map(|s| [s.b0, s.b1, s.b2, -s.a1, -s.a2]));
+        self.memory.clear();
+        self.memory.resize(run.chain.len(), [[0.0; R]; 2]);
+        self.acting.clear();
+        self.acting.resize(acting, [0.0; R]);
+    }
+}
+
 /// How one run goes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Run<'a> {

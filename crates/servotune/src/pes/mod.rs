@@ -19,6 +19,7 @@ mod quick;
 mod reference;
 mod simulation;
 mod spectral;
+mod spectral_adjoint;
 mod spectral_parts;
 mod spectral_slopes;
 mod step;

@@ -4,9 +4,9 @@
 //! Between its lines nothing is left out; what is neglected: images above half the sample rate, the output limit, and the rest
 //! of one move that the next one still sees. Noise enters as expected power. Spec: `specs/tuning.md`, "The measured route".
 
-use super::spectral_slopes::Adjoint;
+use super::spectral_adjoint::Adjoint;
 use super::window_frame::{FrameKey, LANES, WindowFrame, frame, kernel};
-use super::{PesError, Profile, Reference, WindowDft};
+use super::{Noise, PesError, Profile, Reference, WindowDft};
 use crate::controller::{Controller, Feedforward};
 use crate::feedback::{LoopOnGrid, ResponseCurve, SampledPlant};
 use crate::lti::{FrequencyResponse, Section};
@@ -134,13 +134,8 @@ impl SpectralPes {
             spacing_hz,
         });
         let noise = &profile.noise;
-        let keep = (-TAU * noise.windage_corner_hz * t).exp();
-        let coloured = |w: f64| {
-            let back = Complex::new(1.0, 0.0) - keep * Complex::from_polar(1.0, -w * t);
-            noise.windage_rms.powi(2) * t * (1.0 - keep * keep) / back.norm_sqr()
-        };
         let runout = runout(profile, &dft, from_s, n);
-        let windage: Vec<f64> = w.iter().map(|w| coloured(*w)).collect();
+        let windage = windage(noise, t, &w);
         let padded = |x: &mut dyn Iterator<Item = f64>| -> Vec<f64> {
             x.chain(std::iter::repeat(0.0)).take(frame.width()).collect()
         };
@@ -357,6 +352,16 @@ fn line(profile: &Profile, end_s: f64, w: f64, period: f64) -> Complex<f64> {
     let sum: Complex<f64> = steps.iter().map(|(at, size)| size * Complex::from_polar(1.0, -w * (s.start_s + at))).sum();
     // Each step of acceleration contributes 1/(jw)³; the way back, half a period later and negative, doubles odd lines.
     2.0 * acceleration * sum / Complex::new(0.0, -w * w * w) / period
+}
+
+/// Density of the windage at the plant's input on every line.
+fn windage(noise: &Noise, t: f64, w: &[f64]) -> Vec<f64> {
+    let keep = (-TAU * noise.windage_corner_hz * t).exp();
+    let coloured = |w: f64| {
+        let back = Complex::new(1.0, 0.0) - keep * Complex::from_polar(1.0, -w * t);
+        noise.windage_rms.powi(2) * t * (1.0 - keep * keep) / back.norm_sqr()
+    };
+    w.iter().map(|w| coloured(*w)).collect()
 }
 
 /// The run-out's part of every bin.

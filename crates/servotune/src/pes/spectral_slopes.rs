@@ -4,25 +4,12 @@
 //! in each parameter, exact. With dS = -S T d ln C a line z = S E moves by -z T d ln C and the noise on it by 2 Re(|S|² e |L|² d ln C - T n d ln C),
 //! e the encoder's density and n all noise; so every slope is a sum of Re(W d ln C) over lines, and W does not depend on the parameter.
 
+use super::spectral_adjoint::Adjoint;
 use super::window_frame::LANES;
 use super::{SpectralPes, SpectralWork};
 use crate::feedback::SectionGradients;
 use crate::numeric::wide::wide;
 use nalgebra::Complex;
-
-/// Buffers of a backward pass; arrays over lines.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Adjoint {
-    /// Slope of the figure in the folded line and in the folded density.
-    g_re: Vec<f64>,
-    g_im: Vec<f64>,
-    density: Vec<f64>,
-    /// W.
-    w_re: Vec<f64>,
-    w_im: Vec<f64>,
-    /// Of the bins with a share in the figure: index, and the slopes in Re X, Im X and the power.
-    bins: Vec<(usize, [f64; 3])>,
-}
 
 impl SpectralPes {
     /// Slopes of a figure into `out`, one for each pull; `shares` gives, for bins by index, the figure's slope in the bin's power |X_k|²/N².

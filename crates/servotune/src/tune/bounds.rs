@@ -3,8 +3,8 @@
 //! In: `search.bounds`, a plant's |P| over frequency, the range in which the loop is to cross over. Out: a range for every number.
 //! A gain that puts |L| = 1 at f alone is 1/|P(f)| (proportional), 2 pi f/|P| (integral) or 1/(2 pi f |P|) (derivative).
 
+use super::SpecError;
 use super::spec_error::interval;
-use super::{Spec, SpecError};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -41,9 +41,6 @@ pub struct Ranges {
     pub crossover_hz: [f64; 2],
 }
 
-/// Crossovers where nothing is said, as shares of the sample rate: a loop slower than a thousandth wastes its controller, one faster than a
-/// tenth has no phase left.
-const CROSSOVER: [f64; 2] = [1e-3, 0.1];
 /// Room below and above the gains that cross over in the range alone.
 const BELOW: f64 = 1e-2;
 const ABOVE: f64 = 10.0;
@@ -89,17 +86,6 @@ impl Bounds {
             notch_hz: self.notch_hz.unwrap_or([(0.7 * low).min(0.2 * rate), HIGHEST * rate]),
             crossover_hz,
         }
-    }
-}
-
-/// Where a loop under this spec is to cross over (Hz): as it says, around its bandwidth, or as the sample rate allows.
-pub(super) fn crossover_hz(spec: &Spec, sample_time_s: f64) -> [f64; 2] {
-    let [slow, fast] = CROSSOVER.map(|share| share / sample_time_s);
-    match (spec.margins.gain_crossover_hz, spec.margins.bandwidth_hz) {
-        (Some(range), _) => range,
-        // A loop crosses over somewhat below its bandwidth.
-        (None, Some(b)) => [0.25 * b, (2.0 * b).max(fast)],
-        (None, None) => [slow, fast],
     }
 }
 

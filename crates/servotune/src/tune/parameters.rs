@@ -139,30 +139,7 @@ impl Parameters {
         let structure = &spec.structure;
         let kind = structure.controller;
         let mut p = Parameters { base, kind, free: Vec::new(), bounds: Vec::new(), ranges: r };
-        match kind {
-            Kind::Pid => {
-                p.add(Parameter::Kp, r.kp);
-                p.add(Parameter::Ki, r.ki_per_s);
-                p.add(Parameter::Kd, r.kd_s);
-            }
-            Kind::Pi => {
-                p.base.pid.kd_s = 0.0;
-                p.add(Parameter::Kp, r.kp);
-                p.add(Parameter::Ki, r.ki_per_s);
-            }
-            Kind::PPi => {
-                p.base.pid.derivative_filter_s = 0.0;
-                let [low, high] = r.crossover_hz;
-                p.add(Parameter::PositionGain, [0.02 * TAU * low, TAU * high]);
-                p.add(Parameter::VelocityGain, r.kd_s);
-                p.add(Parameter::VelocityIntegral, [1e-3 * r.kp[0], r.kp[1]]);
-            }
-            Kind::Lead => {
-                p.base.pid.ki_per_s = 0.0;
-                p.add(Parameter::Kp, r.kp);
-                p.add(Parameter::Kd, r.kd_s);
-            }
-        }
+        p.add_gains();
         let filter = match (structure.derivative_filter_s, kind) {
             (_, Kind::Pi | Kind::PPi) => None,
             (None, Kind::Lead) if start.is_none() => Some(LEAD_FILTER.map(|share| share * t)),
@@ -191,6 +168,35 @@ impl Parameters {
             p.add(Parameter::NotchPoleDamping { filter }, PEAK_POLE_DAMPING);
         }
         p
+    }
+
+    /// The gains that a controller of this kind has free.
+    fn add_gains(&mut self) {
+        let r = self.ranges;
+        match self.kind {
+            Kind::Pid => {
+                self.add(Parameter::Kp, r.kp);
+                self.add(Parameter::Ki, r.ki_per_s);
+                self.add(Parameter::Kd, r.kd_s);
+            }
+            Kind::Pi => {
+                self.base.pid.kd_s = 0.0;
+                self.add(Parameter::Kp, r.kp);
+                self.add(Parameter::Ki, r.ki_per_s);
+            }
+            Kind::PPi => {
+                self.base.pid.derivative_filter_s = 0.0;
+                let [low, high] = r.crossover_hz;
+                self.add(Parameter::PositionGain, [0.02 * TAU * low, TAU * high]);
+                self.add(Parameter::VelocityGain, r.kd_s);
+                self.add(Parameter::VelocityIntegral, [1e-3 * r.kp[0], r.kp[1]]);
+            }
+            Kind::Lead => {
+                self.base.pid.ki_per_s = 0.0;
+                self.add(Parameter::Kp, r.kp);
+                self.add(Parameter::Kd, r.kd_s);
+            }
+        }
     }
 
     fn add(&mut self, parameter: Parameter, [from, to]: [f64; 2]) {

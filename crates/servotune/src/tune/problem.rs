@@ -11,7 +11,7 @@ use super::record_figures::{Asked, RecordFigure};
 use super::requirements::{CurveFound, Found, Requirement, Side, What};
 use super::row::{Moves, Row};
 use super::score::{INSIDE, Score, UNSTABLE};
-use super::{Machine, Parameters, Spec, TuneError};
+use super::{Machine, Parameters, Ranges, Spec, TuneError};
 use crate::controller::Controller;
 use crate::feedback::CurveLimit;
 use crate::lti::Section;
@@ -61,11 +61,19 @@ pub struct TuningWork {
     pub evaluations: usize,
 }
 
+/// The ranges that a search on these machines has at this sample time (s).
+pub fn ranges(machines: &[Machine<'_>], spec: &Spec, sample_time_s: f64) -> Ranges {
+    let gains: Vec<Box<dyn Fn(f64) -> f64 + '_>> =
+        machines.iter().map(|m| Box::new(|w: f64| m.gain(w)) as Box<dyn Fn(f64) -> f64 + '_>).collect();
+    let gains: Vec<&dyn Fn(f64) -> f64> = gains.iter().map(|g| g.as_ref()).collect();
+    spec.search.bounds.ranges(&gains, spec.crossover_hz(sample_time_s), sample_time_s)
+}
+
 impl TuningProblem {
     /// The problem of tables of the shape of `base`, in the ranges that these machines ask for.
     pub fn around(machines: &[Machine<'_>], spec: &Spec, base: &Controller) -> Result<TuningProblem, TuneError> {
         let t = base.sample_time_s;
-        let parameters = Parameters::of(spec, Some(base), t, &super::ranges(machines, spec, t));
+        let parameters = Parameters::of(spec, Some(base), t, &ranges(machines, spec, t));
         TuningProblem::new(machines, spec, parameters)
     }
 

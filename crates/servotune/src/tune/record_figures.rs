@@ -3,7 +3,6 @@
 //! In: a spec's objective and limits. Out: [`Asked`], the list of figures in a fixed order; the objective's own, if it is one, comes first.
 
 use super::Spec;
-use super::bounds::crossover_hz;
 use super::objective::Minimise;
 use super::requirements::{Requirement, What};
 
@@ -118,7 +117,7 @@ impl Asked {
 
 /// Samples of the simulated step: enough for the slowest loop that is searched.
 pub(super) fn step_samples(spec: &Spec, sample_time_s: f64) -> usize {
-    let [lowest_hz, _] = crossover_hz(spec, sample_time_s);
+    let [lowest_hz, _] = spec.crossover_hz(sample_time_s);
     let watched = (SETTLINGS * spec.limits.settling_s.unwrap_or(0.0)).max(PERIODS / lowest_hz);
     (watched / sample_time_s).clamp(STEP_SAMPLES[0], STEP_SAMPLES[1]) as usize
 }

@@ -87,6 +87,9 @@ pub struct Search {
 
 /// Relative room that every limit keeps where the spec says nothing.
 pub const GUARD: f64 = 0.02;
+/// Crossovers where nothing is said, as shares of the sample rate: a loop slower than a thousandth wastes its controller, one faster than a
+/// tenth has no phase left.
+const CROSSOVER: [f64; 2] = [1e-3, 0.1];
 /// Most notches, low-passes and peak filters that a search sets.
 pub(super) const FILTERS: usize = 3;
 
@@ -137,6 +140,17 @@ impl Spec {
     /// The profile, or the refusal of what cannot do without one.
     pub fn write(&self, what: &'static str) -> Result<&Profile, SpecError> {
         self.profile.as_ref().ok_or(SpecError::NeedsProfile { what })
+    }
+
+    /// Where a loop under this spec is to cross over (Hz): as it says, around its bandwidth, or as the sample rate allows.
+    pub(super) fn crossover_hz(&self, sample_time_s: f64) -> [f64; 2] {
+        let [slow, fast] = CROSSOVER.map(|share| share / sample_time_s);
+        match (self.margins.gain_crossover_hz, self.margins.bandwidth_hz) {
+            (Some(range), _) => range,
+            // A loop crosses over somewhat below its bandwidth.
+            (None, Some(b)) => [0.25 * b, (2.0 * b).max(fast)],
+            (None, None) => [slow, fast],
+        }
     }
 
     /// The same limits without their guard, for whoever keeps room of his own.

@@ -102,16 +102,7 @@ pub fn certify_watched(
     settings: &VerifySettings,
     watch: &BoxWatch<'_>,
 ) -> Result<Certificate, VerifyError> {
-    for (key, found) in [
-        ("gain", i.uncertainty.gain),
-        ("frequency", i.uncertainty.frequency),
-        ("damping", i.uncertainty.damping),
-        ("delay", i.uncertainty.delay),
-    ] {
-        if !(0.0..1.0).contains(&found) {
-            return Err(VerifyError::Uncertainty { key, found });
-        }
-    }
+    within_range(&i.uncertainty)?;
     let table = table_of(i.gains)?;
     let c = table.controller();
     let in_table = |source: VerifyError| source.of(&i.gains.file);
@@ -179,6 +170,16 @@ pub fn certify_watched(
         cases,
         findings,
     })
+}
+
+/// Refuses half widths that are no shares.
+fn within_range(u: &Uncertainty) -> Result<(), VerifyError> {
+    for (key, found) in [("gain", u.gain), ("frequency", u.frequency), ("damping", u.damping), ("delay", u.delay)] {
+        if !(0.0..1.0).contains(&found) {
+            return Err(VerifyError::Uncertainty { key, found });
+        }
+    }
+    Ok(())
 }
 
 /// The table in a file. Its own reader would refuse what a certificate is to report.

@@ -56,15 +56,7 @@ pub(super) fn bound(l: &Loop<'_>, record: &Record, c: &Controller, profile: &Pro
     let (first, second) = (step(&l.first), step(&l.second));
     let state: Vec<f64> =
         (0..n).map(|i| second[i] + sum(&mut l.second.0.row(i).iter().copied().zip(first.iter().copied()))).collect();
-    // Sections: three terms into the memory, three out of it; what comes out enters the next memory as it is.
-    let mut memory: Vec<f64> = Vec::new();
-    let mut entering = wanted + 3.0 * DIGIT * z.error;
-    let mut size = z.error;
-    for (section, w) in l.sections.iter().zip(&z.memory) {
-        memory.push(entering + 4.0 * DIGIT * (size + (section.a1.abs() + section.a2.abs()) * w));
-        size = (section.b0.abs() + section.b1.abs() + section.b2.abs()) * w;
-        entering = 4.0 * DIGIT * size;
-    }
+    let (memory, entering, size) = through(l, record, wanted);
     let forward = c.feedforward.as_ref().map_or(0.0, |f| {
         let t = c.sample_time_s;
         (f.factor * f.velocity_s).abs() * wanted / t + (f.factor * f.acceleration_s2).abs() * 4.0 * wanted / (t * t)
@@ -104,6 +96,20 @@ pub(super) fn bound(l: &Loop<'_>, record: &Record, c: &Controller, profile: &Pro
     let finite = |x: f64| if x.is_finite() { x } else { f64::MAX };
     let bins = (record.window.len() as f64 / 2.0).sqrt();
     [finite(window + transform * bins), finite(total.command * (1.0 + 1e-6))]
+}
+
+/// What the sections' memories and their output are off by, and the output's size.
+fn through(l: &Loop<'_>, record: &Record, wanted: f64) -> (Vec<f64>, f64, f64) {
+    // Sections: three terms into the memory, three out of it; what comes out enters the next memory as it is.
+    let mut memory: Vec<f64> = Vec::new();
+    let mut entering = wanted + 3.0 * DIGIT * record.sizes.error;
+    let mut size = record.sizes.error;
+    for (section, w) in l.sections.iter().zip(&record.sizes.memory) {
+        memory.push(entering + 4.0 * DIGIT * (size + (section.a1.abs() + section.a2.abs()) * w));
+        size = (section.b0.abs() + section.b1.abs() + section.b2.abs()) * w;
+        entering = 4.0 * DIGIT * size;
+    }
+    (memory, entering, size)
 }
 
 /// Where a residual enters.

@@ -5,7 +5,7 @@
 
 use super::Interval;
 use super::contour::{Contour, Window};
-use super::core_moves::{Core, Sum};
+use super::core_moves::{Bend, Core, Sum};
 use super::cut::{Cut, cut};
 use super::family::{DELAY, Family, GAIN, PAIRS, share};
 use super::moves::{Shares, size as modulus};
@@ -132,37 +132,79 @@ pub(super) struct OnCircle {
     pub cuts: Vec<Cut>,
 }
 
-impl OnCircle {
-    /// `family` is the one about the middle of `ranges`; no member's |S| is above `ms` anywhere outside the unit circle.
-    pub fn of(x: &Contour, beside: &Beside, family: &Family, ranges: &[Interval], ms: f64) -> OnCircle {
-        let n = x.s.len();
-        let zero = Complex::new(0.0, 0.0);
-        let shares: Vec<Shares> = (0..family.pairs.len()).map(|i| Family::shares(ranges, i)).collect();
-        let cuts: Vec<Cut> = family.pairs.iter().enumerate().filter_map(|(j, p)| cut(x, p, shares[j], j)).collect();
-        // Largest move of a cut pair at its near points, over its pieces.
-        let mut near: Vec<Vec<f64>> = vec![Vec::new(); family.pairs.len()];
-        for c in &cuts {
-            let mut most = vec![f64::INFINITY; n];
-            for (slot, i) in c.near.iter().enumerate() {
-                let over =
-                    c.pieces.iter().map(|p| (p.at[slot].0 - 1.0).norm() + p.at[slot].0.norm() * p.at[slot].1.most);
-                most[*i] = over.fold(0.0, f64::max);
-            }
-            near[c.pair] = most;
+/// Largest move of each cut pair at its near points, over its pieces; infinite at the others.
+fn near_moves(cuts: &[Cut], pairs: usize, n: usize) -> Vec<Vec<f64>> {
+    let mut near: Vec<Vec<f64>> = vec![Vec::new(); pairs];
+    for c in cuts {
+        let mut most = vec![f64::INFINITY; n];
+        for (slot, i) in c.near.iter().enumerate() {
+            let over = c.pieces.iter().map(|p| (p.at[slot].0 - 1.0).norm() + p.at[slot].0.norm() * p.at[slot].1.most);
+            most[*i] = over.fold(0.0, f64::max);
         }
-        let core = Core::of(family, ranges, &cuts);
-        let mut all = OnCircle {
-            linear: vec![vec![zero; n]; ranges.len()],
+        near[c.pair] = most;
+    }
+    near
+}
+
+impl OnCircle {
+    fn with_room(n: usize, coordinates: usize, core: &Core, cuts: Vec<Cut>) -> OnCircle {
+        OnCircle {
+            linear: vec![vec![Complex::new(0.0, 0.0); n]; coordinates],
             series: Vec::with_capacity(n),
             second: core.pairs().into_iter().map(|p| (p, Vec::with_capacity(n))).collect(),
             command: Vec::with_capacity(n),
-            command_linear: vec![Vec::with_capacity(n); ranges.len()],
+            command_linear: vec![Vec::with_capacity(n); coordinates],
             rest: Vec::with_capacity(n),
             command_rest: Vec::with_capacity(n),
             command_third: Vec::with_capacity(n),
             aside: [Vec::with_capacity(n), Vec::with_capacity(n)],
             cuts,
-        };
+        }
+    }
+
+    /// The linear parts of all factors at point i. Sizes, linear ones and rests of those outside the core, with near points in pieces; and of all,
+    /// each taken whole.
+    fn factors(
+        &mut self,
+        i: usize,
+        s: Complex<f64>,
+        core: &Core,
+        family: &Family,
+        shares: &[Shares],
+        near: &[Vec<f64>],
+    ) -> (Bend, Sum, Sum) {
+        let bent = core.at(s);
+        let (mut aside, mut whole) = (Sum::default(), Sum::default());
+        for (j, (coordinate, linear)) in bent.linear.iter().enumerate() {
+            self.linear[*coordinate][i] = *linear;
+            whole.add(modulus(*linear) + bent.own[j], bent.own[j]);
+        }
+        for (j, p) in family.pairs.iter().enumerate() {
+            if core.body == Some(j) {
+                continue;
+            }
+            let m = p.moved(s, shares[j], p.reach(s, shares[j]));
+            for k in 0..3 {
+                self.linear[PAIRS + 3 * j + k][i] = m.linear[k];
+            }
+            whole.add(m.most, m.rest);
+            match near[j].get(i) {
+                // What the pieces leave is added with them.
+                Some(most) if most.is_finite() => aside.add(*most, 0.0),
+                _ => aside.add(m.most, m.rest),
+            }
+        }
+        (bent, aside, whole)
+    }
+
+    /// `family` is the one about the middle of `ranges`; no member's |S| is above `ms` anywhere outside the unit circle.
+    pub fn of(x: &Contour, beside: &Beside, family: &Family, ranges: &[Interval], ms: f64) -> OnCircle {
+        let n = x.s.len();
+        let shares: Vec<Shares> = (0..family.pairs.len()).map(|i| Family::shares(ranges, i)).collect();
+        let cuts: Vec<Cut> = family.pairs.iter().enumerate().filter_map(|(j, p)| cut(x, p, shares[j], j)).collect();
+        let near = near_moves(&cuts, family.pairs.len(), n);
+        let core = Core::of(family, ranges, &cuts);
+        let mut all = OnCircle::with_room(n, ranges.len(), &core, cuts);
         for i in 0..n {
             let s = x.s[i];
             let one = hold(x, i, 0).1 * family.value(s);
@@ -177,28 +219,7 @@ impl OnCircle {
             let sensitivity = 1.0 / (1.0 + law * (one + aliases));
             let closed = modulus(law * sensitivity);
             let entered = sensitivity * x.inputs[i];
-            // Sizes, linear ones and rests of the factors outside the core, with near points in pieces; and of all, each taken whole.
-            let bent = core.at(s);
-            let (mut aside, mut whole) = (Sum::default(), Sum::default());
-            for (j, (coordinate, linear)) in bent.linear.iter().enumerate() {
-                all.linear[*coordinate][i] = *linear;
-                whole.add(modulus(*linear) + bent.own[j], bent.own[j]);
-            }
-            for (j, p) in family.pairs.iter().enumerate() {
-                if core.body == Some(j) {
-                    continue;
-                }
-                let m = p.moved(s, shares[j], p.reach(s, shares[j]));
-                for k in 0..3 {
-                    all.linear[PAIRS + 3 * j + k][i] = m.linear[k];
-                }
-                whole.add(m.most, m.rest);
-                match near[j].get(i) {
-                    // What the pieces leave is added with them.
-                    Some(most) if most.is_finite() => aside.add(*most, 0.0),
-                    _ => aside.add(m.most, m.rest),
-                }
-            }
+            let (bent, aside, whole) = all.factors(i, s, &core, family, &shares, &near);
             let apart = beside.apart[i];
             // S is known but for the far aliases.
             let blurred = 2.0 * closed * beside.far * (1.0 - (s * -x.t).exp()).norm();

@@ -3,7 +3,7 @@
 //! In: nothing. Out: a constant and a row of the table for each rule. Convention: thresholds in the unit of their row. Spec:
 //! `specs/rules.md`.
 
-use super::{Floor, Rule, rules};
+use super::rule::{Floor, Rule, rules};
 
 rules! {
     Floor::Data;

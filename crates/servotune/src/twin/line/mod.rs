@@ -1,10 +1,11 @@
 //! A production line: drives of the four classes, and machines of kinds that no class knows, each measured as the factory does.
 //!
-//! In: a seed and counts. Out: [`LineMachine`]s with what the factory sees ([`RawMachine`]) and the truth behind it ([`Truth`]).
+//! In: a seed and counts. Out: [`LineMachine`]s with what the factory sees ([`crate::gate::features::RawMachine`]) and the truth behind it ([`Truth`]).
 //! Physics makes every number: a plant with its fault, a spiral write under the one controller, a swept sine with noise, a log.
 //! Why the faults are as large as they are: `specs/gate_twin.md`. Bytes equal for any number of threads.
 
 mod files;
+mod line_machine;
 mod log;
 mod measure;
 mod truth;
@@ -12,13 +13,13 @@ mod unknown;
 mod unknown_kind;
 
 pub use files::{MachineFiles, machine_files};
+pub use line_machine::LineMachine;
 pub use truth::Truth;
 pub use unknown_kind::UnknownKind;
 
 pub(super) use measure::measured;
 
 use super::{MachineClass, TwinError};
-use crate::gate::features::RawMachine;
 use crate::numeric::random::Random;
 use rayon::prelude::*;
 
@@ -49,17 +50,6 @@ impl LineSettings {
         counts[0] = (counts[0] + total).saturating_sub(given);
         LineSettings { seed, counts }
     }
-}
-
-/// One machine of the line.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LineMachine {
-    /// What the factory has of it. Machines of an unknown kind have no label.
-    pub record: RawMachine,
-    /// Words in its log; they are no features.
-    pub words: Vec<(String, String)>,
-    /// What it is.
-    pub truth: Truth,
 }
 
 /// Stream of the order of the machines; the machines' own streams count from 0.
