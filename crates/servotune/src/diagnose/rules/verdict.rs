@@ -118,6 +118,12 @@ rules! {
     SEEN_CHANCE: f64 = 1e-9, "probability",
         "chance of a scan's best gain below which something is there",
         "noise of the records may differ from white by a little";
+    LINEAR_SIGMAS: f64 = 5.0, "standard deviations",
+        "rise of the sum of squares over its mean, with some linear parameters as given, up to which these agree",
+        "five standard deviations of the chi-square of as many numbers are never chance";
+    LINEAR_SLACK: f64 = 10.0, "sum of squares",
+        "by how much more it may rise",
+        "judgement: a refit's own straightness";
     COLOURED: f64 = 1.25, "ratio",
         "open-loop error over the sensor's white noise above which it is coloured",
         "judgement: the level of one record errs by some per cent";
