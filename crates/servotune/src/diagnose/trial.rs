@@ -108,7 +108,7 @@ impl Trial<'_> {
         let f = named.figures();
         let [names_leave, curve_leaves] = left.map(|v| said(v / f.noise_floor, 3));
         let remark = format!(
-            "{} is near to what acts, and not it: it leaves {names_leave} times the noise on records that were not fitted, a curve without a name {curve_leaves} times",
+            "{} is not named: a model with it leaves {names_leave} times the noise on the records that judge, one with a free curve in its place {curve_leaves} times",
             named.judgement.names()
         );
         let nameless = unexplained(&named.data, &named.selection, f.explained_share.clamp(0.0, 1.0));

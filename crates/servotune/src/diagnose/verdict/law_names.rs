@@ -81,7 +81,7 @@ impl<'a> Laws<'a> {
             explained,
             clean: clean(facts, explained),
             against: contradicts(facts.data, facts.held_out, &facts.selection.model),
-            rejected: facts.confirmed.iter().find(|c| c.denied() && !answered),
+            rejected: facts.confirmed.iter().find(|c| c.rejected() && !answered),
             beside: facts.selection.leftover.as_ref(),
         }
     }
@@ -137,7 +137,7 @@ fn rejected(l: &Laws) -> Answer {
 
 fn said_rejected(c: &Confirmation) -> String {
     format!(
-        "the records that were not used deny {}: it should take {:.0} units of their error, and takes {:.0}",
+        "{} is rejected on held-out records: it should lower their whitened squared error by {:.0}, and lowers it by {:.0}",
         c.effect, c.says, c.gains
     )
 }
