@@ -233,16 +233,16 @@ fn a_held_out_record_far_off_is_no_agreement() {
 }
 
 #[test]
-fn a_law_is_denied_where_it_is_absent_and_seldom_where_it_acts() {
+fn a_law_is_rejected_where_it_is_absent_and_seldom_where_it_acts() {
     let mut noise = Random::new(11);
     for says in [60.0, 400.0, 1e4] {
-        let denied = |mean: f64, noise: &mut Random| {
+        let rejected = |mean: f64, noise: &mut Random| {
             let draw =
                 |_| Confirmation { effect: "dead_band", says, gains: mean + 2.0 * f64::sqrt(says) * noise.normal() };
-            (0..4000).map(draw).filter(Confirmation::denied).count()
+            (0..4000).map(draw).filter(Confirmation::rejected).count()
         };
         // Three standard deviations: 1.3 of a thousand, 5.4 of 4000.
-        assert!(denied(says, &mut noise) < 14, "{says}");
-        assert!(denied(-says, &mut noise) > 3900, "{says}");
+        assert!(rejected(says, &mut noise) < 14, "{says}");
+        assert!(rejected(-says, &mut noise) > 3900, "{says}");
     }
 }

@@ -8,6 +8,7 @@ use super::diagnosis_curve::curve_section;
 use super::diagnosis_error::{error_figure, spectrum_figure};
 use super::diagnosis_law::{amplitude_figure, law_figures, unexplained_figure};
 use super::diagnosis_place::{Map, time_map, zone_map};
+use super::diagnosis_rules::rules_block;
 use super::diagnosis_shown::{Shown, figures, short, words};
 use super::diagnosis_tables::{confirmed_table, log_blocks, noise_table, records_table, search_blocks, where_table};
 use super::number::NumberFormat;
@@ -36,6 +37,7 @@ pub fn diagnosis_page(made: &Diagnosed, provenance: Vec<(String, String)>) -> Re
     let (badge, sentence) = verdict(made, shown.position);
     let mut first = vec![Block::Notice(badge, sentence)];
     first.extend(d.findings.iter().map(|f| Block::Prose(said(f))));
+    first.extend(rules_block(&shown)?);
     let mut sections = vec![Section { heading: "Verdict".into(), blocks: first }];
     if !d.findings.is_empty() {
         sections.push(findings_section(&shown)?);

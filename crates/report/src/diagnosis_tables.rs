@@ -140,12 +140,12 @@ pub(super) fn confirmed_table(s: &Shown) -> Result<Option<Table>, ReportError> {
         return Ok(None);
     }
     let mut table = Table::new(
-        "Asked of the records that were not used: fall of their whitened squared error when the law is added",
+        "Each law on held-out records: fall of their whitened squared error when it is added",
         vec![
             Column::words("Law"),
-            Column::numbers("It should take", "", NumberFormat::Significant(4)),
+            Column::numbers("Expected", "", NumberFormat::Significant(4)),
             Column::numbers("Standard deviation", "", NumberFormat::Significant(3)),
-            Column::numbers("It takes", "", NumberFormat::Significant(4)),
+            Column::numbers("Found", "", NumberFormat::Significant(4)),
         ],
     );
     for c in asked {
@@ -154,7 +154,7 @@ pub(super) fn confirmed_table(s: &Shown) -> Result<Option<Table>, ReportError> {
             words(c.effect).as_str().into(),
             c.says.into(),
             (2.0 * c.says.sqrt()).into(),
-            if c.denied() { takes.flagged(Badge::Fail, "denied") } else { takes },
+            if c.rejected() { takes.flagged(Badge::Fail, "rejected") } else { takes },
         ])?;
     }
     Ok(Some(table))

@@ -9,6 +9,7 @@ pub mod diagnosis_curve;
 mod diagnosis_error;
 mod diagnosis_law;
 mod diagnosis_place;
+mod diagnosis_rules;
 mod diagnosis_shown;
 mod diagnosis_tables;
 mod error;

@@ -3,7 +3,7 @@
 use super::diagnose_error::DiagnoseError;
 use super::preconditions;
 use super::progress::{AGAIN, Pace};
-use super::rules::{MEASURED_COMMAND, RUN_OUT_HELPS};
+use super::rules::{MEASURED_COMMAND, RUN_OUT_HELPS, asked};
 use super::settings::DiagnoseSettings;
 use super::trial::Trial;
 use crate::controller::{Controller, Law};
@@ -17,6 +17,7 @@ use crate::diagnose::fit::simulation::rms;
 use crate::diagnose::search::cleared_plant::cleared;
 use crate::diagnose::verdict::diagnosed::Diagnosed;
 use crate::diagnose::verdict::log_checks::{LogChecks, check};
+use crate::diagnose::verdict::outcome::Outcome;
 use crate::diagnose::verdict::run_out::RunOut;
 use crate::lti::{Body, Plant};
 use crate::recording::{Case, Role};
@@ -64,7 +65,8 @@ pub fn diagnose(
         }
     }
     let first = ground.searched(data, whole.clone(), &decoupled, &mut progress)?;
-    ground.with_run_out(first, whole, &decoupled, &mut progress)
+    let made = ground.with_run_out(first, whole, &decoupled, &mut progress)?;
+    Ok(made.diagnosed(&case.id, &ground.log_checks, &decoupled.couplings))
 }
 
 /// What every search of a case goes by.
@@ -114,7 +116,7 @@ impl Ground<'_> {
         mut whole: Vec<Run>,
         decoupled: &Decoupled,
         progress: &mut dyn FnMut(&str),
-    ) -> Result<Diagnosed, DiagnoseError> {
+    ) -> Result<Outcome, DiagnoseError> {
         let (iterations, mut remarks) = (self.settings.select.iterations, self.remarks.clone());
         let sound = self.log_checks.finding.is_none();
         let start = sound.then(|| cleared(&data, iterations, progress)).flatten();
@@ -137,7 +139,6 @@ impl Ground<'_> {
         let (data, shocks) = set_aside(data, self.given, self.case.spindle_hz, iterations)?;
         whole.iter_mut().zip(&data.runs).for_each(|(w, r)| w.shocked = r.shocked);
         let trial = Trial {
-            case: self.case,
             given: self.given,
             decoupled: &decoupled.recorded_as(&whole),
             whole: &whole,
@@ -150,14 +151,14 @@ impl Ground<'_> {
         trial.best(data, progress)
     }
 
-    /// The diagnosis with a run-out beside it that its law hid, where that leaves clearly less.
+    /// What was found, with a run-out beside it that its law hid, where that leaves clearly less.
     fn with_run_out(
         &self,
-        first: Diagnosed,
+        first: Outcome,
         whole: Vec<Run>,
         decoupled: &Decoupled,
         progress: &mut dyn FnMut(&str),
-    ) -> Result<Diagnosed, DiagnoseError> {
+    ) -> Result<Outcome, DiagnoseError> {
         let Some(found) = RunOut::beside(&first) else { return Ok(first) };
         progress(&format!("{AGAIN}, without the run-out that it left"));
         let recorded = if decoupled.recorded.is_empty() { whole.clone() } else { decoupled.recorded.clone() };
@@ -165,11 +166,13 @@ impl Ground<'_> {
         let aside = Decoupled { recorded, ..decoupled.clone() };
         let cut = excerpts(&clean, self.sample_time_s).unwrap_or_else(|| clean.clone());
         let second = self.searched(self.data(self.given, cut)?, clean, &aside, progress)?;
-        if second.judged() > RUN_OUT_HELPS * first.judged() || second.judged().is_nan() {
+        let [left, before] = [&second, &first].map(Outcome::judged);
+        let helps = asked!(left / before, RUN_OUT_HELPS: !(left > RUN_OUT_HELPS * before || left.is_nan()));
+        if !helps.yes {
             return Ok(first);
         }
         let found = found.bettered(&second).unwrap_or(found);
-        Ok(found.entered(second, &whole, self.closed()))
+        Ok(found.entered(second, &whole, self.closed(), helps))
     }
 }
 

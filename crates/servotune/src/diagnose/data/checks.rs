@@ -7,7 +7,7 @@
 use super::run::Run;
 use super::stacked_records::NuisanceBasis;
 use crate::controller::Law;
-use crate::diagnose::rules::{JUMP_STEPS, REPLAY_ERROR, STUCK_STEPS};
+use crate::diagnose::rules::{JUMP_STEPS, REPLAY_ERROR, SHIFT_BROKEN, STUCK_STEPS};
 use crate::lti::step_chain;
 use crate::numeric::golden::{Bound, golden_section};
 use crate::numeric::least_squares::dot;
@@ -129,7 +129,7 @@ pub fn replay_records(law: &Law, runs: &[&Run], smooth: &[Vec<f64>]) -> Option<R
         }
         let m = golden_section(&error, best.0 - 1.0, best.0 + 1.0, 1e-3);
         // A real-valued shift only where it is clearly better than the whole one.
-        if m.value < 0.7 * best.1 && m.at_bound == Bound::Inside {
+        if m.value < SHIFT_BROKEN * best.1 && m.at_bound == Bound::Inside {
             best = (m.x, m.value);
         }
         if best.1 < out.error_shifted {

@@ -7,6 +7,7 @@ use super::differing_repeats::differing;
 use super::model::Model;
 use super::selected_effect::SelectedEffect;
 use crate::diagnose::data::linear_form::FreeParameter;
+use crate::diagnose::rules::{FAR_OFF, OTHER_START};
 use crate::physics::AnyLaw;
 use rayon::prelude::*;
 use std::f64::consts::LN_2;
@@ -76,17 +77,13 @@ pub(in crate::diagnose) fn fitted_from_both(
     if p.iter().all(|v| *v == 0.0) {
         return on(here);
     }
-    if here.excess_sigma() < NEAR {
+    if here.excess_sigma() < OTHER_START {
         return on(here);
     }
     let there = fitted(data, chosen.to_vec(), &vec![0.0; p.len()], first);
     on(if there.cost < here.cost { there } else { here })
 }
 
-/// Standard deviations of excess below which no other start is tried.
-const NEAR: f64 = 5.0;
-/// Standard deviations of excess above which delay and gain are looked for far from the given ones.
-const FAR_OFF: f64 = 5.0;
 /// Farthest that a delay is looked for (samples), and how finely.
 const FARTHEST: usize = 60;
 const STRIDE: usize = 3;

@@ -13,7 +13,7 @@ use super::model::Model;
 use super::output_error_problem::{Problem, places};
 use super::simulation::size;
 use crate::diagnose::data::linear_form::FreeParameter;
-use crate::diagnose::rules::{RUNS_AWAY, SIMULATION_SILENT};
+use crate::diagnose::rules::{RUNS_AWAY, SIMULATION_SILENT, UNSETTLED};
 use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
 
 /// Most Jacobians.
@@ -24,8 +24,6 @@ const TOLERANCE: f64 = 1e-6;
 /// open a way further down.
 const AGAIN: usize = 3;
 const FURTHER: f64 = 3e-4;
-/// Standard deviations of what is left beyond the noise from which a fit is made from elsewhere too.
-const UNSETTLED: f64 = 5.0;
 
 /// The whitened simulation error of a model, stacked, each segment's own directions taken out.
 pub(in crate::diagnose) fn simulation_error(data: &DiagnosisData, model: &Model) -> Vec<f64> {

@@ -5,6 +5,7 @@
 
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::rules::AT_END;
 use crate::numeric::simplex::simplex;
 use crate::numeric::statistics::{median, rms};
 use crate::physics::{PlayObserver, Readings, logarithmic};
@@ -35,7 +36,6 @@ const RATES: [f64; 2] = [0.01, 0.45];
 const DAMPINGS: [f64; 2] = [1e-3, 0.5];
 const LOADS: [f64; 2] = [0.03, 0.6];
 const WIDEST: f64 = 5.0;
-const AT_END: f64 = 1.1;
 /// Frequency of a rival from which it is a drift, over the sample rate, and how many of the grid.
 const DRIFT: f64 = 5e-4;
 const RIVALS: usize = 20;

@@ -12,7 +12,7 @@ use super::trial::Trial;
 use crate::diagnose::data::linear_form::body_numbers;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
-use crate::diagnose::rules::{CURVE_CLEARLY, CURVE_LAG, FOLD_NAMED, SECOND_CURVE};
+use crate::diagnose::rules::{BALANCES, BALANCES_NOT, CURVE_CLEARLY, CURVE_LAG, FOLD_NAMED, SECOND_CURVE};
 use crate::lti::Plant;
 use crate::numeric::spline::Spline;
 use crate::physics::{CurvePort, Knots};
@@ -85,9 +85,6 @@ pub(in crate::diagnose) struct Estimated<'a> {
 const CHOICES: usize = 2;
 /// Times that the knots of the best curve are doubled.
 const FINER: usize = 2;
-/// Shares of the linear balance below which a curve balances well, and above which it does not beside such a one.
-const BALANCES: f64 = 0.3;
-const BALANCES_NOT: f64 = 0.8;
 /// Time constant from which a lag sets out (samples).
 const LAG: f64 = 3.0;
 /// Share of the readings below the place where a fold is taken to lie at first, and share of the range below that which makes an edge: the

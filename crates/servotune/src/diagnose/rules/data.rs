@@ -22,6 +22,18 @@ rules! {
     REPLAY_ERROR: f64 = 5e-3, "share",
         "error of the replayed command over the command above which the controller is not the documented one",
         "logs round their numbers to three or four digits";
+    REPLAY_HELPS: f64 = 0.3, "share",
+        "error of a failing replay that a shift or a factor may leave to explain it",
+        "judgement: the fault itself takes nearly all of the error";
+    SHIFT_TOLD: f64 = 0.05, "samples",
+        "shift of the position above which the log is late or early",
+        "judgement: rounding of the log imitates hundredths of a sample";
+    SHIFT_BEFORE_SCALE: f64 = 1.1, "ratio",
+        "error that a shift leaves over that a factor leaves, up to which the shift is the fault",
+        "judgement: of two that do as well the shift has one number, the factor two";
+    SHIFT_BROKEN: f64 = 0.7, "ratio",
+        "error of a replay with a shift of parts of a sample over that with the best whole one, below which the former counts",
+        "judgement: logs slip by whole samples more often";
     STUCK_STEPS: f64 = 3.0, "counts",
         "steps of the encoder that the model moves while the position stands still, from which the value is stuck",
         "judgement: two counts may be rounding";

@@ -55,12 +55,27 @@ rules! {
     SIMULATION_SAMPLING: f64 = 2.0, "standard deviations",
         "the same over the root of the samples",
         "two standard deviations of a mean square of so many samples, at the least";
+    OTHER_START: f64 = 5.0, "standard deviations",
+        "excess from which a fit with laws is made from the given plant too",
+        "it only saves a fit: the lower error decides";
+    FAR_OFF: f64 = 5.0, "standard deviations",
+        "excess from which delay and gain are looked for far from the given ones",
+        "it only opens a fit: the lower error decides";
+    UNSETTLED: f64 = 5.0, "standard deviations",
+        "excess from which a fit by simulation is made from the given plant too",
+        "it only saves a fit: the lower error decides";
     REFIT_FAR: f64 = 3.0, "noise",
         "error of a linear refit over noise from which a fit by simulation is tried beside it",
         "it only saves a fit: errors decide";
     REFIT_BETTER: f64 = 0.95, "ratio",
         "share of the refit's error that the fit by simulation must stay below",
         "another kind of fit needs a reason";
+    BALANCES: f64 = 0.3, "share",
+        "squares of the linear balance of torques that a curve leaves, below which it balances well and is the start of its fit",
+        "judgement: it saves fits, and the error on parts left out decides";
+    BALANCES_NOT: f64 = 0.8, "share",
+        "the same above which a port is left out beside one that balances well",
+        "judgement: what explains a fifth of the balance is not what acts where another explains most";
     FOLD_NAMED: f64 = 1.15, "ratio",
         "squared error of a folded or limited reading over that of the free curve up to which it is the curve",
         "a form with three numbers against one with seventeen may leave a little more";

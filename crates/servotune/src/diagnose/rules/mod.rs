@@ -4,6 +4,7 @@
 //! algorithms (iterations, steps, tolerances, grids) are not rules and stay beside what they set. A reason that begins with "judgement" was not
 //! derived; a false-alarm rate is given only where it was counted. Spec: `specs/rules.md`.
 
+mod answer;
 mod data;
 mod fit;
 mod noise;
@@ -11,6 +12,8 @@ mod rule;
 mod search;
 mod verdict;
 
+pub use answer::Consulted;
+pub(in crate::diagnose) use answer::{Answer, asked};
 pub(super) use data::*;
 pub(super) use fit::*;
 pub(super) use noise::*;

@@ -10,6 +10,12 @@ rules! {
     RUN_OUT_HELPS: f64 = 0.9, "ratio",
         "error of the records that judge with a run-out that was taken out and all searched again, over that without, below which it is kept",
         "judgement: an order that another law's form feeds takes little with it";
+    SHOWN_BY: f64 = 0.02, "share",
+        "energy of an effect in a record over that in the strongest, above which the record shows it",
+        "judgement: it only says where to look";
+    ONE_DIRECTION: f64 = 6.0, "ratio",
+        "energy of an effect in one direction of the motion over that in the other, above which it shows in that direction alone",
+        "judgement: it only says where to look";
     FAMILY: f64 = 20.0, "twice log-likelihood",
         "difference of two fits below which they are one family",
         "judgement: odds of e^10; laws differ from machines by more than noise";
@@ -118,16 +124,22 @@ rules! {
     SEEN_CHANCE: f64 = 1e-9, "probability",
         "chance of a scan's best gain below which something is there",
         "noise of the records may differ from white by a little";
+    LINEAR_SIGMAS: f64 = 5.0, "standard deviations",
+        "rise of the sum of squares over its mean, with some linear parameters as given, up to which these agree",
+        "five standard deviations of the chi-square of as many numbers are never chance";
+    LINEAR_SLACK: f64 = 10.0, "sum of squares",
+        "by how much more it may rise",
+        "judgement: a refit's own straightness";
     COLOURED: f64 = 1.25, "ratio",
         "open-loop error over the sensor's white noise above which it is coloured",
         "judgement: the level of one record errs by some per cent";
     LAW_SAYS: f64 = 40.0, "sum of squares",
-        "what a law must say of held-out records before they can deny it",
+        "what a law must say of held-out records before they can reject it",
         "its mean is then three standard deviations above nothing (40 against 2 times the root of 40)";
     LAW_SHORT: f64 = 0.25, "share",
         "part of it that they fall short of",
         "judgement: where the law acts they answer with all of it",
-        "1 of 96 right laws denied on three opened sets, counted by hand (specs/decisions/mismatch.md)";
+        "1 of 96 right laws rejected on three opened sets, counted by hand (specs/decisions/mismatch.md)";
     LAW_FAR: f64 = 3.0, "standard deviations",
         "standard deviations that they fall short by",
         "a normal number passes it once in 740";
@@ -170,6 +182,9 @@ rules! {
     PLAY_HELD_OUT: f64 = 0.15, "share",
         "gain per sample on held-out records over that on fitted ones from which they agree",
         "judgement: other motions meet the contact less often";
+    AT_END: f64 = 1.1, "ratio",
+        "distance of a play's number from an end of its range, as a ratio, within which it rests there and is not named",
+        "judgement: a slow motion in a wide gap follows any drift, and then rests at an end";
     PLAY_TOUCHES: f64 = 0.02, "share",
         "samples in contact, and out of it, from which a gap is seen",
         "a gap that is never crossed, or never met, is no play";

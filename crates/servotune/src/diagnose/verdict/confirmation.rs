@@ -29,8 +29,8 @@ pub struct Confirmation {
 }
 
 impl Confirmation {
-    /// Whether the records that were not used deny the law.
-    pub fn denied(&self) -> bool {
+    /// Whether the records that were not used reject the law.
+    pub fn rejected(&self) -> bool {
         self.says > LAW_SAYS
             && self.gains < LAW_SHORT * self.says
             && self.gains < self.says - LAW_FAR * 2.0 * self.says.sqrt()

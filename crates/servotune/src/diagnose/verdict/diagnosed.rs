@@ -3,7 +3,7 @@
 use super::diagnosis_json::Diagnosis;
 use crate::diagnose::fit::corrected_model::Corrected;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
-use crate::diagnose::fit::simulation::rms;
+use crate::diagnose::rules::Consulted;
 use crate::diagnose::search::selection::Selection;
 use crate::lti::Plant;
 
@@ -11,6 +11,8 @@ use crate::lti::Plant;
 pub struct Diagnosed {
     /// What stands in diagnosis.json.
     pub diagnosis: Diagnosis,
+    /// The rules that were consulted for its verdict, in order.
+    pub consulted: Vec<Consulted>,
     /// The ground it was made on.
     pub data: DiagnosisData,
     /// The search.
@@ -23,16 +25,4 @@ pub struct Diagnosed {
     pub errors: [Vec<Vec<f64>>; 3],
     /// The same from the recorded command, in open loop.
     pub open: [Vec<Vec<f64>>; 3],
-}
-
-impl Diagnosed {
-    /// Error (rms, position_unit) that the corrected model leaves of the records that judge.
-    pub(in crate::diagnose) fn judged(&self) -> f64 {
-        judged(&self.data, &self.errors[2])
-    }
-}
-
-/// Error (rms, position_unit) of the records that judge, out of those of all.
-pub(in crate::diagnose) fn judged(data: &DiagnosisData, errors: &[Vec<f64>]) -> f64 {
-    rms(&data.judging().iter().map(|&i| errors[i].clone()).collect::<Vec<_>>())
 }

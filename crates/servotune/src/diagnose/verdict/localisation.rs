@@ -4,6 +4,7 @@ use super::finding::Where;
 use crate::diagnose::data::stacked_records::{Segment, StackedRecords};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::trajectory::Trajectory;
+use crate::diagnose::rules::{ONE_DIRECTION, SHOWN_BY};
 use crate::numeric::spectrum::forward;
 
 /// Windows of a record.
@@ -98,7 +99,7 @@ pub fn place_of(parts: &[Part], t: f64) -> Where {
     let Some(strongest) = energies.iter().position(|e| *e == most && most > 0.0) else {
         return Where { velocity_sign: "both", ..Where::default() };
     };
-    let loud = parts.iter().zip(&energies).filter(|(_, e)| **e > 0.02 * most);
+    let loud = parts.iter().zip(&energies).filter(|(_, e)| **e > SHOWN_BY * most);
     let records = loud.flat_map(|(p, _)| p.records.iter().cloned()).collect();
     // Time: the fewest windows of the strongest record that hold nine tenths, joined where they touch.
     let part = parts[strongest].signal;
@@ -139,9 +140,9 @@ pub fn place_of(parts: &[Part], t: f64) -> Where {
             if *speed > 0.0 { ahead += v * v } else { back += v * v }
         }
     }
-    let velocity_sign = if ahead > 6.0 * back {
+    let velocity_sign = if ahead > ONE_DIRECTION * back {
         "positive"
-    } else if back > 6.0 * ahead {
+    } else if back > ONE_DIRECTION * ahead {
         "negative"
     } else {
         "both"

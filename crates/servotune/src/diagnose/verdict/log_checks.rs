@@ -9,7 +9,7 @@ use crate::diagnose::data::slip::breaks_of_replay;
 use crate::diagnose::data::time_shift::shifted;
 use crate::diagnose::fit::diagnosis_data::scene;
 use crate::diagnose::fit::simulation::{SimulatedModel, error};
-use crate::diagnose::rules::UNIT_FACTOR;
+use crate::diagnose::rules::{REPLAY_HELPS, SHIFT_BEFORE_SCALE, SHIFT_TOLD, UNIT_FACTOR};
 use crate::lti::{LtiError, Plant};
 use crate::recording::Case;
 
@@ -51,12 +51,13 @@ pub(in crate::diagnose) fn check(
         let breaks: Vec<SampleFault> =
             failing.iter().flat_map(|&i| breaks_of_replay(law, &runs[i], sample_time_s)).collect();
         let named: Vec<&Run> = failing.iter().map(|&i| &runs[i]).collect();
-        let helps = |e: f64| e < 0.3 * r.error;
+        let helps = |e: f64| e < REPLAY_HELPS * r.error;
+        let shifted = helps(r.error_shifted) && r.error_shifted <= SHIFT_BEFORE_SCALE * r.error_scaled;
         if !breaks.is_empty() {
             faults.extend(breaks);
             log_checks.closed = false;
         } else if faults.is_empty() {
-            if helps(r.error_shifted) && r.shift_samples.abs() > 0.05 && r.error_shifted <= 1.1 * r.error_scaled {
+            if shifted && r.shift_samples.abs() > SHIFT_TOLD {
                 log_checks.finding = Some(super::log_finding::misalignment(r, sample_time_s, &named));
                 let by = r.shift_samples;
                 failing.iter().for_each(|&i| shift(&mut runs[i], by));

@@ -4,8 +4,8 @@
 //! In: a diagnosis that ended without a name. Out: the corrected model with the curve, its errors, and what diagnosis.json says of it;
 //! a reading that folds or ends at limits has a name and is found here too.
 
-use super::diagnosis_json::Diagnosis;
-use super::finding::{Estimate, Finding, Verdict};
+use super::finding::{Estimate, Finding};
+use super::judgement::{Judgement, Later};
 use super::naming::everywhere;
 use crate::controller::Law;
 use crate::diagnose::data::run::Run;
@@ -283,16 +283,15 @@ fn bearing_finding(data: &DiagnosisData, best: &Foretelling, found: &Estimated) 
     })
 }
 
-/// Takes what was found into a diagnosis.
-pub(in crate::diagnose) fn enter(d: &mut Diagnosis, found: &StandIn) {
-    if let Some(f) = &found.finding {
-        d.verdict = Verdict::Named;
-        d.findings = vec![f.clone()];
+impl StandIn {
+    /// The judgement with what was found, where it has a name, and with what is said of the curve.
+    pub fn entered(&self, judged: Judgement) -> Judgement {
+        let judged = match &self.finding {
+            Some(f) => judged.after(Later::Instead(f.clone()), Vec::new()),
+            None => judged,
+        };
+        judged.said(self.curve.as_ref().map(|c| c.says.clone()))
     }
-    if let Some(c) = &found.curve {
-        d.remarks.push(c.says.clone());
-    }
-    d.free_form.clone_from(&found.curve);
 }
 
 /// A curve beside a linear plant and nothing else.

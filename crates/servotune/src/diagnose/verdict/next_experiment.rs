@@ -1,7 +1,7 @@
 //! What to record next, and how well it would tell the survivors apart.
 
-use super::diagnosis_json::Diagnosis;
 use super::finding::{NextExperiment, Verdict};
+use super::judgement::Judgement;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::{SimulatedModel, error};
@@ -17,8 +17,8 @@ const STROKE: f64 = 2.0;
 
 /// Proposes the record that tells the final model best from its strongest rival: the existing excitations at other sizes
 /// (T-optimality over a catalogue; Atkinson & Fedorov 1975), by simulating both and counting the whitened difference.
-pub(in crate::diagnose) fn propose(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection) {
-    let standing = match d.verdict {
+pub(in crate::diagnose) fn propose(judged: &Judgement, data: &DiagnosisData, selection: &Selection) -> NextExperiment {
+    let standing = match judged.verdict {
         Verdict::DataFault => "record again with the log repaired; every other verdict rests on it".to_owned(),
         Verdict::Undecidable => {
             "the same excitation at least four times: what repeats differ by is noise, the rest is the machine".to_owned()
@@ -26,7 +26,7 @@ pub(in crate::diagnose) fn propose(d: &mut Diagnosis, data: &DiagnosisData, sele
         Verdict::NoMismatch | Verdict::Refit => {
             "the same excitation at a third and at three times its size: a linear machine scales, friction and limits do not".to_owned()
         }
-        _ => d.findings.first().and_then(|f| facts(&f.effect)).map_or_else(
+        _ => judged.findings.first().and_then(|f| facts(&f.effect)).map_or_else(
             || "the same excitation at three sizes, in three zones of the stroke".to_owned(),
             |f| f.experiment.to_owned(),
         ),
@@ -62,7 +62,7 @@ pub(in crate::diagnose) fn propose(d: &mut Diagnosis, data: &DiagnosisData, sele
     } else {
         standing
     };
-    d.next_experiment = NextExperiment { what, expected_separation: best.0 };
+    NextExperiment { what, expected_separation: best.0 }
 }
 
 fn difference(

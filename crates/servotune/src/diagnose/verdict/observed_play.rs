@@ -4,8 +4,8 @@
 //! that was fitted beside what the observer saw. A resonance under the same observer is the rival; held-out records must agree.
 //! Spec: `specs/mismatch.md`.
 
-use super::diagnosis_json::Diagnosis;
 use super::finding::{Estimate, Finding, Verdict};
+use super::judgement::{Judgement, Later};
 use super::localisation::place;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, corrected};
@@ -13,7 +13,7 @@ use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
 use crate::diagnose::fit::play_ground::{FittedPlay, PlayGround, Side, readings};
 use crate::diagnose::fit::simulation::{SimulatedModel, errors};
-use crate::diagnose::rules::{PLAY_CLEARLY, PLAY_HELD_OUT, PLAY_LEAST, PLAY_TOUCHES};
+use crate::diagnose::rules::{Consulted, PLAY_CLEARLY, PLAY_HELD_OUT, PLAY_LEAST, PLAY_TOUCHES, asked};
 use crate::lti::{PhysicsEntry, Plant};
 use crate::physics::backlash::{Backlash, Contact, FACTS};
 use crate::physics::{Parametric, PlayObserver, Port, Readings, Setting};
@@ -35,8 +35,9 @@ const LOAD_RANGE: [f64; 2] = [0.0, 0.5];
 pub(in crate::diagnose) struct ObservedPlay {
     finding: Finding,
     remark: String,
+    consulted: Vec<Consulted>,
     /// The plant beside it, with the play.
-    pub corrected: Corrected,
+    corrected: Corrected,
 }
 
 /// What a plant leaves of every run in open loop.
@@ -124,10 +125,17 @@ pub(in crate::diagnose) fn observed_play(
     let gain = least(0) - play.deviance;
     let contact = |r: &Readings| play.observer.follow(r, own.sample_time_s).touching * r.rest.len() as f64;
     let touching = own.fit.iter().map(contact).sum::<f64>() / samples;
-    let crossed = touching > PLAY_TOUCHES && touching < 1.0 - PLAY_TOUCHES;
-    let agrees = held == 0.0 || (least(1) - own.held_out(&play.observer)) / held > PLAY_HELD_OUT * gain / samples;
-    let clear = gain > PLAY_LEAST && gain > PLAY_CLEARLY * samples;
-    (clear && crossed && agrees && !own.at_end(play)).then(|| told(data, &best, gain, touching))
+    let crossed = asked!(touching, PLAY_TOUCHES: touching > PLAY_TOUCHES && touching < 1.0 - PLAY_TOUCHES);
+    let agrees = match held == 0.0 {
+        true => true.into(),
+        false => {
+            let by = (least(1) - own.held_out(&play.observer)) / held;
+            asked!(by * samples / gain, PLAY_HELD_OUT: by > PLAY_HELD_OUT * gain / samples)
+        }
+    };
+    let clear = asked!(gain, > PLAY_LEAST) & asked!(gain / samples, PLAY_CLEARLY: gain > PLAY_CLEARLY * samples);
+    let found = clear & crossed & agrees & (!own.at_end(play)).into();
+    found.yes.then(|| ObservedPlay { consulted: found.consulted, ..told(data, &best, gain, touching) })
 }
 
 /// The play as its law has it, with the share of the distance that the encoder reads.
@@ -207,23 +215,22 @@ fn told(data: &DiagnosisData, best: &Found, gain: f64, touching: f64) -> Observe
         "the play was found under an observer that the recorded positions correct: its masses touch {:.0} % of the time and rattle, and no simulation over a whole record repeats that (what stands above of laws on held-out records is of such simulations); a resonance under the same observer is {gain:.0} units of twice the log-likelihood worse",
         100.0 * touching
     );
-    ObservedPlay { finding, remark, corrected }
+    ObservedPlay { finding, remark, consulted: Vec::new(), corrected }
 }
 
 /// Whether a diagnosis leaves room for a play: nothing was named, or a part of the structure.
-pub(in crate::diagnose) fn open_to_play(d: &Diagnosis) -> bool {
-    match d.verdict {
+pub(in crate::diagnose) fn open_to_play(judged: &Judgement) -> bool {
+    match judged.verdict {
         Verdict::LocatedUnexplained | Verdict::Undecidable => true,
-        Verdict::Named | Verdict::Family => d.findings.iter().any(|f| f.port == Port::Structure),
+        Verdict::Named | Verdict::Family => judged.findings.iter().any(|f| f.port == Port::Structure),
         _ => false,
     }
 }
 
 impl ObservedPlay {
-    /// Takes what was found into a diagnosis.
-    pub(in crate::diagnose) fn enter(&self, d: &mut Diagnosis) {
-        d.verdict = Verdict::Named;
-        d.findings = vec![self.finding.clone()];
-        d.remarks.push(self.remark.clone());
+    /// The judgement with it in the place of what was said, and the plant beside it.
+    pub(in crate::diagnose) fn entered(self, judged: Judgement) -> (Judgement, Corrected) {
+        let judged = judged.after(Later::Instead(self.finding), self.consulted).said(Some(self.remark));
+        (judged, self.corrected)
     }
 }

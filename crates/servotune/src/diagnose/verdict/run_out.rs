@@ -4,20 +4,22 @@
 //! In: a diagnosis. Out: the orders, records without them, and a diagnosis that has them. Convention: a run-out adds to the recorded position
 //! and moves nothing; the controller hears it. Spec: `specs/mismatch.md`, "Run-out beside another law".
 
-use super::diagnosed::Diagnosed;
 use super::finding::{Estimate, Finding, Verdict};
-use super::fit_report::figures_of;
+use super::fit_report::{Errors, figures_of};
+use super::judgement::Later;
 use super::localisation::place;
 use super::naming::RUNOUT;
+use super::outcome::Outcome;
 use crate::controller::Law;
 use crate::diagnose::data::linear_form::free_motions;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::fit::corrected_model::entry;
+use crate::diagnose::fit::corrected_model::{Corrected, entry};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::{SimulatedModel, errors, size};
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::noise::lines::{HIGHEST_ORDER, Line, standing_orders};
 use crate::diagnose::noise::repeats::without_start;
+use crate::diagnose::rules::Answer;
 use crate::numeric::digits::said;
 use crate::numeric::least_squares::Qr;
 use crate::physics::repeatable_runout::{FACTS, RepeatableRunout};
@@ -40,10 +42,10 @@ pub(in crate::diagnose) struct RunOut {
 impl RunOut {
     /// The orders that stand out of what the offered model leaves of the fit records in open loop; none where a run-out is named already, or
     /// nothing stands out.
-    pub fn beside(made: &Diagnosed) -> Option<RunOut> {
+    pub fn beside(made: &Outcome) -> Option<RunOut> {
         let data = &made.data;
-        let named = made.diagnosis.findings.iter().any(|f| f.effect == RUNOUT);
-        if named || made.diagnosis.verdict == Verdict::DataFault {
+        let named = made.judgement.findings.iter().any(|f| f.effect == RUNOUT);
+        if named || made.judgement.verdict == Verdict::DataFault {
             return None;
         }
         let left = Left::of(data, &made.open[2])?;
@@ -53,7 +55,7 @@ impl RunOut {
     }
 
     /// The same orders once more, fitted to what is left where they are taken out already.
-    pub fn bettered(&self, made: &Diagnosed) -> Option<RunOut> {
+    pub fn bettered(&self, made: &Outcome) -> Option<RunOut> {
         let more = Left::of(&made.data, &made.open[2])?.fitted(self.orders.clone())?;
         let phasors = self.phasors.iter().zip(&more.phasors).map(|(a, b)| [a[0] + b[0], a[1] + b[1]]).collect();
         Some(RunOut { phasors, gain: self.gain + more.gain, ..more })
@@ -92,28 +94,25 @@ impl RunOut {
         all
     }
 
-    /// The diagnosis of records without it, made one of the records as they are.
-    pub fn entered(&self, mut made: Diagnosed, recorded: &[Run], closed: Option<&Law>) -> Diagnosed {
-        let effects = self.effects(&self.phasors);
-        for (i, setting) in effects.iter().enumerate() {
-            made.diagnosis.findings.push(self.finding(&made.data, i, setting));
-            made.corrected.plant.physics.push(entry(setting, &made.data.scene));
-        }
-        made.corrected.effects.extend(effects);
-        if matches!(made.diagnosis.verdict, Verdict::NoMismatch | Verdict::Refit) {
-            made.diagnosis.verdict = Verdict::Named;
-        }
-        made.diagnosis.remarks.push(
+    /// What was found in records without it, made an outcome of the records as they are; `helps` is the rule by which it stays.
+    pub fn entered(&self, made: Outcome, recorded: &[Run], closed: Option<&Law>, helps: Answer) -> Outcome {
+        let own = self.effects(&self.phasors);
+        let findings = own.iter().enumerate().map(|(i, setting)| self.finding(&made.data, i, setting)).collect();
+        let Corrected { mut plant, effects } = made.corrected;
+        plant.physics.extend(own.iter().map(|setting| entry(setting, &made.data.scene)));
+        let judgement = made.judgement.after(Later::Beside(findings), helps.consulted).said(Some(
             "orders of the spindle stood out of what the first search left; they were taken out of the records, and the rest was searched again".into(),
-        );
+        ));
         // Which of them a push fell into, the search found.
         let known = |(r, found): (&Run, &Run)| Run { shocked: found.shocked, ..r.clone() };
-        made.data.runs = recorded.iter().zip(&made.data.runs).map(known).collect();
-        let every: Vec<&Run> = made.data.runs.iter().collect();
-        let refit = SimulatedModel::of(&made.refitted, &[], &made.data.scene);
-        [made.errors[1], made.open[1]] = [closed, None].map(|law| errors(&refit, &every, law));
-        made.diagnosis.fit = figures_of(&made.data, &every, [&made.open, &made.errors], closed.is_some());
-        made
+        let data = DiagnosisData { runs: recorded.iter().zip(&made.data.runs).map(known).collect(), ..made.data };
+        let every: Vec<&Run> = data.runs.iter().collect();
+        let linear = SimulatedModel::of(&made.refitted, &[], &data.scene);
+        let with_refit = |[given, _, after]: Errors, law| [given, errors(&linear, &every, law), after];
+        let (shown, open) = (with_refit(made.errors, closed), with_refit(made.open, None));
+        let fit = figures_of(&data, &every, [&open, &shown], closed.is_some());
+        let corrected = Corrected { plant, effects: [effects, own].concat() };
+        Outcome { judgement, corrected, fit, errors: shown, open, data, ..made }
     }
 
     fn finding(&self, data: &DiagnosisData, at: usize, setting: &Setting) -> Finding {

@@ -1,8 +1,8 @@
 //! What happened to the linear parameters beside the findings: nothing, the delay alone, the log's clock, or a refit.
 
 use super::clock::Clock;
-use super::diagnosis_json::Diagnosis;
-use super::finding::{Estimate, Finding, Verdict};
+use super::facts::Facts;
+use super::finding::{Estimate, Finding};
 use super::naming::{everywhere, text_of};
 use crate::diagnose::data::linear_form::{FreeParameter, LinearForm, body_numbers};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
@@ -11,12 +11,11 @@ use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_fit::simulated_with;
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::noise::chance::log_tail;
-use crate::diagnose::rules::{COLOURED, FAMILY, LAGS_ALIKE, ONE_NUMBER};
+use crate::diagnose::rules::{FAMILY, LAGS_ALIKE, LINEAR_SIGMAS, LINEAR_SLACK, ONE_NUMBER};
 use crate::diagnose::search::selection::Selection;
-use crate::lti::Plant;
 use crate::physics::amplifier_lag::AmplifierLag;
 use crate::physics::sensor_lag::SensorLag;
-use crate::physics::{AnyLaw, Facts, Parameter, Setting, extra_delay, misalignment};
+use crate::physics::{self, AnyLaw, Parameter, Setting, extra_delay, misalignment};
 use std::collections::BTreeMap;
 
 /// How a restricted model is fitted.
@@ -147,117 +146,141 @@ impl Lag {
     }
 }
 
-/// Whether, no record being repeated, the simulation leaves far more than a noise of the sensor: noise of torque, or missing physics.
-pub(super) fn coloured(d: &Diagnosis, data: &DiagnosisData, noise: f64) -> bool {
-    !data.levels.from_repeats && d.fit.open_loop.is_some_and(|o| o.rms_after > COLOURED * noise)
+/// What became of the linear parameters of the given plant.
+pub(super) enum LinearChange {
+    /// Not looked at.
+    NotAsked,
+    /// They agree.
+    Agree,
+    /// One number does for all of them: a delay or a lag.
+    Alone(Finding),
+    /// The clock of the log does.
+    Clock(Finding),
+    /// They were refitted; says how.
+    Refit(String),
 }
 
-/// What happened to the linear parameters of the `given` plant: nothing, the delay alone, one mode alone, or a refit.
-pub(super) fn linear_verdict(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection, given: &Plant) {
-    if d.verdict == Verdict::LocatedUnexplained || d.verdict == Verdict::DataFault {
-        return;
+impl LinearChange {
+    /// Nothing, the delay alone, a lag or a clock alone, or a refit; `alone` tells that nothing was found beside them.
+    pub fn of(facts: &Facts, alone: bool) -> LinearChange {
+        // Around another plant the given one was far off already.
+        let around = facts.data.form.given == *facts.given;
+        around.then(|| by_one_number(facts, alone)).flatten().unwrap_or_else(|| LinearChange::Refit(said_refit(facts)))
     }
-    // Around another plant the given one was far off already.
-    if data.form.given == *given && simple_story(d, data, selection) {
-        return;
+
+    pub fn is_refit(&self) -> bool {
+        matches!(self, LinearChange::Refit(_))
     }
-    if d.verdict == Verdict::NoMismatch {
-        d.verdict = Verdict::Refit;
+
+    /// What is named by it.
+    pub fn finding(&self) -> Option<&Finding> {
+        if let LinearChange::Alone(f) = self { Some(f) } else { None }
     }
-    let (b0, k0, c0) = body_numbers(&given.body);
-    let refitted = &selection.last().refitted.plant;
-    let (b1, k1, c1) = body_numbers(&refitted.body);
-    d.remarks.push(format!(
+
+    /// The fault of the log's clock.
+    pub fn clock(&self) -> Option<&Finding> {
+        if let LinearChange::Clock(f) = self { Some(f) } else { None }
+    }
+
+    pub fn remark(&self) -> Option<String> {
+        match self {
+            LinearChange::Agree => Some("the linear parameters agree with the given plant".into()),
+            LinearChange::Refit(says) => Some(says.clone()),
+            _ => None,
+        }
+    }
+}
+
+fn said_refit(facts: &Facts) -> String {
+    let given = facts.given;
+    let refitted = &facts.selection.last().refitted.plant;
+    let [(b0, k0, c0), (b1, k1, c1)] = [given, refitted].map(|p| body_numbers(&p.body));
+    format!(
         "linear refit: acceleration gain {b0:.6e} -> {b1:.6e}, stiffness {k0:.6e} -> {k1:.6e} 1/s^2, viscous rate {c0:.4} -> {c1:.4} 1/s, delay {:.3e} -> {:.3e} s",
         given.delay_s, refitted.delay_s
-    ));
+    )
 }
 
-/// Whether the given numbers still do, but for one of them; says which.
-fn simple_story(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection) -> bool {
-    let all = data.form.free_parameters.len() as f64;
-    // Chi-square of as many parameters as were freed, and four of its standard deviations.
-    let allowed = |free: usize| {
-        let n = all - free as f64;
-        n + 5.0 * (2.0 * n).sqrt() + 10.0
-    };
-    let (mut fixed, mut later_s) = (Vec::new(), 0.0);
+/// Most by which the sum of squares may rise where only `free` of `all` linear parameters are fitted, the others being as given.
+fn allowed(all: usize, free: usize) -> f64 {
+    let n = all as f64 - free as f64;
+    n + LINEAR_SIGMAS * (2.0 * n).sqrt() + LINEAR_SLACK
+}
+
+/// Whether the given numbers still do, or all of them but one.
+fn by_one_number(facts: &Facts, alone: bool) -> Option<LinearChange> {
+    let (data, selection) = (facts.data, facts.selection);
+    let all = data.form.free_parameters.len();
+    let mut fixed = Vec::new();
     for way in Way::all(selection) {
         let cost = way.restricted(data, |_| false, None).0;
-        if cost - way.full() < allowed(0) {
-            d.remarks.push("the linear parameters agree with the given plant".into());
-            return true;
+        if cost - way.full() < allowed(all, 0) {
+            return Some(LinearChange::Agree);
         }
         fixed.push(cost);
     }
+    let mut later_s = 0.0;
     for (way, &fixed) in Way::all(selection).zip(&fixed) {
-        let (delay, p) = way.restricted(data, |k| k == FreeParameter::Delay, None);
-        let t = data.scene.sample_time_s;
-        let value = p[0] * t;
-        if delay - way.full() >= allowed(1) {
-            later_s = value;
-            continue;
+        let (cost, p) = way.restricted(data, |k| k == FreeParameter::Delay, None);
+        let value = p[0] * data.scene.sample_time_s;
+        if cost - way.full() < allowed(all, 1) {
+            return Some(LinearChange::Alone(delay_finding(facts, way, value, [fixed, cost])));
         }
-        let sigma = data
-            .form
-            .free_parameters
-            .iter()
-            .position(|k| *k == FreeParameter::Delay)
-            .map_or(0.0, |i| selection.model.refitted.spread(i))
-            * t;
-        let &Facts { name: effect, says, port, .. } = &extra_delay::FACTS;
-        let mut family = vec![effect.to_owned()];
-        if value > 0.0 {
-            family.extend(lags_like(data, way, value, delay));
-        }
-        // Only a controller's replay tells a late log from a late machine.
-        if d.replay.is_none() {
-            family.push(misalignment::FACTS.name.into());
-        }
-        let f = Finding {
-            effect: effect.into(),
-            family,
-            port,
-            p_value: log_tail(fixed - delay, 1).min(0.0).exp().max(1e-300),
-            says: format!("{says}: {:.2} microseconds.", value * 1e6),
-            parameters: BTreeMap::from([(
-                "delay_s".to_owned(),
-                Estimate { value, low: value - 1.96 * sigma, high: value + 1.96 * sigma, unit: "s".into() },
-            )]),
-            place: everywhere(&data.fit_runs.iter().map(|&r| &data.runs[r]).collect::<Vec<_>>()),
-        };
-        if d.verdict == Verdict::NoMismatch {
-            d.verdict = if f.family.len() > 1 { Verdict::Family } else { Verdict::Named };
-        }
-        d.findings.push(f);
-        return true;
+        later_s = value;
     }
-    if d.findings.is_empty() && selection.model.chosen.is_empty() && later_s > 0.0 {
-        let lags = Lag::alone(data, later_s);
-        let width = lags.first().map_or(0.0, |l| FAMILY.max(LAGS_ALIKE * (fixed[0] - l.cost)));
-        let like: Vec<String> =
-            lags.iter().filter(|l| l.cost < lags[0].cost + width).map(|l| l.name().to_owned()).collect();
-        let sure = |l: &&Lag| fixed[0] - l.cost > ONE_NUMBER && l.cost - selection.model.cost < allowed(1);
-        if let Some(lag) = lags.first().filter(sure) {
-            d.verdict = if like.len() > 1 { Verdict::Family } else { Verdict::Named };
-            d.findings.push(lag.finding(data, like, fixed[0]));
-            return true;
-        }
-    }
-    clock_alone(d, data, selection, fixed[0], allowed(1))
+    let alone = alone && selection.model.chosen.is_empty();
+    let lag = (alone && later_s > 0.0).then(|| lag_alone(data, selection, later_s, fixed[0])).flatten();
+    let clock = || alone.then(|| clock_alone(facts, fixed[0])).flatten();
+    lag.map(LinearChange::Alone).or_else(|| clock().map(LinearChange::Clock))
 }
 
-/// Whether a clock that runs wrong explains by one number what all linear numbers do; says it.
-fn clock_alone(d: &mut Diagnosis, data: &DiagnosisData, selection: &Selection, fixed: f64, allowed: f64) -> bool {
+/// The finding of a delay that does for all linear numbers; sums of squares without it and with it.
+fn delay_finding(facts: &Facts, way: Way, value: f64, [fixed, cost]: [f64; 2]) -> Finding {
+    let (data, selection) = (facts.data, facts.selection);
+    let at = data.form.free_parameters.iter().position(|k| *k == FreeParameter::Delay);
+    let sigma = at.map_or(0.0, |i| selection.model.refitted.spread(i)) * data.scene.sample_time_s;
+    let &physics::Facts { name: effect, says, port, .. } = &extra_delay::FACTS;
+    let mut family = vec![effect.to_owned()];
+    if value > 0.0 {
+        family.extend(lags_like(data, way, value, cost));
+    }
+    // Only a controller's replay tells a late log from a late machine.
+    if facts.log_checks.replay.is_none() {
+        family.push(misalignment::FACTS.name.into());
+    }
+    Finding {
+        effect: effect.into(),
+        family,
+        port,
+        p_value: log_tail(fixed - cost, 1).min(0.0).exp().max(1e-300),
+        says: format!("{says}: {:.2} microseconds.", value * 1e6),
+        parameters: BTreeMap::from([(
+            "delay_s".to_owned(),
+            Estimate { value, low: value - 1.96 * sigma, high: value + 1.96 * sigma, unit: "s".into() },
+        )]),
+        place: everywhere(&data.fit_runs.iter().map(|&r| &data.runs[r]).collect::<Vec<_>>()),
+    }
+}
+
+/// A lag that does for all linear numbers.
+fn lag_alone(data: &DiagnosisData, selection: &Selection, later_s: f64, fixed: f64) -> Option<Finding> {
+    let lags = Lag::alone(data, later_s);
+    let lag = lags.first()?;
+    let width = FAMILY.max(LAGS_ALIKE * (fixed - lag.cost));
+    let like = lags.iter().filter(|l| l.cost < lag.cost + width).map(|l| l.name().to_owned()).collect();
+    let allowed = allowed(data.form.free_parameters.len(), 1);
+    let sure = fixed - lag.cost > ONE_NUMBER && lag.cost - selection.model.cost < allowed;
+    sure.then(|| lag.finding(data, like, fixed))
+}
+
+/// A clock that runs wrong and explains by one number what all linear numbers do.
+fn clock_alone(facts: &Facts, fixed: f64) -> Option<Finding> {
     // Where a coloured rest hides what tells gain, damping and frequency apart, one number does as well as all of them by chance.
-    if !d.findings.is_empty() || !selection.model.chosen.is_empty() || coloured(d, data, data.levels.sensor_rms) {
-        return false;
+    if facts.coloured_rest().yes {
+        return None;
     }
-    let clock = Clock::of(data, fixed);
-    let alone = clock.sure() && clock.cost - selection.model.cost < allowed;
-    if alone {
-        d.verdict = Verdict::DataFault;
-        d.findings.push(clock.finding(data));
-    }
-    alone
+    let clock = Clock::of(facts.data, fixed);
+    let allowed = allowed(facts.data.form.free_parameters.len(), 1);
+    let alone = clock.sure() && clock.cost - facts.selection.model.cost < allowed;
+    alone.then(|| clock.finding(facts.data))
 }

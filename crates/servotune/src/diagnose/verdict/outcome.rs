@@ -1,0 +1,127 @@
+//! What a search of a case came to: each later step makes a new one of it, and the diagnosis is built of the last.
+
+use super::confirmation::Confirmation;
+use super::diagnosed::Diagnosed;
+use super::diagnosis_json::Diagnosis;
+use super::finding::{FitFigures, FitReport, NextExperiment, Tried, Verdict};
+use super::fit_report::{Errors, figures_of};
+use super::held_out::{HeldOut, mean};
+use super::judgement::Judgement;
+use super::log_checks::LogChecks;
+use crate::diagnose::data::run::Run;
+use crate::diagnose::fit::corrected_model::Corrected;
+use crate::diagnose::fit::coupling::Coupling;
+use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::simulation::rms;
+use crate::diagnose::free_form::curve::FreeForm;
+use crate::diagnose::rules::{Answer, NAME_FAR, asked};
+use crate::diagnose::search::selection::Selection;
+use crate::lti::Plant;
+
+/// What a search came to.
+pub(in crate::diagnose) struct Outcome {
+    pub judgement: Judgement,
+    pub next_experiment: NextExperiment,
+    pub free_form: Option<FreeForm>,
+    pub fit: FitReport,
+    /// Recorded less simulated position of every run under given plant, refit and corrected model: as the report shows it, and in open loop.
+    pub errors: Errors,
+    pub open: Errors,
+    pub corrected: Corrected,
+    pub refitted: Plant,
+    pub held_out: Vec<HeldOut>,
+    pub confirmed: Vec<Confirmation>,
+    pub data: DiagnosisData,
+    pub selection: Selection,
+}
+
+/// Error (rms, position_unit) of the records that judge, out of those of all.
+pub(in crate::diagnose) fn judged(data: &DiagnosisData, errors: &[Vec<f64>]) -> f64 {
+    rms(&data.judging().iter().map(|&i| errors[i].clone()).collect::<Vec<_>>())
+}
+
+impl Outcome {
+    /// Error (rms, position_unit) that the corrected model leaves of the records that judge.
+    pub fn judged(&self) -> f64 {
+        judged(&self.data, &self.errors[2])
+    }
+
+    /// The figures that count.
+    pub fn figures(&self) -> FitFigures {
+        self.fit.holdout.unwrap_or(self.fit.fit)
+    }
+
+    /// Whether names stand that leave several times what repeats differ by.
+    pub fn named_far_from_noise(&self) -> Answer {
+        let f = self.figures();
+        let named = matches!(self.judgement.verdict, Verdict::Named | Verdict::Family);
+        Answer::from(named && self.data.levels.from_repeats)
+            & asked!(f.rms_after / f.noise_floor, NAME_FAR: f.rms_after > NAME_FAR * f.noise_floor)
+    }
+
+    /// The same with another corrected model and its errors: as the report shows them, in open loop.
+    pub fn corrected_by(self, corrected: Corrected, errors: [Vec<Vec<f64>>; 2], closed: bool) -> Outcome {
+        let [after, open_after] = errors;
+        let ([given, refit, _], [open_given, open_refit, _]) = (self.errors, self.open);
+        let (errors, open) = ([given, refit, after], [open_given, open_refit, open_after]);
+        let every: Vec<&Run> = self.data.runs.iter().collect();
+        let fit = figures_of(&self.data, &every, [&open, &errors], closed);
+        Outcome { corrected, errors, open, fit, ..self }
+    }
+
+    /// The diagnosis of a case.
+    pub fn diagnosed(self, id: &str, log_checks: &LogChecks, coupling: &[Coupling]) -> Diagnosed {
+        let (selection, all) = (&self.selection, self.data.stack.total as f64);
+        let diagnosis = Diagnosis {
+            schema: "servotune.diagnosis/1",
+            id: id.into(),
+            verdict: self.judgement.verdict,
+            findings: self.judgement.findings,
+            fit: self.fit,
+            free_form: self.free_form,
+            corrected_model: None,
+            next_experiment: self.next_experiment,
+            noise: self.data.levels,
+            replay: log_checks.replay.clone(),
+            sample_faults: log_checks.faults.clone(),
+            whitened: [selection.given / all, selection.baseline.cost / all, selection.best().cost / all],
+            holdout_whitened: mean(&self.held_out),
+            held_out: self.held_out,
+            confirmed: self.confirmed,
+            leftover: selection.leftover.clone(),
+            coupling: coupling.to_vec(),
+            remarks: self.judgement.remarks,
+            search: tried(selection),
+            bootstrap: selection.bootstrap.clone(),
+        };
+        Diagnosed {
+            diagnosis,
+            consulted: self.judgement.consulted,
+            data: self.data,
+            selection: self.selection,
+            corrected: self.corrected,
+            refitted: self.refitted,
+            errors: self.errors,
+            open: self.open,
+        }
+    }
+}
+
+/// The search, line by line.
+fn tried(selection: &Selection) -> Vec<Tried> {
+    let mut all = Vec::new();
+    for (i, step) in selection.steps.iter().enumerate() {
+        for (j, c) in step.candidates.iter().enumerate().take(12) {
+            let tried = step.tried.iter().position(|t| t.0 == j);
+            all.push(Tried {
+                effect: c.setting.facts().name.into(),
+                step: i + 1,
+                screened: c.gain,
+                concealed: c.concealed,
+                error_after: tried.map(|t| step.tried[t].1.cost / (step.tried[t].1.freedom)),
+                taken: tried.is_some() && tried == step.taken,
+            });
+        }
+    }
+    all
+}
