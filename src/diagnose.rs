@@ -1,7 +1,7 @@
 //! `servotune diagnose`: a case folder, or records straight from CSV files, to a diagnosis.
 
 use super::diagnose_arguments::DiagnoseArguments;
-use super::{Ending, Failure, Screen, diagnose_rules, load};
+use super::{Ending, Failure, Screen, diagnose_effects, diagnose_rules, load};
 use servotune::diagnose::{Coupling, DiagnoseSettings, Diagnosis, Rule, decision_rules, diagnose};
 use servotune::document::{FileSet, check_target};
 use servotune::gate::features::csv_field;
@@ -77,6 +77,10 @@ pub(super) fn run(a: &DiagnoseArguments, screen: &mut Screen) -> Result<Ending, 
     if a.rules {
         let rules: Vec<&Rule> = decision_rules().collect();
         screen.result(&rules, &diagnose_rules::text(&rules))?;
+        return Ok(Ending::Accepted);
+    }
+    if a.effects {
+        screen.result(&diagnose_effects::document(), &diagnose_effects::text())?;
         return Ok(Ending::Accepted);
     }
     let (diagnosis, text) = make(a, screen)?;

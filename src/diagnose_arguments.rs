@@ -13,6 +13,7 @@ use std::path::PathBuf;
   servotune diagnose --plant axis.toml --record lap.csv.gz --columns time=t_s,reference=qg_m,position=qm_m,command=vir_V --rows 0:12480 --holdout-rows 12480:24841 --out axis
   servotune diagnose --plant box.toml --record box.csv.gz --columns position=V2_V,command=V1_V --sample-rate-hz 610.35 --rows 40650:105712 --holdout-rows 105712:127400 --out box
   servotune diagnose --rules
+  servotune diagnose --effects
 
 CASE_DIR holds case.toml. Written: diagnosis.json, plant_corrected.toml where the model changed, report.html,
 coupling.csv where `further_inputs` of case.toml move the position (impulse responses over time).
@@ -58,13 +59,16 @@ pub(super) struct DiagnoseArguments {
     /// Print the decision rules of the diagnosis, and do nothing else
     #[arg(long, group = "records", conflicts_with_all = ["case", "record"])]
     pub rules: bool,
+    /// Print the catalogue of effects: laws, keys, ranges, experiments, sources, and do nothing else
+    #[arg(long, group = "records", conflicts_with_all = ["case", "record", "rules"])]
+    pub effects: bool,
     /// Folder to write to
     #[arg(
         long,
         value_name = "DIR",
         required = false,
-        required_unless_present = "rules",
-        default_value_if("rules", "true", ".")
+        required_unless_present_any = ["rules", "effects"],
+        default_value_ifs([("rules", "true", "."), ("effects", "true", ".")])
     )]
     pub out: PathBuf,
 }
@@ -86,6 +90,7 @@ impl DiagnoseArguments {
             spindle_hz: None,
             bootstrap: 0,
             rules: false,
+            effects: false,
             out,
         }
     }

@@ -17,6 +17,7 @@ mod demo_fleet;
 mod demo_gate;
 mod diagnose;
 mod diagnose_arguments;
+mod diagnose_effects;
 mod diagnose_rules;
 mod ending;
 mod export;

@@ -34,7 +34,7 @@ enum Swept {
 }
 
 /// Pages that say what every key means.
-const PAGES: [(&str, &str); 10] = [
+const PAGES: [(&str, &str); 11] = [
     ("specs/keys.md", include_str!("../specs/keys.md")),
     ("specs/files.md", include_str!("../specs/files.md")),
     ("specs/tuning.md", include_str!("../specs/tuning.md")),
@@ -45,6 +45,7 @@ const PAGES: [(&str, &str); 10] = [
     ("specs/pes.md", include_str!("../specs/pes.md")),
     ("specs/certificate.md", include_str!("../specs/certificate.md")),
     ("specs/mismatch.md", include_str!("../specs/mismatch.md")),
+    ("specs/effects.md", include_str!("../specs/effects.md")),
 ];
 
 impl Starter {

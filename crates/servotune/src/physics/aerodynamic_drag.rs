@@ -3,12 +3,15 @@
 //! tau = -c v |v|; the mean over an interval by Simpson's rule, velocity taken as straight.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::Key;
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
 /// Its strength is the drag coefficient.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AerodynamicDrag;
+
+const COEFFICIENT: Key = Key::new("coefficient", Unit::CommandSecondSquaredPerPositionSquared, "c");
 
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
@@ -19,6 +22,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "tau = -c v |v|",
+    keys: &[COEFFICIENT],
+    source: "S. F. Hoerner, Fluid-Dynamic Drag, 1965",
     says: "the air holds the arm back at high speed: twice the speed, four times the drag",
     confused_with: &["coulomb_friction", "linear_parameters", "current_saturation"],
     experiment: "constant-velocity moves in both directions at six speeds over two decades",
@@ -56,7 +61,7 @@ impl Parametric for AerodynamicDrag {
     }
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![Parameter::new("coefficient", strengths[0], Unit::CommandSecondSquaredPerPositionSquared)]
+        vec![COEFFICIENT.at(strengths[0])]
     }
 
     fn is_possible(&self, strengths: &[f64], _errors: &[f64]) -> bool {
@@ -64,6 +69,6 @@ impl Parametric for AerodynamicDrag {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(AerodynamicDrag, Vec<f64>), PhysicsError> {
-        Ok((AerodynamicDrag, vec![given.need("coefficient")?]))
+        Ok((AerodynamicDrag, vec![given.need(&COEFFICIENT)?]))
     }
 }

@@ -13,6 +13,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "f_seen = |f - n f_s|, f above half the sample rate",
+    keys: &[],
+    source: "G. F. Franklin, J. D. Powell, M. L. Workman, Digital Control of Dynamic Systems, 3rd edition, 1998",
     says: "a vibration above half the sample rate shows at a wrong, lower frequency",
     confused_with: &["unmodelled_resonance", "line_disturbance"],
     experiment: "the same move with the sample rate changed by 1 to 2 %: an alias moves by n times the change",

@@ -3,6 +3,7 @@
 //! tau i' = u - i with u held between samples; i(t) = u + (i0 - u) exp(-t/tau), and what acts is its mean over the interval.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::{Bound, Key, Measure, Prior};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use super::share::Share;
@@ -16,6 +17,15 @@ pub struct AmplifierLag {
     pub time_constant_s: f64,
 }
 
+const TIME_CONSTANT_S: Key = Key::new("time_constant_s", Unit::Second, "time constant")
+    .unless(&["bandwidth_hz"])
+    .positive()
+    .scan(Bound::At(0.1, Measure::Sample), Bound::At(20.0, Measure::Sample));
+const BANDWIDTH_HZ: Key = Key::new("bandwidth_hz", Unit::Hertz, "1/(2 pi time_constant_s)")
+    .unless(&["time_constant_s"])
+    .positive()
+    .prior(Prior::Words("made from the time constant"));
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "amplifier_lag",
@@ -25,6 +35,8 @@ pub static FACTS: Facts = Facts {
     fixed: true,
     per_record: false,
     equation: "tau i' = u - i, u held between samples; the mean of i over each interval acts",
+    keys: &[TIME_CONSTANT_S, BANDWIDTH_HZ],
+    source: "G. F. Franklin, J. D. Powell, M. L. Workman, Digital Control of Dynamic Systems, 3rd edition, 1998",
     says: "the amplifier follows its command with a lag: high frequencies come late and weaker",
     confused_with: &["extra_delay", "sensor_lag", "linear_parameters", "slew_limit"],
     experiment: "a multisine up to half the sample rate: a lag weakens the top of the band, a delay does not",
@@ -76,10 +88,7 @@ impl Parametric for AmplifierLag {
     }
 
     fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![
-            Parameter::new("time_constant_s", self.time_constant_s, Unit::Second),
-            Parameter::new("bandwidth_hz", 1.0 / (TAU * self.time_constant_s), Unit::Hertz),
-        ]
+        vec![TIME_CONSTANT_S.at(self.time_constant_s), BANDWIDTH_HZ.at(1.0 / (TAU * self.time_constant_s))]
     }
 
     fn response_share(&self, _strengths: &[f64], scene: &Scene, w_rad_s: f64) -> Share {
@@ -91,10 +100,10 @@ impl Parametric for AmplifierLag {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(AmplifierLag, Vec<f64>), PhysicsError> {
-        let time_constant_s = if given.has("time_constant_s") {
-            given.positive("time_constant_s")?
+        let time_constant_s = if given.has(&TIME_CONSTANT_S) {
+            given.need(&TIME_CONSTANT_S)?
         } else {
-            1.0 / (TAU * given.positive("bandwidth_hz")?)
+            1.0 / (TAU * given.need(&BANDWIDTH_HZ)?)
         };
         Ok((AmplifierLag { time_constant_s }, vec![1.0]))
     }

@@ -9,6 +9,7 @@
 //! the inertia, behind the play -(1 - s) e.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Bound, Key, Measure, Prior, Takes};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use super::share::Share;
@@ -37,6 +38,32 @@ pub struct Contact {
     pub drive: f64,
 }
 
+const GAP: Key = Key::new("gap", Unit::Position, "g")
+    .positive()
+    .scan(Bound::Greatest(&[(0.1, Measure::Noise), (1e-5, Measure::Travel)]), Bound::At(1.0, Measure::Travel));
+const CONTACT_HZ: Key = Key::new("contact_hz", Unit::Hertz, "the two masses against one another in contact")
+    .or_else("a rigid contact")
+    .positive()
+    .scan(Bound::At(CONTACTS[0], Measure::SampleRate), Bound::At(CONTACTS[1], Measure::SampleRate));
+const DAMPING_RATIO: Key =
+    Key::new("damping_ratio", Unit::Ratio, "damping ratio there; the last fit moves it between 0.001 and 0.5")
+        .or(DAMPING)
+        .beside("contact_hz")
+        .points(&[DAMPING]);
+const LOAD_SHARE: Key = Key::new("load_share", Unit::Ratio, "share of the load in the inertia, s")
+    .or(LOAD)
+    .beside("contact_hz")
+    .takes(Takes::Between(0.0, 1.0, "a number between 0 and 1"));
+const DRIVE_RATIO: Key = Key::new("drive_ratio", Unit::Ratio, "whole inertia over the driven one, d")
+    .or_else("1/(1 - load_share)")
+    .beside("contact_hz")
+    .points(&DRIVES);
+const ENCODER_BEHIND: Key =
+    Key::new("encoder_behind", Unit::Ratio, "0: the encoder sits on the driven mass; else behind the play")
+        .or(0.0)
+        .beside("contact_hz")
+        .prior(Prior::Words("the sign of the strength"));
+
 const fn play(fixed: bool, equation: &'static str) -> Facts {
     Facts {
         name: "backlash",
@@ -46,6 +73,8 @@ const fn play(fixed: bool, equation: &'static str) -> Facts {
         fixed,
         per_record: false,
         equation,
+        keys: &[GAP, CONTACT_HZ, DAMPING_RATIO, LOAD_SHARE, DRIVE_RATIO, ENCODER_BEHIND],
+        source: "M. A. Krasnoselskii, A. V. Pokrovskii, Systems with Hysteresis, 1989; the contact: M. Nordin, P.-O. Gutman, Controlling Mechanical Systems with Backlash: a Survey, Automatica 38(10), 2002",
         says: "there is play between the arm and the part it pushes: after each reversal the part waits until the gap is crossed",
         confused_with: &["coulomb_friction", "pivot_friction", "quantisation", "unmodelled_resonance"],
         experiment: "slow triangles of three sizes with the PES and the encoder recorded: the PES stops at reversals",
@@ -246,15 +275,15 @@ impl Parametric for Backlash {
     }
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        let mut all = vec![Parameter::new("gap", self.gap, Unit::Position)];
+        let mut all = vec![GAP.at(self.gap)];
         if let Some(c) = self.contact {
             let read = strengths.first().copied().unwrap_or(0.0);
             let behind = f64::from(read < 0.0);
-            all.push(Parameter::new("contact_hz", c.hz, Unit::Hertz));
-            all.push(Parameter::new("damping_ratio", c.damping_ratio, Unit::Ratio));
-            all.push(Parameter::new("load_share", behind + read, Unit::Ratio));
-            all.push(Parameter::new("drive_ratio", c.drive, Unit::Ratio));
-            all.push(Parameter::new("encoder_behind", behind, Unit::Ratio));
+            all.push(CONTACT_HZ.at(c.hz));
+            all.push(DAMPING_RATIO.at(c.damping_ratio));
+            all.push(LOAD_SHARE.at(behind + read));
+            all.push(DRIVE_RATIO.at(c.drive));
+            all.push(ENCODER_BEHIND.at(behind));
         }
         all
     }
@@ -278,19 +307,16 @@ impl Parametric for Backlash {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(Backlash, Vec<f64>), PhysicsError> {
-        let gap = given.positive("gap")?;
-        if !given.has("contact_hz") {
+        let gap = given.need(&GAP)?;
+        if !given.has(&CONTACT_HZ) {
             return Ok((Backlash { gap, contact: None }, vec![1.0]));
         }
-        let share = match given.has("load_share") {
-            true => given.between("load_share", 0.0, 1.0, "a number between 0 and 1")?,
-            false => LOAD,
-        };
-        let behind = given.or("encoder_behind", 0.0) != 0.0;
+        let share = given.or(&LOAD_SHARE)?;
+        let behind = given.or(&ENCODER_BEHIND)? != 0.0;
         let contact = Contact {
-            hz: given.positive("contact_hz")?,
-            damping_ratio: given.or("damping_ratio", DAMPING),
-            drive: given.or("drive_ratio", 1.0 / (1.0 - share)),
+            hz: given.need(&CONTACT_HZ)?,
+            damping_ratio: given.or(&DAMPING_RATIO)?,
+            drive: given.or_else(&DRIVE_RATIO, 1.0 / (1.0 - share))?,
         };
         Ok((Backlash { gap, contact: Some(contact) }, vec![if behind { share - 1.0 } else { share }]))
     }

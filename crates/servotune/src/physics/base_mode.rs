@@ -3,6 +3,7 @@
 //! Base: x_b'' + 2 z w x_b' + w² x_b = -R i; m = x - x_b, so m = x + g w²/(s² + 2 z w s + w²) i with g = R/w².
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::{Bound, Key, Measure, Takes};
 use super::parameter::{Parameter, Unit};
 use super::sample::Scene;
 use super::share::Share;
@@ -18,6 +19,15 @@ pub struct BaseMode {
     pub damping_ratio: f64,
 }
 
+const FREQUENCY_HZ: Key = Key::new("frequency_hz", Unit::Hertz, "natural frequency")
+    .positive()
+    .scan(Bound::At(3.0, Measure::One), Bound::Least(&[(80.0, Measure::One), (0.2, Measure::SampleRate)]));
+const DAMPING_RATIO: Key =
+    Key::new("damping_ratio", Unit::Ratio, "damping ratio; refined from a third of the first up, below 0.3")
+        .takes(Takes::Between(0.0, 1.0, "above 0 and below 1"))
+        .points(&[0.01, 0.05, 0.15]);
+const STATIC_GAIN: Key = Key::new("static_gain", Unit::PositionPerCommand, "g");
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "base_mode",
@@ -27,6 +37,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "m = x + g w^2/(s^2 + 2 z w s + w^2) i, w within 3 to 80 Hz",
+    keys: &[FREQUENCY_HZ, DAMPING_RATIO, STATIC_GAIN],
+    source: "E. I. Rivin, Passive Vibration Isolation, 2003",
     says: "the whole machine rocks on its feet when the arm is pushed, and rings on after the move",
     confused_with: &["unmodelled_resonance", "pivot_friction", "linear_parameters", "line_disturbance"],
     experiment: "a hard move, then half a second of rest: the base rings on; the same from a neighbouring slot",
@@ -75,11 +87,7 @@ impl Parametric for BaseMode {
     }
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![
-            Parameter::new("frequency_hz", self.frequency_hz, Unit::Hertz),
-            Parameter::new("damping_ratio", self.damping_ratio, Unit::Ratio),
-            Parameter::new("static_gain", strengths[0], Unit::PositionPerCommand),
-        ]
+        vec![FREQUENCY_HZ.at(self.frequency_hz), DAMPING_RATIO.at(self.damping_ratio), STATIC_GAIN.at(strengths[0])]
     }
 
     fn response_share(&self, strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
@@ -87,8 +95,8 @@ impl Parametric for BaseMode {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(BaseMode, Vec<f64>), PhysicsError> {
-        let damping = given.between("damping_ratio", 0.0, 1.0, "above 0 and below 1")?;
-        let strengths = vec![given.need("static_gain")?];
-        Ok((BaseMode::at([given.positive("frequency_hz")?, damping]), strengths))
+        let damping = given.need(&DAMPING_RATIO)?;
+        let strengths = vec![given.need(&STATIC_GAIN)?];
+        Ok((BaseMode::at([given.need(&FREQUENCY_HZ)?, damping]), strengths))
     }
 }

@@ -5,6 +5,7 @@
 //! smallest one is no new move.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Bound, Key, Measure, Prior};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
@@ -19,6 +20,17 @@ pub struct BearingBias {
     pub shortest_move: f64,
 }
 
+const BIAS_COMMAND: Key = Key::new("bias_command", Unit::Command, "largest bias, B");
+const CRITICAL_LENGTH: Key = Key::new("critical_length", Unit::Position, "move beyond which the bias grows no further")
+    .positive()
+    .scan(Bound::At(0.15, Measure::Travel), Bound::At(1.5, Measure::Travel));
+const RELAXATION_TIME_S: Key = Key::new("relaxation_time_s", Unit::Second, "time constant of the bias")
+    .positive()
+    .scan(Bound::At(0.01, Measure::Record), Bound::At(3.0, Measure::Record));
+const SHORTEST_MOVE: Key = Key::new("shortest_move", Unit::Position, "way back that begins a new move")
+    .or_else("max(6 noise, 0.0001 travel)")
+    .prior(Prior::Words("max(6 noise, 0.0001 travel), 5 and 25 times that, up to 0.1 travel"));
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "bearing_bias",
@@ -28,6 +40,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "tau = -b, b' = -(b - B sat(L/L_c) sgn(last move))/tau_b",
+    keys: &[BIAS_COMMAND, CRITICAL_LENGTH, RELAXATION_TIME_S, SHORTEST_MOVE],
+    source: "M. T. Helmick, W. C. Messner, C. F. Higgs, on pivot bias and lubrication, Microsystem Technologies, 2008",
     says: "after a long move the bearing pulls the arm back for a while; after a short one it does so less",
     confused_with: &["cable_spring", "pivot_friction", "offset_drift"],
     experiment: "the same target reached by moves of five lengths from both sides, then half a second of rest",
@@ -130,10 +144,10 @@ impl Parametric for BearingBias {
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("bias_command", strengths[0], Unit::Command),
-            Parameter::new("critical_length", self.critical_length, Unit::Position),
-            Parameter::new("relaxation_time_s", self.relaxation_time_s, Unit::Second),
-            Parameter::new("shortest_move", self.shortest_move, Unit::Position),
+            BIAS_COMMAND.at(strengths[0]),
+            CRITICAL_LENGTH.at(self.critical_length),
+            RELAXATION_TIME_S.at(self.relaxation_time_s),
+            SHORTEST_MOVE.at(self.shortest_move),
         ]
     }
 
@@ -143,10 +157,9 @@ impl Parametric for BearingBias {
     }
 
     fn setting_of(given: &Given, scene: &Scene) -> Result<(BearingBias, Vec<f64>), PhysicsError> {
-        let shortest_move = given.or("shortest_move", (6.0 * scene.noise).max(1e-4 * scene.travel));
-        let (critical_length, relaxation_time_s) =
-            (given.positive("critical_length")?, given.positive("relaxation_time_s")?);
+        let shortest_move = given.or_else(&SHORTEST_MOVE, (6.0 * scene.noise).max(1e-4 * scene.travel))?;
+        let (critical_length, relaxation_time_s) = (given.need(&CRITICAL_LENGTH)?, given.need(&RELAXATION_TIME_S)?);
         let law = BearingBias { critical_length, relaxation_time_s, shortest_move };
-        Ok((law, vec![given.need("bias_command")?]))
+        Ok((law, vec![given.need(&BIAS_COMMAND)?]))
     }
 }

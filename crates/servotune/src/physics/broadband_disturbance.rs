@@ -13,6 +13,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "tau = H(s) n, n white",
+    keys: &[],
+    source: "D. Abramovitch, T. Hurst, D. Henze, An Overview of the PES Pareto Method for Decomposing Baseline Noise Sources in Hard Disk Position Error Signals, IEEE Transactions on Magnetics 34(1), 1998",
     says: "an uneven push without a pattern acts on the arm, such as moving air",
     confused_with: &["encoder_noise", "line_disturbance"],
     experiment: "rest with the loop closed, disk spinning and disk stopped",

@@ -5,6 +5,7 @@
 //! is the creep and the curvature. A free inertia has no spring of its own, so there creep time 0 stands for the plain one.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Bound, Key, Measure, Prior};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use crate::lti::Body;
@@ -18,6 +19,16 @@ pub struct CableSpring {
     pub centre: f64,
 }
 
+const STIFFNESS: Key = Key::new("stiffness", Unit::CommandPerPosition, "k");
+const QUADRATIC: Key = Key::new("quadratic", Unit::CommandPerPositionSquared, "k2").or(0.0);
+const CREEP_TIME_S: Key =
+    Key::new("creep_time_s", Unit::Second, "time constant of the creep; 0 for none, which is tried on a free inertia")
+        .or(0.0)
+        .scan(Bound::At(20.0, Measure::Sample), Bound::At(2.0, Measure::Record));
+const CENTRE: Key = Key::new("centre", Unit::Position, "where it does not pull, x0")
+    .or_else("the middle of the stroke")
+    .prior(Prior::Words("the middle of the positions"));
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "cable_spring",
@@ -27,6 +38,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "tau = -k (x - x_c) - k2 (x - x0)^2, x_c' = (x - x_c)/tau_c (creep); k (x - x0) without creep",
+    keys: &[STIFFNESS, QUADRATIC, CREEP_TIME_S, CENTRE],
+    source: "W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976; A. Al Mamun, G. Guo, C. Bi, Hard Disk Drive: Mechatronics and Control, 2007",
     says: "the cable pulls on the arm like a spring that slowly gives way",
     confused_with: &["nonlinear_spring", "pivot_friction", "offset_drift", "linear_parameters", "bearing_bias"],
     experiment: "a staircase of long dwells over the stroke, upwards and downwards",
@@ -102,10 +115,10 @@ impl Parametric for CableSpring {
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         vec![
-            Parameter::new("stiffness", strengths[0], Unit::CommandPerPosition),
-            Parameter::new("quadratic", strengths[1], Unit::CommandPerPositionSquared),
-            Parameter::new("creep_time_s", self.creep_time_s.unwrap_or(0.0), Unit::Second),
-            Parameter::new("centre", self.centre, Unit::Position),
+            STIFFNESS.at(strengths[0]),
+            QUADRATIC.at(strengths[1]),
+            CREEP_TIME_S.at(self.creep_time_s.unwrap_or(0.0)),
+            CENTRE.at(self.centre),
         ]
     }
 
@@ -115,8 +128,8 @@ impl Parametric for CableSpring {
     }
 
     fn setting_of(given: &Given, scene: &Scene) -> Result<(CableSpring, Vec<f64>), PhysicsError> {
-        let creep_time_s = Some(given.or("creep_time_s", 0.0)).filter(|tau| *tau > 0.0);
-        let law = CableSpring { creep_time_s, centre: given.or("centre", scene.centre) };
-        Ok((law, vec![given.need("stiffness")?, given.or("quadratic", 0.0)]))
+        let creep_time_s = Some(given.or(&CREEP_TIME_S)?).filter(|tau| *tau > 0.0);
+        let law = CableSpring { creep_time_s, centre: given.or_else(&CENTRE, scene.centre)? };
+        Ok((law, vec![given.need(&STIFFNESS)?, given.or(&QUADRATIC)?]))
     }
 }

@@ -13,6 +13,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "u_rec - C(r - m) != 0",
+    keys: &[],
+    source: "U. Forssell, L. Ljung, Closed-Loop Identification Revisited, Automatica 35(7), 1999",
     says: "the controller that ran is not the one in the file",
     confused_with: &["linear_parameters"],
     experiment: "none: replaying the log through the controller file decides",

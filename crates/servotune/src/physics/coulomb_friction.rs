@@ -6,6 +6,7 @@
 //! viscous part belongs to the linear plant; a mean offset belongs to the torque offset.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Bound, Key, Measure};
 use super::parameter::{Parameter, Unit};
 use super::pivot_friction::{SLID, dahl, shortest_loop};
 use super::sample::{Sample, Scene, logarithmic};
@@ -43,6 +44,29 @@ pub struct Stribeck {
     pub rise: f64,
 }
 
+const LEVEL_COMMAND: Key = Key::new("level_command", Unit::Command, "drag at speed, F");
+const SLIDING_LENGTH: Key = Key::new("sliding_length", Unit::Position, "way over which the drag turns round")
+    .or_else("max(6 noise, 0.00001 travel)")
+    .positive()
+    .scan(
+        Bound::Greatest(&[(1.5, Measure::Noise), (3e-6, Measure::Travel)]),
+        Bound::Greatest(&[(12.0, Measure::Noise), (2e-3, Measure::Travel)]),
+    );
+const CREEP_SPEED: Key = Key::new(
+    "creep_speed",
+    Unit::PositionPerSecond,
+    "speed over which the drag of a film turns round, in place of the length",
+)
+.or_else("it sticks")
+.positive()
+.scan(Bound::At(1e-3, Measure::Speed), Bound::At(0.3, Measure::Speed));
+const STRIBECK_SPEED: Key = Key::new("stribeck_speed", Unit::PositionPerSecond, "speed over which the rise falls off")
+    .or_else("no rise")
+    .positive()
+    .scan(Bound::At(0.015, Measure::Speed), Bound::At(0.2, Measure::Speed));
+const STRIBECK_RISE: Key =
+    Key::new("stribeck_rise", Unit::Ratio, "rise at rest over the level").beside("stribeck_speed").points(&[0.5]);
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "coulomb_friction",
@@ -52,6 +76,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "tau = -F (1 + rise exp(-(v/v_s)^2)) z, dz/dx = (1 - sgn(dx) z)/length (sgn(v) once sliding); of a film z = tanh(v/v_c)",
+    keys: &[LEVEL_COMMAND, SLIDING_LENGTH, CREEP_SPEED, STRIBECK_SPEED, STRIBECK_RISE],
+    source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, A Survey of Models, Analysis Tools and Compensation Methods for the Control of Machines with Friction, Automatica 30(7), 1994",
     says: "the arm drags with the same force at every speed, and the force turns round with the motion",
     confused_with: &["pivot_friction", "backlash", "dead_band", "torque_ripple"],
     experiment: "constant-velocity moves in both directions at six speeds over two decades",
@@ -206,15 +232,15 @@ impl Parametric for CoulombFriction {
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         let mut all = vec![
-            Parameter::new("level_command", strengths[0], Unit::Command),
+            LEVEL_COMMAND.at(strengths[0]),
             match self.turning {
-                Turning::Length { sliding_length } => Parameter::new("sliding_length", sliding_length, Unit::Position),
-                Turning::Creep { speed } => Parameter::new("creep_speed", speed, Unit::PositionPerSecond),
+                Turning::Length { sliding_length } => SLIDING_LENGTH.at(sliding_length),
+                Turning::Creep { speed } => CREEP_SPEED.at(speed),
             },
         ];
         if let Some(Stribeck { speed, rise }) = self.stribeck {
-            all.push(Parameter::new("stribeck_speed", speed, Unit::PositionPerSecond));
-            all.push(Parameter::new("stribeck_rise", rise, Unit::Ratio));
+            all.push(STRIBECK_SPEED.at(speed));
+            all.push(STRIBECK_RISE.at(rise));
         }
         all
     }
@@ -229,17 +255,16 @@ impl Parametric for CoulombFriction {
     }
 
     fn setting_of(given: &Given, scene: &Scene) -> Result<(CoulombFriction, Vec<f64>), PhysicsError> {
-        let turning = if given.has("creep_speed") {
-            Turning::Creep { speed: given.positive("creep_speed")? }
-        } else if given.has("sliding_length") {
-            Turning::Length { sliding_length: given.positive("sliding_length")? }
+        let turning = if let Some(speed) = given.get(&CREEP_SPEED)? {
+            Turning::Creep { speed }
         } else {
-            Turning::Length { sliding_length: (6.0 * scene.noise).max(1e-5 * scene.travel) }
+            let dry = (6.0 * scene.noise).max(1e-5 * scene.travel);
+            Turning::Length { sliding_length: given.or_else(&SLIDING_LENGTH, dry)? }
         };
         let rising = given
-            .has("stribeck_speed")
-            .then(|| Ok(Stribeck { speed: given.positive("stribeck_speed")?, rise: given.need("stribeck_rise")? }));
+            .has(&STRIBECK_SPEED)
+            .then(|| Ok(Stribeck { speed: given.need(&STRIBECK_SPEED)?, rise: given.need(&STRIBECK_RISE)? }));
         let law = CoulombFriction { turning, stribeck: rising.transpose()? };
-        Ok((law, vec![given.need("level_command")?]))
+        Ok((law, vec![given.need(&LEVEL_COMMAND)?]))
     }
 }

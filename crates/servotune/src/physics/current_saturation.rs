@@ -4,6 +4,7 @@
 //! their slopes.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Bound, Key, Measure, Takes};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
@@ -20,6 +21,14 @@ pub struct CurrentSaturation {
 const KNEES: [f64; 3] = [0.04, 0.1, 0.25];
 const WIDEST: f64 = 1.0;
 
+const LIMIT: Key = Key::new("limit", Unit::Command, "largest current, as a command")
+    .positive()
+    .scan(Bound::At(0.115, Measure::Command), Bound::At(0.991, Measure::Command));
+const KNEE: Key = Key::new("knee", Unit::Ratio, "half the width of the rounded corner over the limit")
+    .or_else("a sharp corner")
+    .takes(Takes::Between(0.0, f64::next_up(WIDEST), "a number above 0, at most 1"))
+    .points(&KNEES);
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "current_saturation",
@@ -29,6 +38,8 @@ pub static FACTS: Facts = Facts {
     fixed: true,
     per_record: false,
     equation: "i = clip(u, -limit, limit); with a knee k the corner is the parabola |u| - (|u| - (1 - k) limit)^2 / (4 k limit)",
+    keys: &[LIMIT, KNEE],
+    source: "A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, 1968; the knee: D. Giannoulis, M. Massberg, J. D. Reiss, Digital Dynamic Range Compressor Design, Journal of the Audio Engineering Society 60(6), 2012",
     says: "the amplifier runs out of current: commands above a limit give no more torque",
     confused_with: &["slew_limit", "torque_factor_rolloff"],
     experiment: "moves of growing length, so that the largest command grows step by step",
@@ -99,8 +110,8 @@ impl Parametric for CurrentSaturation {
     }
 
     fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        let knee = self.knee.map(|k| Parameter::new("knee", k, Unit::Ratio));
-        std::iter::once(Parameter::new("limit", self.limit, Unit::Command)).chain(knee).collect()
+        let knee = self.knee.map(|k| KNEE.at(k));
+        std::iter::once(LIMIT.at(self.limit)).chain(knee).collect()
     }
 
     /// Amplifiers round their corner off: a limit that is met softly is taken for one a little lower.
@@ -109,11 +120,7 @@ impl Parametric for CurrentSaturation {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(CurrentSaturation, Vec<f64>), PhysicsError> {
-        let knee = if given.has("knee") {
-            Some(given.between("knee", 0.0, f64::next_up(WIDEST), "a number above 0, at most 1")?)
-        } else {
-            None
-        };
-        Ok((CurrentSaturation { limit: given.positive("limit")?, knee }, vec![1.0]))
+        let knee = given.get(&KNEE)?;
+        Ok((CurrentSaturation { limit: given.need(&LIMIT)?, knee }, vec![1.0]))
     }
 }

@@ -3,6 +3,7 @@
 //! i = u - clip(u, -D, D), the dead zone of textbooks (Gelb, Vander Velde 1968).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Bound, Key, Measure, Prior};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
@@ -13,6 +14,15 @@ pub struct DeadBand {
     pub half_width: f64,
 }
 
+const HALF_WIDTH: Key = Key::new("half_width", Unit::Command, "D")
+    .unless(&["width"])
+    .positive()
+    .scan(Bound::At(2e-5, Measure::Command), Bound::At(0.5, Measure::Command));
+const WIDTH: Key = Key::new("width", Unit::Command, "2 D")
+    .unless(&["half_width"])
+    .positive()
+    .prior(Prior::Words("made from its half"));
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "dead_band",
@@ -22,6 +32,8 @@ pub static FACTS: Facts = Facts {
     fixed: true,
     per_record: false,
     equation: "i = u - clip(u, -D, D)",
+    keys: &[HALF_WIDTH, WIDTH],
+    source: "A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, 1968",
     says: "the amplifier does nothing for small commands: around zero the arm is left alone",
     confused_with: &["coulomb_friction", "quantisation", "linear_parameters"],
     experiment: "a small multisine around zero and around a constant command: the constant removes the effect",
@@ -67,10 +79,7 @@ impl Parametric for DeadBand {
     }
 
     fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![
-            Parameter::new("half_width", self.half_width, Unit::Command),
-            Parameter::new("width", 2.0 * self.half_width, Unit::Command),
-        ]
+        vec![HALF_WIDTH.at(self.half_width), WIDTH.at(2.0 * self.half_width)]
     }
 
     /// A machine holds to this law to about a hundredth.
@@ -79,8 +88,7 @@ impl Parametric for DeadBand {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(DeadBand, Vec<f64>), PhysicsError> {
-        let half_width =
-            if given.has("half_width") { given.positive("half_width")? } else { 0.5 * given.positive("width")? };
+        let half_width = if given.has(&HALF_WIDTH) { given.need(&HALF_WIDTH)? } else { 0.5 * given.need(&WIDTH)? };
         Ok((DeadBand { half_width }, vec![1.0]))
     }
 }

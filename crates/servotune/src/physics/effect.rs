@@ -3,6 +3,7 @@
 //! An effect is a law with a few strengths (linear) and numbers of its own (a sliding length, a period, a limit; [`Parametric`]). In motion
 //! the law gives columns; strengths times columns, summed, enter the loop at one place ([`Entry`]).
 
+use super::key::{Key, Need};
 use super::parameter::Parameter;
 use super::sample::{Sample, Scene};
 use super::share::Share;
@@ -55,8 +56,12 @@ pub struct Facts {
     pub fixed: bool,
     /// Whether the strengths differ from record to record (a mains line starts at another phase each time).
     pub per_record: bool,
-    /// The law, written out, with its source.
+    /// The law, written out.
     pub equation: &'static str,
+    /// Keys of its entry in a plant file, all of them, in the order of the catalogue; none where it has no law.
+    pub keys: &'static [Key],
+    /// Where the law is from: authors, title, year.
+    pub source: &'static str,
     /// One plain sentence for the factory floor.
     pub says: &'static str,
     /// Effects that the same records may not tell from this one.
@@ -122,44 +127,36 @@ impl<'a> Given<'a> {
     }
 
     /// A parameter that must be there.
-    pub fn need(&self, parameter: &'static str) -> Result<f64, PhysicsError> {
-        self.parameters.get(parameter).copied().ok_or(PhysicsError::Missing { effect: self.effect, parameter })
+    pub fn need(&self, key: &Key) -> Result<f64, PhysicsError> {
+        self.get(key)?.ok_or(PhysicsError::Missing { effect: self.effect, parameter: key.name })
     }
 
-    /// A parameter with a default.
-    pub fn or(&self, parameter: &str, default: f64) -> f64 {
-        self.parameters.get(parameter).copied().unwrap_or(default)
-    }
-
-    /// A parameter that must be above 0.
-    pub fn positive(&self, parameter: &'static str) -> Result<f64, PhysicsError> {
-        let found = self.need(parameter)?;
-        if found.is_finite() && found > 0.0 {
-            Ok(found)
-        } else {
-            Err(PhysicsError::Range { effect: self.effect, parameter, found, expected: "a finite number above 0" })
+    /// A parameter that may be there.
+    pub fn get(&self, key: &Key) -> Result<Option<f64>, PhysicsError> {
+        match self.parameters.get(key.name) {
+            Some(found) if !key.takes.takes(*found) => Err(self.refused(key, *found)),
+            found => Ok(found.copied()),
         }
     }
 
-    /// A parameter that must lie strictly between two numbers, which `expected` says in words.
-    pub fn between(
-        &self,
-        parameter: &'static str,
-        low: f64,
-        high: f64,
-        expected: &'static str,
-    ) -> Result<f64, PhysicsError> {
-        let found = self.need(parameter)?;
-        if found > low && found < high {
-            Ok(found)
-        } else {
-            Err(PhysicsError::Range { effect: self.effect, parameter, found, expected })
-        }
+    /// A parameter with the default of its key; one that must be there where that is no number.
+    pub fn or(&self, key: &Key) -> Result<f64, PhysicsError> {
+        if let Need::Or(number) = key.need { self.or_else(key, number) } else { self.need(key) }
+    }
+
+    /// A parameter with a default that depends on the machine.
+    pub fn or_else(&self, key: &Key, default: f64) -> Result<f64, PhysicsError> {
+        Ok(self.get(key)?.unwrap_or(default))
+    }
+
+    /// The refusal of what a parameter was found to be.
+    pub fn refused(&self, key: &Key, found: f64) -> PhysicsError {
+        PhysicsError::Range { effect: self.effect, parameter: key.name, found, expected: key.takes.text() }
     }
 
     /// Whether a parameter was given.
-    pub fn has(&self, parameter: &str) -> bool {
-        self.parameters.contains_key(parameter)
+    pub fn has(&self, key: &Key) -> bool {
+        self.parameters.contains_key(key.name)
     }
 }
 

@@ -4,6 +4,7 @@
 //! amplitudes and a phase that is not 90 degrees the second (Heydemann 1981).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Bound, Key, Measure};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use std::f64::consts::TAU;
@@ -26,6 +27,14 @@ pub enum Harmonics {
     FirstAndSecond,
 }
 
+const AMPLITUDE: Key = Key::new("amplitude", Unit::Position, "first harmonic");
+const PERIOD: Key = Key::new("period", Unit::Position, "length of the wave")
+    .positive()
+    .scan(Bound::Greatest(&[(8.0, Measure::Noise), (0.01, Measure::Travel)]), Bound::At(0.6, Measure::Travel));
+const PHASE_DEG: Key = Key::new("phase_deg", Unit::Degree, "phase").or(0.0);
+const AMPLITUDE_2: Key = Key::new("amplitude_2", Unit::Position, "second harmonic").or_else("the first alone");
+const PHASE_2_DEG: Key = Key::new("phase_2_deg", Unit::Degree, "its phase").or(0.0).beside("amplitude_2");
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "encoder_cyclic_error",
@@ -35,6 +44,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "m = x + sum_h a_h cos(2 pi h x/P + phi_h), h = 1, 2",
+    keys: &[AMPLITUDE, PERIOD, PHASE_DEG, AMPLITUDE_2, PHASE_2_DEG],
+    source: "P. L. M. Heydemann, Determination and Correction of Quadrature Fringe Measurement Errors in Interferometers, Applied Optics 20(19), 1981",
     says: "the encoder reads wrong by a wave that repeats with the position: its lines are not evenly interpolated",
     confused_with: &["torque_ripple", "unmodelled_resonance", "line_disturbance"],
     experiment: "constant-velocity moves at three speeds: the line moves with the speed",
@@ -116,23 +127,19 @@ impl Parametric for EncoderCyclicError {
         let at = |i: usize| strengths.get(i).copied().unwrap_or(0.0);
         let pair = |i: usize| (at(i).hypot(at(i + 1)), (-at(i + 1)).atan2(at(i)).to_degrees());
         let (first, second) = (pair(0), pair(2));
-        let mut all = vec![
-            Parameter::new("amplitude", first.0, Unit::Position),
-            Parameter::new("period", self.period, Unit::Position),
-            Parameter::new("phase_deg", first.1, Unit::Degree),
-        ];
+        let mut all = vec![AMPLITUDE.at(first.0), PERIOD.at(self.period), PHASE_DEG.at(first.1)];
         if self.second() {
-            all.push(Parameter::new("amplitude_2", second.0, Unit::Position));
-            all.push(Parameter::new("phase_2_deg", second.1, Unit::Degree));
+            all.push(AMPLITUDE_2.at(second.0));
+            all.push(PHASE_2_DEG.at(second.1));
         }
         all
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(EncoderCyclicError, Vec<f64>), PhysicsError> {
         let pair = |amplitude: f64, phase: f64| [amplitude * phase.cos(), -amplitude * phase.sin()];
-        let first = pair(given.need("amplitude")?, given.or("phase_deg", 0.0).to_radians());
-        let second = pair(given.or("amplitude_2", 0.0), given.or("phase_2_deg", 0.0).to_radians());
-        let harmonics = if given.has("amplitude_2") { Harmonics::FirstAndSecond } else { Harmonics::First };
-        Ok((EncoderCyclicError { period: given.positive("period")?, harmonics }, [first, second].concat()))
+        let first = pair(given.need(&AMPLITUDE)?, given.or(&PHASE_DEG)?.to_radians());
+        let second = pair(given.or_else(&AMPLITUDE_2, 0.0)?, given.or(&PHASE_2_DEG)?.to_radians());
+        let harmonics = if given.has(&AMPLITUDE_2) { Harmonics::FirstAndSecond } else { Harmonics::First };
+        Ok((EncoderCyclicError { period: given.need(&PERIOD)?, harmonics }, [first, second].concat()))
     }
 }

@@ -13,6 +13,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "m = x + n, var(n) = s0^2 + (s1 v)^2",
+    keys: &[],
+    source: "R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd edition, 2012",
     says: "the encoder's noise is larger than usual, or grows with speed",
     confused_with: &["quantisation", "jitter", "broadband_disturbance"],
     experiment: "four repeats at rest and four at full speed",

@@ -4,6 +4,7 @@
 //! constant and the slope are offset and gain of the plant.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Key, Prior};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
@@ -14,6 +15,13 @@ pub struct EncoderScaleError {
     pub centre: f64,
 }
 
+const QUADRATIC: Key = Key::new("quadratic", Unit::PerPosition, "e2");
+const CUBIC: Key = Key::new("cubic", Unit::PerPositionSquared, "e3").or(0.0);
+const CENTRE: Key = Key::new("centre", Unit::Position, "where it reads right, x0")
+    .or_else("the middle of the stroke")
+    .prior(Prior::Words("the middle of the positions"));
+const ERROR_AT_TRAVEL: Key = Key::reported("error_at_travel", Unit::Position, "error at the travel");
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "encoder_scale_error",
@@ -23,6 +31,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "m = x + e2 (x - x0)^2 + e3 (x - x0)^3",
+    keys: &[QUADRATIC, CUBIC, CENTRE, ERROR_AT_TRAVEL],
+    source: "A. H. Slocum, Precision Machine Design, 1992",
     says: "the encoder's scale stretches over the stroke: distances read differently at the ends",
     confused_with: &["torque_factor_rolloff", "cable_spring", "nonlinear_spring"],
     experiment: "the same small multisine in five zones, read by encoder and PES: the scale differs, the torque does not",
@@ -65,15 +75,15 @@ impl Parametric for EncoderScaleError {
         let [e2, e3] = [strengths[0], strengths[1]];
         let travel = scene.travel;
         vec![
-            Parameter::new("quadratic", e2, Unit::PerPosition),
-            Parameter::new("cubic", e3, Unit::PerPositionSquared),
-            Parameter::new("centre", self.centre, Unit::Position),
-            Parameter::new("error_at_travel", travel * travel * (e2 + e3 * travel), Unit::Position),
+            QUADRATIC.at(e2),
+            CUBIC.at(e3),
+            CENTRE.at(self.centre),
+            ERROR_AT_TRAVEL.at(travel * travel * (e2 + e3 * travel)),
         ]
     }
 
     fn setting_of(given: &Given, scene: &Scene) -> Result<(EncoderScaleError, Vec<f64>), PhysicsError> {
-        let law = EncoderScaleError { centre: given.or("centre", scene.centre) };
-        Ok((law, vec![given.need("quadratic")?, given.or("cubic", 0.0)]))
+        let law = EncoderScaleError { centre: given.or_else(&CENTRE, scene.centre)? };
+        Ok((law, vec![given.need(&QUADRATIC)?, given.or(&CUBIC)?]))
     }
 }

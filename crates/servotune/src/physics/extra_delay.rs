@@ -3,6 +3,7 @@
 //! m(t) = x(t - d). Between samples the trajectory is the cubic through positions and velocities (Hermite).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::{Bound, Key, Measure, Takes};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
@@ -17,6 +18,10 @@ pub struct ExtraDelay {
 /// Longest delay (samples).
 const LONGEST: usize = 16;
 
+const DELAY_S: Key = Key::new("delay_s", Unit::Second, "d")
+    .takes(Takes::Law("above 0 and at most 16 samples"))
+    .scan(Bound::At(0.1, Measure::Sample), Bound::At(6.0, Measure::Sample));
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "extra_delay",
@@ -26,6 +31,8 @@ pub static FACTS: Facts = Facts {
     fixed: true,
     per_record: false,
     equation: "m(t) = x(t - d)",
+    keys: &[DELAY_S],
+    source: "K. J. Åström, B. Wittenmark, Computer-Controlled Systems, 3rd edition, 1997",
     says: "the machine answers later than the model says: some computing or transport time was left out",
     confused_with: &["misalignment", "amplifier_lag", "sensor_lag", "linear_parameters"],
     experiment: "a multisine up to half the sample rate: a delay turns the phase in proportion to frequency and leaves the gain",
@@ -102,7 +109,7 @@ impl Parametric for ExtraDelay {
     }
 
     fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![Parameter::new("delay_s", self.delay_s, Unit::Second)]
+        vec![DELAY_S.at(self.delay_s)]
     }
 
     fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
@@ -111,7 +118,10 @@ impl Parametric for ExtraDelay {
 
     fn setting_of(given: &Given, scene: &Scene) -> Result<(ExtraDelay, Vec<f64>), PhysicsError> {
         let longest = (LONGEST as f64 + 1e-9) * scene.sample_time_s;
-        let delay_s = given.between("delay_s", 0.0, longest, "above 0 and at most 16 samples")?;
+        let delay_s = given.need(&DELAY_S)?;
+        if !(delay_s > 0.0 && delay_s < longest) {
+            return Err(given.refused(&DELAY_S, delay_s));
+        }
         Ok((ExtraDelay { delay_s }, vec![1.0]))
     }
 }

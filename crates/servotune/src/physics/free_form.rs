@@ -8,8 +8,9 @@
 //! a name").
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::{Key, Prior};
 use super::knots::{Knots, Surface};
-use super::parameter::Parameter;
+use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
 use super::sliders::{Loading, Sliders, slider_stiffness};
@@ -61,6 +62,8 @@ const fn made(part: Port, entry: Entry, equation: &'static str) -> Facts {
         fixed: true,
         per_record: false,
         equation,
+        keys: &[LAG],
+        source: "P. J. Green, B. W. Silverman, Nonparametric Regression and Generalized Linear Models, 1994; loading curves: W. D. Iwan, A Distributed-Element Model for Hysteresis and Its Steady-State Dynamic Response, Journal of Applied Mechanics 33(4), 1966",
         says: "something acts along a curve that has no name in the library",
         confused_with: &[],
         experiment: "the same moves at three sizes, and slow ramps over the whole range in both directions",
@@ -99,7 +102,7 @@ impl CurvePort {
     ];
 
     /// What is known of a curve at this port.
-    fn known(self) -> &'static Facts {
+    pub fn known(self) -> &'static Facts {
         match self {
             CurvePort::TorqueOverPosition => &TORQUE_OVER_POSITION,
             CurvePort::TorqueOverVelocity => &TORQUE_OVER_VELOCITY,
@@ -183,7 +186,7 @@ impl CurvePort {
         let [port, argument] = self.names().map(str::to_owned);
         let [_, unit] = self.units(position, command);
         let curve = Some(CurveEntry { port, argument, unit, knots });
-        let parameters = lag_s.map(|lag| (LAG.to_owned(), lag)).into_iter().collect();
+        let parameters = lag_s.map(|lag| (LAG.name.to_owned(), lag)).into_iter().collect();
         PhysicsEntry { effect: FACTS.name.into(), parameters, curve }
     }
 }
@@ -200,8 +203,11 @@ impl FreeForm {
     }
 }
 
-/// Name of the lag behind an amplifier's curve.
-const LAG: &str = "lag_s";
+/// The lag behind an amplifier's curve.
+const LAG: Key = Key::new("lag_s", Unit::Second, "time constant of a lag behind an amplifier's curve")
+    .or_else("no lag")
+    .positive()
+    .prior(Prior::Words("the estimation of curves"));
 
 /// A plant file's curve; refused by name where its keys make none.
 pub(super) fn restored(entry: &PhysicsEntry) -> Result<FreeForm, PhysicsError> {
@@ -213,14 +219,14 @@ pub(super) fn restored(entry: &PhysicsEntry) -> Result<FreeForm, PhysicsError> {
         wrong(format!("found {} over {}; expected one of: {}", curve.port, curve.argument, known.join(", ")))
     })?;
     let lagged = port == CurvePort::AmplifierOverCommand;
-    if let Some(parameter) = entry.parameters.keys().find(|k| !lagged || *k != LAG) {
+    if let Some(parameter) = entry.parameters.keys().find(|k| !lagged || *k != LAG.name) {
         return Err(wrong(format!(
             "parameter `{parameter}` is unknown; expected port, argument, unit and knots, and lag_s for an amplifier"
         )));
     }
-    let lag_s = entry.parameters.get(LAG).copied();
-    if let Some(found) = lag_s.filter(|l| !(l.is_finite() && *l > 0.0)) {
-        return Err(wrong(format!("{LAG} = {found}; expected a finite number above 0")));
+    let lag_s = entry.parameters.get(LAG.name).copied();
+    if let Some(found) = lag_s.filter(|l| !LAG.takes.takes(*l)) {
+        return Err(wrong(format!("{} = {found}; expected {}", LAG.name, LAG.takes.text())));
     }
     let knots = &curve.knots;
     if knots.len() < 2 {

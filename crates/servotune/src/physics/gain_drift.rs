@@ -5,6 +5,7 @@
 //! a temperature was recorded, tau = i (1 + c (T - T0)): copper's resistance rises by 0.39 %/K, a magnet's field falls by about 0.1 %/K.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Bound, Key, Measure, Prior};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use super::share::Share;
@@ -33,6 +34,23 @@ pub enum Start {
     Session,
 }
 
+const GAIN_PER_DEGREE: Key =
+    Key::new("gain_per_degree", Unit::PerDegreeCelsius, "c, by a recorded temperature").unless(&["gain_change"]);
+const GAIN_CHANGE: Key = Key::new("gain_change", Unit::Ratio, "a").unless(&["gain_per_degree"]);
+const TIME_CONSTANT_S: Key =
+    Key::new("time_constant_s", Unit::Second, "thermal time constant; of a session the same in its length")
+        .beside("gain_change")
+        .positive()
+        .scan(Bound::At(0.03, Measure::Record), Bound::At(3.0, Measure::Record));
+const FROM_SESSION_START: Key = Key::new(
+    "from_session_start",
+    Unit::Ratio,
+    "0: t counts from the start of each record; else from that of the session",
+)
+.or(0.0)
+.beside("gain_change")
+.prior(Prior::Words("0; 1 too where the session is longer than 1.5 records"));
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "gain_drift",
@@ -42,6 +60,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "tau = i (1 + a (1 - exp(-t/tau_th))) (t of record or session) or i (1 + c (T - T0))",
+    keys: &[GAIN_PER_DEGREE, GAIN_CHANGE, TIME_CONSTANT_S, FROM_SESSION_START],
+    source: "IEC 60028, International Standard of Resistance for Copper, 1925",
     says: "the motor gets weaker or stronger while it runs, as when it warms up",
     confused_with: &["torque_factor_rolloff", "offset_drift", "linear_parameters"],
     experiment: "the same multisine at the start and at the end of a long session, temperature recorded",
@@ -119,11 +139,11 @@ impl Parametric for GainDrift {
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         match *self {
-            GainDrift::ByTemperature => vec![Parameter::new("gain_per_degree", strengths[0], Unit::PerDegreeCelsius)],
+            GainDrift::ByTemperature => vec![GAIN_PER_DEGREE.at(strengths[0])],
             GainDrift::Warming { time_constant_s, from } => vec![
-                Parameter::new("gain_change", strengths[0], Unit::Ratio),
-                Parameter::new("time_constant_s", time_constant_s, Unit::Second),
-                Parameter::new("from_session_start", f64::from(from == Start::Session), Unit::Ratio),
+                GAIN_CHANGE.at(strengths[0]),
+                TIME_CONSTANT_S.at(time_constant_s),
+                FROM_SESSION_START.at(f64::from(from == Start::Session)),
             ],
         }
     }
@@ -135,11 +155,11 @@ impl Parametric for GainDrift {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(GainDrift, Vec<f64>), PhysicsError> {
-        if given.has("gain_per_degree") {
-            return Ok((GainDrift::ByTemperature, vec![given.need("gain_per_degree")?]));
+        if given.has(&GAIN_PER_DEGREE) {
+            return Ok((GainDrift::ByTemperature, vec![given.need(&GAIN_PER_DEGREE)?]));
         }
-        let strengths = vec![given.need("gain_change")?];
-        let from = if given.or("from_session_start", 0.0) != 0.0 { Start::Session } else { Start::Record };
-        Ok((GainDrift::Warming { time_constant_s: given.positive("time_constant_s")?, from }, strengths))
+        let strengths = vec![given.need(&GAIN_CHANGE)?];
+        let from = if given.or(&FROM_SESSION_START)? != 0.0 { Start::Session } else { Start::Record };
+        Ok((GainDrift::Warming { time_constant_s: given.need(&TIME_CONSTANT_S)?, from }, strengths))
     }
 }

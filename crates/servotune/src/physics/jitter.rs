@@ -13,6 +13,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "m_k = x(k T + d_k), d_k random",
+    keys: &[],
+    source: "M. Shinagawa, Y. Akazawa, T. Wakimoto, Jitter Analysis of High-Speed Sampling Systems, IEEE Journal of Solid-State Circuits 25(1), 1990",
     says: "samples are taken at uneven times: the error grows with speed",
     confused_with: &["encoder_noise", "extra_delay"],
     experiment: "constant-velocity moves at three speeds; error over speed is a time with a fixed spread",

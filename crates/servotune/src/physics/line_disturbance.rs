@@ -3,6 +3,7 @@
 //! tau = a cos(2 pi f t) + b sin(2 pi f t); the mean over an interval is the value at its middle times sin(y)/y, y = pi f T.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::{Bound, Key, Measure};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
@@ -15,6 +16,19 @@ pub struct LineDisturbance {
     pub frequency_hz: f64,
 }
 
+const FREQUENCY_HZ: Key = Key::new(
+    "frequency_hz",
+    Unit::Hertz,
+    "f; multiples of 50 and 60 Hz first, then steps of 0.8 / record, 3000 points",
+)
+.positive()
+.scan(
+    Bound::Least(&[(50.0, Measure::One), (3.0, Measure::Line)]),
+    Bound::Least(&[(1000.0, Measure::One), (0.45, Measure::SampleRate)]),
+);
+const AMPLITUDE_COMMAND: Key = Key::new("amplitude_command", Unit::Command, "a");
+const PHASE_DEG: Key = Key::new("phase_deg", Unit::Degree, "phase").or(0.0);
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "line_disturbance",
@@ -24,6 +38,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: true,
     equation: "tau = a cos(2 pi f t + phi), phi new in every record",
+    keys: &[FREQUENCY_HZ, AMPLITUDE_COMMAND, PHASE_DEG],
+    source: "H. W. Ott, Electromagnetic Compatibility Engineering, 2009",
     says: "something outside hums on the arm at a fixed frequency, such as mains or a fan",
     confused_with: &["repeatable_runout", "unmodelled_resonance", "broadband_disturbance"],
     experiment: "ten seconds of rest with the loop closed, once with the spindle at another speed",
@@ -89,9 +105,9 @@ impl Parametric for LineDisturbance {
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         let [a, b] = [strengths[0], strengths[1]];
         vec![
-            Parameter::new("frequency_hz", self.frequency_hz, Unit::Hertz),
-            Parameter::new("amplitude_command", a.hypot(b), Unit::Command),
-            Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
+            FREQUENCY_HZ.at(self.frequency_hz),
+            AMPLITUDE_COMMAND.at(a.hypot(b)),
+            PHASE_DEG.at((-b).atan2(a).to_degrees()),
         ]
     }
 
@@ -116,8 +132,8 @@ impl Parametric for LineDisturbance {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(LineDisturbance, Vec<f64>), PhysicsError> {
-        let (amplitude, phase) = (given.need("amplitude_command")?, given.or("phase_deg", 0.0).to_radians());
+        let (amplitude, phase) = (given.need(&AMPLITUDE_COMMAND)?, given.or(&PHASE_DEG)?.to_radians());
         let strengths = vec![amplitude * phase.cos(), -amplitude * phase.sin()];
-        Ok((LineDisturbance { frequency_hz: given.positive("frequency_hz")? }, strengths))
+        Ok((LineDisturbance { frequency_hz: given.need(&FREQUENCY_HZ)? }, strengths))
     }
 }

@@ -13,6 +13,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "P(s; theta + d theta)",
+    keys: &[],
+    source: "L. Ljung, System Identification: Theory for the User, 2nd edition, 1999",
     says: "the linear model's numbers are off; no physics is missing",
     confused_with: &["extra_delay", "misalignment", "pivot_friction"],
     experiment: "a multisine at one amplitude; refit",

@@ -13,6 +13,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "m_k = x_(k+d) after k0, d whole samples",
+    keys: &[],
+    source: "L. Ljung, System Identification: Theory for the User, 2nd edition, 1999",
     says: "the log lost or repeated samples: from there on command and position are out of step",
     confused_with: &["misalignment", "time_base_drift", "shock"],
     experiment: "the same record again; a counter column in the log",

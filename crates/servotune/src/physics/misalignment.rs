@@ -13,6 +13,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "m_k = x_(k-d), d whole samples",
+    keys: &[],
+    source: "L. Ljung, System Identification: Theory for the User, 2nd edition, 1999",
     says: "command and position in the log are shifted against each other by whole samples",
     confused_with: &["extra_delay", "sensor_lag", "linear_parameters"],
     experiment: "a step of the excitation at a known row of the log",

@@ -1,11 +1,12 @@
 //! Physics beyond the linear plant: one file per effect, with its law, its parameters and what it is confused with.
 //!
 //! In: the motion, sample by sample. Out: columns that enter the loop at the command, at the torque or at the position.
-//! Convention: a torque is counted in command units, positive in the direction of motion. Spec: `specs/mismatch.md`.
+//! Convention: a torque is counted in command units, positive in the direction of motion. Spec: `specs/mismatch.md`, `specs/effects.md`.
 
 mod cycle;
 mod describing;
 mod effect;
+mod key;
 mod knots;
 mod library;
 mod machine;
@@ -64,6 +65,7 @@ pub use cycle::{Cycle, Motion};
 pub use describing::describing;
 pub use effect::{COLUMNS, Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 pub use free_form::CurvePort;
+pub use key::{Bound, Key, Measure, Need, Prior, Takes};
 pub use knots::Knots;
 pub use library::{AnyLaw, Effect, Setting, curves, data_facts, effect, facts, library};
 pub use machine::{Machine, Reading};

@@ -8,7 +8,8 @@
 //! stage's deflection over w_j (`physics::stage`).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
-use super::mode_shift::{ModeForm, mode};
+use super::key::{Key, Prior};
+use super::mode_shift::{MODE, MODE_HZ, ModeForm, STAGE, mode};
 use super::pair::{Pair, Turn};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
@@ -27,6 +28,8 @@ pub struct ModalDamping {
     pub form: ModeForm,
 }
 
+const GROWTH: Key = Key::new("growth", Unit::PerPosition, "g").prior(Prior::Words("0.3 to 1000 over the amplitude that the largest command as a tone would reach, and -0.3 to -100; of a stage 0.3 to 300"));
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "modal_damping",
@@ -36,6 +39,8 @@ pub static FACTS: Facts = Facts {
     fixed: true,
     per_record: false,
     equation: "zeta_j(A) = zeta_j (1 + g A), A = |2 q_j|, in the modal form q' = (Re p (1 + g A) + j Im p) q + r i; or A = |q1|, the rate of a stage",
+    keys: &[MODE, GROWTH, STAGE, MODE_HZ],
+    source: "D. J. Segalman, A Four-Parameter Iwan Model for Lap-Type Joints, Journal of Applied Mechanics 72(5), 2005",
     says: "a vibration of the arm is damped differently when it is large, as where a joint slips",
     confused_with: &["unmodelled_resonance", "mode_shift", "current_saturation"],
     experiment: "the same multisine around the vibration at three amplitudes over a decade",
@@ -170,19 +175,16 @@ impl Parametric for ModalDamping {
     }
 
     fn parameters(&self, _strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
-        let mut all = vec![
-            Parameter::new("mode", self.mode as f64, Unit::Ratio),
-            Parameter::new("growth", self.growth, Unit::PerPosition),
-            Parameter::new("stage", f64::from(self.form == ModeForm::Stage), Unit::Ratio),
-        ];
+        let mut all =
+            vec![MODE.at(self.mode as f64), GROWTH.at(self.growth), STAGE.at(f64::from(self.form == ModeForm::Stage))];
         if let Some(pair) = Pair::of(scene, self.mode) {
-            all.push(Parameter::new("mode_hz", pair.pole.norm() / std::f64::consts::TAU, Unit::Hertz));
+            all.push(MODE_HZ.at(pair.pole.norm() / std::f64::consts::TAU));
         }
         all
     }
 
     fn setting_of(given: &Given, scene: &Scene) -> Result<(ModalDamping, Vec<f64>), PhysicsError> {
-        let form = ModeForm::of(given.or("stage", 0.0));
-        Ok((ModalDamping { mode: mode(FACTS.name, given, scene)?, growth: given.need("growth")?, form }, vec![1.0]))
+        let form = ModeForm::of(given.or(&STAGE)?);
+        Ok((ModalDamping { mode: mode(given, scene)?, growth: given.need(&GROWTH)?, form }, vec![1.0]))
     }
 }

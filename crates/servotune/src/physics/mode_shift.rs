@@ -7,6 +7,7 @@
 //! Or, where the resonance is a stage of a chain, its pole and zero move together (`physics::stage`).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::{Bound, Key, Measure, Prior, Takes};
 use super::pair::{Pair, Turn};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
@@ -43,6 +44,19 @@ impl ModeForm {
     }
 }
 
+pub(super) const MODE: Key = Key::new("mode", Unit::Ratio, "its number in `plant.modes`, from 0")
+    .takes(Takes::Law("the number of one of plant.modes, counted from 0, with a damping ratio below 1"))
+    .prior(Prior::Words("every mode of the plant that rings"));
+const SHIFT_PER_POSITION: Key = Key::new("shift_per_position", Unit::PerPosition, "c, of either sign")
+    .scan(Bound::At(1e-3, Measure::PerTravel), Bound::At(0.1, Measure::PerTravel));
+const CENTRE: Key = Key::new("centre", Unit::Position, "where it has the frequency of the plant, x0")
+    .or_else("the middle of the stroke")
+    .prior(Prior::Words("the middle of the positions"));
+const SHIFT_AT_TRAVEL: Key = Key::reported("shift_at_travel", Unit::Ratio, "relative shift at the travel");
+pub(super) const STAGE: Key =
+    Key::new("stage", Unit::Ratio, "0: a term of the modal form; else a stage of a chain").or(0.0).points(&[0.0, 1.0]);
+pub(super) const MODE_HZ: Key = Key::reported("mode_hz", Unit::Hertz, "frequency of the mode");
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "mode_shift",
@@ -52,6 +66,8 @@ pub static FACTS: Facts = Facts {
     fixed: true,
     per_record: false,
     equation: "w_j(x) = w_j (1 + c (x - x0)), in the modal form q' = p (1 + d) q + r/(1 + d) i, d = c (x - x0)",
+    keys: &[MODE, SHIFT_PER_POSITION, CENTRE, SHIFT_AT_TRAVEL, STAGE, MODE_HZ],
+    source: "R. Tóth, Modeling and Identification of Linear Parameter-Varying Systems, 2010",
     says: "a vibration of the arm changes its frequency over the stroke",
     confused_with: &["unmodelled_resonance", "modal_damping", "time_base_drift", "torque_factor_rolloff"],
     experiment: "the same multisine around the vibration in three or more zones of the stroke",
@@ -177,32 +193,31 @@ impl Parametric for ModeShift {
 
     fn parameters(&self, _strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
         let mut all = vec![
-            Parameter::new("mode", self.mode as f64, Unit::Ratio),
-            Parameter::new("shift_per_position", self.shift_per_position, Unit::PerPosition),
-            Parameter::new("centre", self.centre, Unit::Position),
-            Parameter::new("shift_at_travel", self.shift_per_position * scene.travel, Unit::Ratio),
-            Parameter::new("stage", f64::from(self.form == ModeForm::Stage), Unit::Ratio),
+            MODE.at(self.mode as f64),
+            SHIFT_PER_POSITION.at(self.shift_per_position),
+            CENTRE.at(self.centre),
+            SHIFT_AT_TRAVEL.at(self.shift_per_position * scene.travel),
+            STAGE.at(f64::from(self.form == ModeForm::Stage)),
         ];
         if let Some(pair) = Pair::of(scene, self.mode) {
-            all.push(Parameter::new("mode_hz", pair.pole.norm() / std::f64::consts::TAU, Unit::Hertz));
+            all.push(MODE_HZ.at(pair.pole.norm() / std::f64::consts::TAU));
         }
         all
     }
 
     fn setting_of(given: &Given, scene: &Scene) -> Result<(ModeShift, Vec<f64>), PhysicsError> {
-        let mode = mode(FACTS.name, given, scene)?;
-        let form = ModeForm::of(given.or("stage", 0.0));
-        let (shift_per_position, centre) = (given.need("shift_per_position")?, given.or("centre", scene.centre));
+        let mode = mode(given, scene)?;
+        let form = ModeForm::of(given.or(&STAGE)?);
+        let (shift_per_position, centre) = (given.need(&SHIFT_PER_POSITION)?, given.or_else(&CENTRE, scene.centre)?);
         Ok((ModeShift { mode, shift_per_position, centre, form }, vec![1.0]))
     }
 }
 
 /// The number of a mode that the plant has, counted from 0 as in `plant.modes`.
-pub(super) fn mode(effect: &'static str, given: &Given, scene: &Scene) -> Result<usize, PhysicsError> {
-    let found = given.need("mode")?;
+pub(super) fn mode(given: &Given, scene: &Scene) -> Result<usize, PhysicsError> {
+    let found = given.need(&MODE)?;
     if found.fract() == 0.0 && found >= 0.0 && Pair::of(scene, found as usize).is_some() {
         return Ok(found as usize);
     }
-    let expected = "the number of one of plant.modes, counted from 0, with a damping ratio below 1";
-    Err(PhysicsError::Range { effect, parameter: "mode", found, expected })
+    Err(given.refused(&MODE, found))
 }

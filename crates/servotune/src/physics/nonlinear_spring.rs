@@ -4,6 +4,7 @@
 //! interval are exact for a straight path (Simpson's rule for the cubic).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Key, Prior};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
@@ -28,6 +29,15 @@ pub enum Stiffening {
     },
 }
 
+const CUBIC: Key = Key::new("cubic", Unit::CommandPerPositionCubed, "k3").unless(&["stop_stiffness"]);
+const STOP_STIFFNESS: Key = Key::new("stop_stiffness", Unit::CommandPerPosition, "k of a stop").unless(&["cubic"]);
+const STOP_POSITION: Key = Key::new("stop_position", Unit::Position, "where the stop begins")
+    .beside("stop_stiffness")
+    .prior(Prior::Words("0.3, 0.5, 0.65, 0.8 and 0.9 travel to either side of the centre"));
+const CENTRE: Key = Key::new("centre", Unit::Position, "where it pushes to, x0")
+    .or_else("the middle of the stroke")
+    .prior(Prior::Words("the middle of the positions"));
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "nonlinear_spring",
@@ -37,6 +47,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "tau = -k3 (x - x0)^3, or -k max(0, x - x_e) at a stop",
+    keys: &[CUBIC, STOP_STIFFNESS, STOP_POSITION, CENTRE],
+    source: "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations, 1979",
     says: "the arm is pushed back harder the farther it goes, as by a stiffening spring or a stop",
     confused_with: &["cable_spring", "pivot_friction", "torque_ripple", "torque_factor_rolloff"],
     experiment: "the same multisine at two amplitudes: a stiffening spring raises the low resonance and adds no damping",
@@ -107,14 +119,12 @@ impl Parametric for NonlinearSpring {
     }
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        let centre = Parameter::new("centre", self.centre, Unit::Position);
+        let centre = CENTRE.at(self.centre);
         match self.stiffening {
-            Stiffening::Cubic => vec![Parameter::new("cubic", strengths[0], Unit::CommandPerPositionCubed), centre],
-            Stiffening::Stop { offset } => vec![
-                Parameter::new("stop_stiffness", strengths[0], Unit::CommandPerPosition),
-                Parameter::new("stop_position", self.centre + offset, Unit::Position),
-                centre,
-            ],
+            Stiffening::Cubic => vec![CUBIC.at(strengths[0]), centre],
+            Stiffening::Stop { offset } => {
+                vec![STOP_STIFFNESS.at(strengths[0]), STOP_POSITION.at(self.centre + offset), centre]
+            }
         }
     }
 
@@ -124,12 +134,12 @@ impl Parametric for NonlinearSpring {
     }
 
     fn setting_of(given: &Given, scene: &Scene) -> Result<(NonlinearSpring, Vec<f64>), PhysicsError> {
-        let centre = given.or("centre", scene.centre);
-        if given.has("stop_stiffness") {
-            let offset = given.need("stop_position")? - centre;
+        let centre = given.or_else(&CENTRE, scene.centre)?;
+        if given.has(&STOP_STIFFNESS) {
+            let offset = given.need(&STOP_POSITION)? - centre;
             let law = NonlinearSpring { centre, stiffening: Stiffening::Stop { offset } };
-            return Ok((law, vec![given.need("stop_stiffness")?]));
+            return Ok((law, vec![given.need(&STOP_STIFFNESS)?]));
         }
-        Ok((NonlinearSpring { centre, stiffening: Stiffening::Cubic }, vec![given.need("cubic")?]))
+        Ok((NonlinearSpring { centre, stiffening: Stiffening::Cubic }, vec![given.need(&CUBIC)?]))
     }
 }

@@ -3,6 +3,7 @@
 //! tau = a t + b t², t from the start of the record: the first terms of any slow change. The constant is the torque offset.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::Key;
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
@@ -10,6 +11,9 @@ use super::share::Share;
 /// Its strengths are slope and curvature, per record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OffsetDrift;
+
+const SLOPE: Key = Key::new("slope", Unit::CommandPerSecond, "a");
+const CURVATURE: Key = Key::new("curvature", Unit::CommandPerSecondSquared, "b").or(0.0);
 
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
@@ -20,6 +24,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: true,
     equation: "tau = a t + b t^2",
+    keys: &[SLOPE, CURVATURE],
+    source: "L. Ljung, System Identification: Theory for the User, 2nd edition, 1999",
     says: "a constant push on the arm slowly changes while recording",
     confused_with: &["cable_spring", "bearing_bias", "gain_drift"],
     experiment: "rest at one place for as long as a record takes, before and after",
@@ -53,10 +59,7 @@ impl Parametric for OffsetDrift {
     }
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![
-            Parameter::new("slope", strengths[0], Unit::CommandPerSecond),
-            Parameter::new("curvature", strengths[1], Unit::CommandPerSecondSquared),
-        ]
+        vec![SLOPE.at(strengths[0]), CURVATURE.at(strengths[1])]
     }
 
     fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
@@ -64,6 +67,6 @@ impl Parametric for OffsetDrift {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(OffsetDrift, Vec<f64>), PhysicsError> {
-        Ok((OffsetDrift, vec![given.need("slope")?, given.or("curvature", 0.0)]))
+        Ok((OffsetDrift, vec![given.need(&SLOPE)?, given.or(&CURVATURE)?]))
     }
 }

@@ -3,6 +3,7 @@
 //! tau = i (1 + e cos(angle + phi)), the angle being a whole order of the spindle or 2 pi f t (a time-periodic gain; Floquet).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Key, Prior};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
@@ -26,6 +27,13 @@ pub enum Clock {
     Spindle(usize),
 }
 
+const DEPTH: Key = Key::new("depth", Unit::Ratio, "e");
+const FREQUENCY_HZ: Key = Key::new("frequency_hz", Unit::Hertz, "f").positive().prior(Prior::Words("orders 1 to 6 of the spindle; of time from 3 / record in steps of 0.8 / record, 300 points, below a tenth of the sample rate"));
+const SPINDLE_ORDER: Key = Key::new("spindle_order", Unit::Ratio, "turns to one of the spindle; 0: f counts in time")
+    .or(0.0)
+    .points(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+const PHASE_DEG: Key = Key::new("phase_deg", Unit::Degree, "phase").or(0.0);
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "parametric_gain",
@@ -35,6 +43,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "tau = i (1 + e cos(2 pi f t + phi)), f t counted by the spindle where f is an order of it",
+    keys: &[DEPTH, FREQUENCY_HZ, SPINDLE_ORDER, PHASE_DEG],
+    source: "J. A. Richards, Analysis of Periodically Time-Varying Systems, 1983",
     says: "the motor's strength swings periodically: every tone of the command gets two neighbours",
     confused_with: &["line_disturbance", "repeatable_runout", "gain_drift"],
     experiment: "single tones at three frequencies and two amplitudes: sidebands follow the tone and grow with it",
@@ -121,10 +131,10 @@ impl Parametric for ParametricGain {
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         let [a, b] = [strengths[0], strengths[1]];
         vec![
-            Parameter::new("depth", a.hypot(b), Unit::Ratio),
-            Parameter::new("frequency_hz", self.frequency_hz, Unit::Hertz),
-            Parameter::new("spindle_order", self.order() as f64, Unit::Ratio),
-            Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
+            DEPTH.at(a.hypot(b)),
+            FREQUENCY_HZ.at(self.frequency_hz),
+            SPINDLE_ORDER.at(self.order() as f64),
+            PHASE_DEG.at((-b).atan2(a).to_degrees()),
         ]
     }
 
@@ -133,12 +143,12 @@ impl Parametric for ParametricGain {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(ParametricGain, Vec<f64>), PhysicsError> {
-        let (depth, phase) = (given.need("depth")?, given.or("phase_deg", 0.0).to_radians());
-        let clock = match given.or("spindle_order", 0.0).round().max(0.0) as usize {
+        let (depth, phase) = (given.need(&DEPTH)?, given.or(&PHASE_DEG)?.to_radians());
+        let clock = match given.or(&SPINDLE_ORDER)?.round().max(0.0) as usize {
             0 => Clock::Time,
             order => Clock::Spindle(order),
         };
-        let law = ParametricGain { frequency_hz: given.positive("frequency_hz")?, clock };
+        let law = ParametricGain { frequency_hz: given.need(&FREQUENCY_HZ)?, clock };
         Ok((law, vec![depth * phase.cos(), -depth * phase.sin()]))
     }
 }

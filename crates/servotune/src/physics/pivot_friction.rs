@@ -9,6 +9,7 @@
 //! spring that slips at once, above 2 elements that yield ever later.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Bound, Key, Measure};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
@@ -33,6 +34,12 @@ pub enum Loading {
     },
 }
 
+const SLIDING_LENGTH: Key = Key::new("sliding_length", Unit::Position, "sliding level over the first stiffness")
+    .positive()
+    .scan(Bound::Greatest(&[(12.0, Measure::Noise), (2e-3, Measure::Travel)]), Bound::At(4.0, Measure::Travel));
+const LEVEL_COMMAND: Key = Key::new("level_command", Unit::Command, "drag once it slides, F");
+const SHAPE: Key = Key::new("shape", Unit::Ratio, "0: Dahl; above 0 a Maxwell-slip row with the first loading 1 - (1 + m d/x_s)^(-1/m), m = shape/2 - 1: 1 a parabola, 2 the curve of Dahl, towards 0 one spring that slips; the last fit moves it between 0.1 and 3.5").or(0.0).points(&[0.0, 1.0, 2.0]);
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "pivot_friction",
@@ -42,6 +49,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "tau = -F z, dz/dx = (1 - sgn(dx) z)/x_s (Dahl) or a row of Maxwell-slip elements up to 2 x_s",
+    keys: &[SLIDING_LENGTH, LEVEL_COMMAND, SHAPE],
+    source: "P. R. Dahl, A Solid Friction Model, Aerospace Corporation TOR-0158, 1968; F. Al-Bender, V. Lampaert, J. Swevers, The Generalized Maxwell-Slip Model, IEEE Transactions on Automatic Control 50(11), 2005; D. Abramovitch, F. Wang, G. Franklin, Disk Drive Pivot Nonlinearity Modeling, ACC 1994",
     says: "the arm behaves like a bearing that sticks: after each reversal it first acts as a spring, then slides at a constant drag",
     confused_with: &["coulomb_friction", "cable_spring", "nonlinear_spring", "linear_parameters"],
     experiment: "the same multisine at three amplitudes over a decade, and a slow triangle with small nested reversals",
@@ -217,11 +226,7 @@ impl Parametric for PivotFriction {
     }
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![
-            Parameter::new("sliding_length", self.sliding_length, Unit::Position),
-            Parameter::new("level_command", strengths[0], Unit::Command),
-            Parameter::new("shape", self.loading.shape(), Unit::Ratio),
-        ]
+        vec![SLIDING_LENGTH.at(self.sliding_length), LEVEL_COMMAND.at(strengths[0]), SHAPE.at(self.loading.shape())]
     }
 
     fn measured_in_last_fit(&self) -> Vec<(usize, [f64; 2])> {
@@ -249,8 +254,8 @@ impl Parametric for PivotFriction {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(PivotFriction, Vec<f64>), PhysicsError> {
-        let sliding_length = given.positive("sliding_length")?;
-        let law = PivotFriction { sliding_length, loading: Loading::of(given.or("shape", 0.0)) };
-        Ok((law, vec![given.need("level_command")?]))
+        let sliding_length = given.need(&SLIDING_LENGTH)?;
+        let law = PivotFriction { sliding_length, loading: Loading::of(given.or(&SHAPE)?) };
+        Ok((law, vec![given.need(&LEVEL_COMMAND)?]))
     }
 }

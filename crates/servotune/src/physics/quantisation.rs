@@ -13,6 +13,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "m = q round(x/q), q an effective step",
+    keys: &[],
+    source: "B. Widrow, I. Kollár, Quantization Noise, 2008",
     says: "the encoder reports in steps that are coarser than they should be",
     confused_with: &["encoder_noise", "dead_band"],
     experiment: "a slow drift over some hundred steps at rest; the histogram of position modulo the step",

@@ -4,6 +4,7 @@
 //! not of hertz: where the spindle's speed moves, the lines move with it.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Bound, Key, Measure};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
@@ -16,6 +17,16 @@ pub struct RepeatableRunout {
     pub base_hz: f64,
 }
 
+const BASE_HZ: Key = Key::new("base_hz", Unit::Hertz, "base order")
+    .positive()
+    .scan(Bound::At(1.0, Measure::Spindle), Bound::At(8.0, Measure::Spindle));
+const AMPLITUDE: Key = Key::new("amplitude", Unit::Position, "first harmonic");
+const PHASE_DEG: Key = Key::new("phase_deg", Unit::Degree, "its phase").or(0.0);
+const AMPLITUDE_2: Key = Key::new("amplitude_2", Unit::Position, "second harmonic").or(0.0);
+const PHASE_2_DEG: Key = Key::new("phase_2_deg", Unit::Degree, "its phase").or(0.0);
+const AMPLITUDE_3: Key = Key::new("amplitude_3", Unit::Position, "third harmonic").or(0.0);
+const PHASE_3_DEG: Key = Key::new("phase_3_deg", Unit::Degree, "its phase").or(0.0);
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "repeatable_runout",
@@ -25,14 +36,16 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "m = x + sum_h a_h cos(h n psi + phi_h), h = 1, 2, 3, psi the spindle's angle",
+    keys: &[BASE_HZ, AMPLITUDE, PHASE_DEG, AMPLITUDE_2, PHASE_2_DEG, AMPLITUDE_3, PHASE_3_DEG],
+    source: "D. Abramovitch, G. Franklin, A Brief History of Disk Drive Control, IEEE Control Systems Magazine 22(3), 2002",
     says: "the error repeats with every turn of the spindle: something on it runs out of round",
     confused_with: &["line_disturbance", "parametric_gain"],
     experiment: "the same move with the spindle one percent faster: runout follows the spindle, mains does not",
     band_hz: [10.0, 2000.0],
 };
 
-const AMPLITUDES: [&str; 3] = ["amplitude", "amplitude_2", "amplitude_3"];
-const PHASES: [&str; 3] = ["phase_deg", "phase_2_deg", "phase_3_deg"];
+const AMPLITUDES: [Key; 3] = [AMPLITUDE, AMPLITUDE_2, AMPLITUDE_3];
+const PHASES: [Key; 3] = [PHASE_DEG, PHASE_2_DEG, PHASE_3_DEG];
 
 struct Runout {
     /// Whole order of the spindle, or none and then hertz.
@@ -84,10 +97,10 @@ impl Parametric for RepeatableRunout {
     }
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        let mut all = vec![Parameter::new("base_hz", self.base_hz, Unit::Hertz)];
+        let mut all = vec![BASE_HZ.at(self.base_hz)];
         for (h, pair) in strengths.chunks_exact(2).take(3).enumerate() {
-            all.push(Parameter::new(AMPLITUDES[h], pair[0].hypot(pair[1]), Unit::Position));
-            all.push(Parameter::new(PHASES[h], (-pair[1]).atan2(pair[0]).to_degrees(), Unit::Degree));
+            all.push(AMPLITUDES[h].at(pair[0].hypot(pair[1])));
+            all.push(PHASES[h].at((-pair[1]).atan2(pair[0]).to_degrees()));
         }
         all
     }
@@ -97,12 +110,11 @@ impl Parametric for RepeatableRunout {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(RepeatableRunout, Vec<f64>), PhysicsError> {
-        given.need(AMPLITUDES[0])?;
         let mut strengths = Vec::with_capacity(6);
         for h in 0..3 {
-            let (amplitude, phase) = (given.or(AMPLITUDES[h], 0.0), given.or(PHASES[h], 0.0).to_radians());
+            let (amplitude, phase) = (given.or(&AMPLITUDES[h])?, given.or(&PHASES[h])?.to_radians());
             strengths.extend([amplitude * phase.cos(), -amplitude * phase.sin()]);
         }
-        Ok((RepeatableRunout { base_hz: given.positive("base_hz")? }, strengths))
+        Ok((RepeatableRunout { base_hz: given.need(&BASE_HZ)? }, strengths))
     }
 }

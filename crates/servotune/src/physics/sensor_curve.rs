@@ -5,6 +5,7 @@
 //! motion, cannot see it; the estimation of curves does.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::{Key, Prior, Takes};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use super::share::Share;
@@ -37,6 +38,32 @@ pub enum SensorCurve {
     },
 }
 
+const LOWEST_READING: Key = Key::new(
+    "lowest_reading",
+    Unit::Position,
+    "lowest reading, r or low; of a fold alone it may be left out: the place of the fold",
+)
+.unless(&["fold_position", "quadratic"])
+.prior(Prior::Words("the estimation of curves"));
+const FOLD_POSITION: Key = Key::new("fold_position", Unit::Position, "where a folded curve turns, c")
+    .unless(&["highest_reading", "quadratic"])
+    .prior(Prior::Words("the estimation of curves"));
+const HIGHEST_READING: Key = Key::new("highest_reading", Unit::Position, "highest reading")
+    .unless(&["fold_position", "quadratic"])
+    .takes(Takes::Law("a number above lowest_reading"))
+    .prior(Prior::Words("the estimation of curves"));
+const QUADRATIC: Key = Key::new("quadratic", Unit::PerPosition, "q of a bent curve")
+    .unless(&["fold_position", "highest_reading"])
+    .prior(Prior::Words("the estimation of curves"));
+const CUBIC: Key = Key::new("cubic", Unit::PerPositionSquared, "k of a bent curve")
+    .or(0.0)
+    .beside("quadratic")
+    .prior(Prior::Words("the estimation of curves"));
+const CENTRE: Key = Key::new("centre", Unit::Position, "where a bent curve reads right, c")
+    .or_else("the middle of the stroke")
+    .beside("quadratic")
+    .prior(Prior::Words("the estimation of curves"));
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "sensor_curve",
@@ -46,6 +73,8 @@ pub static FACTS: Facts = Facts {
     fixed: true,
     per_record: false,
     equation: "folded: m = r + |x - c|; limited: m = clip(x, low, high); bent: m = x + q (x - c)^2 + k (x - c)^3",
+    keys: &[LOWEST_READING, FOLD_POSITION, HIGHEST_READING, QUADRATIC, CUBIC, CENTRE],
+    source: "J. Fraden, Handbook of Modern Sensors, 4th edition, 2010",
     says: "the sensor does not read the position itself but a curve of it: folded like an absolute value, limited, or bent",
     confused_with: &["encoder_scale_error", "free_form", "nonlinear_spring"],
     experiment: "a slow ramp over the whole range in both directions, read by a second sensor",
@@ -94,19 +123,12 @@ impl Parametric for SensorCurve {
     }
 
     fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        let position = |name, value| Parameter::new(name, value, Unit::Position);
         match *self {
-            SensorCurve::Folded { lowest, at } => {
-                vec![position("lowest_reading", lowest), position("fold_position", at)]
+            SensorCurve::Folded { lowest, at } => vec![LOWEST_READING.at(lowest), FOLD_POSITION.at(at)],
+            SensorCurve::Limited { low, high } => vec![LOWEST_READING.at(low), HIGHEST_READING.at(high)],
+            SensorCurve::Bent { centre, quadratic, cubic } => {
+                vec![CENTRE.at(centre), QUADRATIC.at(quadratic), CUBIC.at(cubic)]
             }
-            SensorCurve::Limited { low, high } => {
-                vec![position("lowest_reading", low), position("highest_reading", high)]
-            }
-            SensorCurve::Bent { centre, quadratic, cubic } => vec![
-                position("centre", centre),
-                Parameter::new("quadratic", quadratic, Unit::PerPosition),
-                Parameter::new("cubic", cubic, Unit::PerPositionSquared),
-            ],
         }
     }
 
@@ -116,20 +138,18 @@ impl Parametric for SensorCurve {
     }
 
     fn setting_of(given: &Given, scene: &Scene) -> Result<(SensorCurve, Vec<f64>), PhysicsError> {
-        if given.has("fold_position") {
-            let at = given.need("fold_position")?;
-            return Ok((SensorCurve::Folded { lowest: given.or("lowest_reading", at), at }, vec![1.0]));
+        if given.has(&FOLD_POSITION) {
+            let at = given.need(&FOLD_POSITION)?;
+            return Ok((SensorCurve::Folded { lowest: given.or_else(&LOWEST_READING, at)?, at }, vec![1.0]));
         }
-        if given.has("highest_reading") {
-            let (low, high) = (given.need("lowest_reading")?, given.need("highest_reading")?);
+        if given.has(&HIGHEST_READING) {
+            let (low, high) = (given.need(&LOWEST_READING)?, given.need(&HIGHEST_READING)?);
             if low >= high {
-                let expected = "a number above lowest_reading";
-                let parameter = "highest_reading";
-                return Err(PhysicsError::Range { effect: "sensor_curve", parameter, found: high, expected });
+                return Err(given.refused(&HIGHEST_READING, high));
             }
             return Ok((SensorCurve::Limited { low, high }, vec![1.0]));
         }
-        let (quadratic, cubic) = (given.need("quadratic")?, given.or("cubic", 0.0));
-        Ok((SensorCurve::Bent { centre: given.or("centre", scene.centre), quadratic, cubic }, vec![1.0]))
+        let (quadratic, cubic) = (given.need(&QUADRATIC)?, given.or(&CUBIC)?);
+        Ok((SensorCurve::Bent { centre: given.or_else(&CENTRE, scene.centre)?, quadratic, cubic }, vec![1.0]))
     }
 }

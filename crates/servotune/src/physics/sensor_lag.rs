@@ -3,6 +3,7 @@
 //! tau y' = x - y; over an interval where x runs straight with slope s: y = x - s tau + (y0 - x0 + s tau) exp(-t/tau).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::{Bound, Key, Measure, Prior};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use super::share::Share;
@@ -16,6 +17,15 @@ pub struct SensorLag {
     pub time_constant_s: f64,
 }
 
+const TIME_CONSTANT_S: Key = Key::new("time_constant_s", Unit::Second, "time constant")
+    .unless(&["bandwidth_hz"])
+    .positive()
+    .scan(Bound::At(0.1, Measure::Sample), Bound::At(20.0, Measure::Sample));
+const BANDWIDTH_HZ: Key = Key::new("bandwidth_hz", Unit::Hertz, "1/(2 pi time_constant_s)")
+    .unless(&["time_constant_s"])
+    .positive()
+    .prior(Prior::Words("made from the time constant"));
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "sensor_lag",
@@ -25,6 +35,8 @@ pub static FACTS: Facts = Facts {
     fixed: true,
     per_record: false,
     equation: "tau y' = x - y, y is recorded",
+    keys: &[TIME_CONSTANT_S, BANDWIDTH_HZ],
+    source: "G. F. Franklin, J. D. Powell, M. L. Workman, Digital Control of Dynamic Systems, 3rd edition, 1998",
     says: "the encoder's reading lags behind the position: something in the sensor filters it",
     confused_with: &["amplifier_lag", "extra_delay", "linear_parameters"],
     experiment: "a multisine up to half the sample rate, read by the encoder and by the PES: only the encoder shows the lag",
@@ -78,10 +90,7 @@ impl Parametric for SensorLag {
     }
 
     fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![
-            Parameter::new("time_constant_s", self.time_constant_s, Unit::Second),
-            Parameter::new("bandwidth_hz", 1.0 / (TAU * self.time_constant_s), Unit::Hertz),
-        ]
+        vec![TIME_CONSTANT_S.at(self.time_constant_s), BANDWIDTH_HZ.at(1.0 / (TAU * self.time_constant_s))]
     }
 
     fn response_share(&self, _strengths: &[f64], scene: &Scene, w_rad_s: f64) -> Share {
@@ -92,10 +101,10 @@ impl Parametric for SensorLag {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(SensorLag, Vec<f64>), PhysicsError> {
-        let time_constant_s = if given.has("time_constant_s") {
-            given.positive("time_constant_s")?
+        let time_constant_s = if given.has(&TIME_CONSTANT_S) {
+            given.need(&TIME_CONSTANT_S)?
         } else {
-            1.0 / (TAU * given.positive("bandwidth_hz")?)
+            1.0 / (TAU * given.need(&BANDWIDTH_HZ)?)
         };
         Ok((SensorLag { time_constant_s }, vec![1.0]))
     }

@@ -3,6 +3,7 @@
 //! tau = B sin(pi (t - t0)/w) for t0 < t < t0 + w: the half-sine of shock tests (IEC 60068-2-27); its mean over an interval is exact.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::{Bound, Key, Measure, Prior};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 use super::share::Share;
@@ -17,6 +18,13 @@ pub struct Shock {
     pub width_s: f64,
 }
 
+const PEAK_COMMAND: Key = Key::new("peak_command", Unit::Command, "B");
+const TIME_S: Key =
+    Key::new("time_s", Unit::Second, "when it begins, t0").prior(Prior::Words("half a width apart over the record"));
+const WIDTH_S: Key = Key::new("width_s", Unit::Second, "w")
+    .positive()
+    .scan(Bound::Greatest(&[(8.0, Measure::Sample), (0.005, Measure::Record)]), Bound::At(0.125, Measure::Record));
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "shock",
@@ -26,6 +34,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: true,
     equation: "tau = B sin(pi (t - t0)/w), t0 < t < t0 + w",
+    keys: &[PEAK_COMMAND, TIME_S, WIDTH_S],
+    source: "IEC 60068-2-27, Environmental Testing, Test Ea: Shock, 2008",
     says: "the machine was bumped once while recording",
     confused_with: &["lost_samples", "broadband_disturbance", "backlash"],
     experiment: "the same move again: a bump does not repeat at the same time",
@@ -86,11 +96,7 @@ impl Parametric for Shock {
     }
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![
-            Parameter::new("peak_command", strengths[0], Unit::Command),
-            Parameter::new("time_s", self.time_s, Unit::Second),
-            Parameter::new("width_s", self.width_s, Unit::Second),
-        ]
+        vec![PEAK_COMMAND.at(strengths[0]), TIME_S.at(self.time_s), WIDTH_S.at(self.width_s)]
     }
 
     fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
@@ -98,7 +104,7 @@ impl Parametric for Shock {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(Shock, Vec<f64>), PhysicsError> {
-        let law = Shock { time_s: given.need("time_s")?, width_s: given.positive("width_s")? };
-        Ok((law, vec![given.need("peak_command")?]))
+        let law = Shock { time_s: given.need(&TIME_S)?, width_s: given.need(&WIDTH_S)? };
+        Ok((law, vec![given.need(&PEAK_COMMAND)?]))
     }
 }

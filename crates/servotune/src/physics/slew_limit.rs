@@ -4,6 +4,7 @@
 //! the step. A digital limiter works at the samples instead: i_k = i_(k-1) + clip(u_k - i_(k-1), -S T, S T).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::{Bound, Key, Measure};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
@@ -16,6 +17,14 @@ pub struct SlewLimit {
     pub between_samples: bool,
 }
 
+const MAX_SLOPE: Key = Key::new("max_slope", Unit::CommandPerSecond, "largest slope, S")
+    .positive()
+    .scan(Bound::At(0.02, Measure::SteepestCommand), Bound::At(60.0, Measure::SteepestCommand));
+const BETWEEN_SAMPLES: Key =
+    Key::new("between_samples", Unit::Ratio, "0: limited at the samples; else the current ramps between them")
+        .or(0.0)
+        .points(&[0.0, 1.0]);
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "slew_limit",
@@ -25,6 +34,8 @@ pub static FACTS: Facts = Facts {
     fixed: true,
     per_record: false,
     equation: "di/dt = S sgn(u - i) until i = u, u held over the sample; or i_k = i_(k-1) + clip(u_k - i_(k-1), -S T, S T)",
+    keys: &[MAX_SLOPE, BETWEEN_SAMPLES],
+    source: "P. Horowitz, W. Hill, The Art of Electronics, 3rd edition, 2015",
     says: "the amplifier cannot change its current faster than a limit: quick commands arrive late and rounded",
     confused_with: &["current_saturation", "amplifier_lag"],
     experiment: "the same high-frequency burst at three amplitudes: the lag grows with amplitude times frequency",
@@ -97,14 +108,11 @@ impl Parametric for SlewLimit {
     }
 
     fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![
-            Parameter::new("max_slope", self.max_slope, Unit::CommandPerSecond),
-            Parameter::new("between_samples", f64::from(self.between_samples), Unit::Ratio),
-        ]
+        vec![MAX_SLOPE.at(self.max_slope), BETWEEN_SAMPLES.at(f64::from(self.between_samples))]
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(SlewLimit, Vec<f64>), PhysicsError> {
-        let between_samples = given.or("between_samples", 0.0) != 0.0;
-        Ok((SlewLimit { max_slope: given.positive("max_slope")?, between_samples }, vec![1.0]))
+        let between_samples = given.or(&BETWEEN_SAMPLES)? != 0.0;
+        Ok((SlewLimit { max_slope: given.need(&MAX_SLOPE)?, between_samples }, vec![1.0]))
     }
 }

@@ -13,6 +13,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "t' = (1 + eps) t",
+    keys: &[],
+    source: "D. W. Allan, Time and Frequency (Time-Domain) Characterization, Estimation, and Prediction of Precision Clocks and Oscillators, IEEE Transactions UFFC 34(6), 1987",
     says: "the clock of the log runs fast or slow: everything in it is scaled in time",
     confused_with: &["extra_delay", "mode_shift", "misalignment"],
     experiment: "one record as long as possible with a known line (spindle or mains)",

@@ -4,6 +4,7 @@
 //! have corners that no expansion follows: there the fall ends, or only begins.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
+use super::key::{Bound, Key, Measure, Prior};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 
@@ -37,6 +38,27 @@ pub enum Shape {
 /// Corners of the grid, over the travel: at either end of these a shape is a parabola or of no effect.
 const CORNERS: [f64; 8] = [0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 0.95];
 
+const DROP_AT_15: Key = Key::new(
+    "drop_at_15",
+    Unit::Ratio,
+    "loss of torque at 15 position units, where the travel is at least half of that",
+)
+.unless(&["curvature"])
+.prior(Prior::Words("made from the others"));
+const DROP_AT_TRAVEL: Key = Key::reported("drop_at_travel", Unit::Ratio, "loss of torque at the travel");
+const CURVATURE: Key = Key::new("curvature", Unit::PerPositionSquared, "a").unless(&["drop_at_15"]);
+const BEGINS_AT: Key = Key::new("begins_at", Unit::Position, "corner where a parabola begins")
+    .or_else("no corner")
+    .positive()
+    .scan(Bound::At(0.3, Measure::Travel), Bound::At(0.95, Measure::Travel));
+const ENDS_AT: Key = Key::new("ends_at", Unit::Position, "corner where a parabola ends")
+    .or_else("no corner")
+    .positive()
+    .scan(Bound::At(0.3, Measure::Travel), Bound::At(0.95, Measure::Travel));
+const SLOPE: Key = Key::new("slope", Unit::PerPosition, "s").or_else("no such term");
+const QUARTIC: Key = Key::new("quartic", Unit::Named("1/position^4"), "b").or_else("no such term");
+const SEXTIC: Key = Key::new("sextic", Unit::Named("1/position^6"), "c").or_else("no such term");
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "torque_factor_rolloff",
@@ -46,6 +68,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "tau = Kt0 (1 - s x - a x^2 - b x^4 - c x^6) i; with a corner c: a min(|x|, c)^2, or a max(|x| - c, 0)^2",
+    keys: &[DROP_AT_15, DROP_AT_TRAVEL, CURVATURE, BEGINS_AT, ENDS_AT, SLOPE, QUARTIC, SEXTIC],
+    source: "A. Al Mamun, G. Guo, C. Bi, Hard Disk Drive: Mechatronics and Control, 2007",
     says: "the motor pushes less towards the ends of the stroke: the same current gives less torque there",
     confused_with: &["nonlinear_spring", "encoder_scale_error", "gain_drift", "cable_spring", "mode_shift"],
     experiment: "the same multisine in three or more zones of the stroke",
@@ -160,51 +184,46 @@ impl Parametric for TorqueFactorRolloff {
     fn parameters(&self, strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
         let (s, l, shape) = (strengths, scene.travel, self.shape);
         // What a reader can picture first; the function after it, from which the law is made again.
-        let mut all = vec![
-            Parameter::new("drop_at_travel", fall(shape, s, 1.0), Unit::Ratio),
-            Parameter::new("curvature", s[1] / l.powi(2), Unit::PerPositionSquared),
-        ];
+        let mut all = vec![DROP_AT_TRAVEL.at(fall(shape, s, 1.0)), CURVATURE.at(s[1] / l.powi(2))];
         // Far beyond the motion a polynomial says nothing of a magnet.
         if KNOWN <= CONTINUED * l {
-            all.insert(0, Parameter::new("drop_at_15", fall(shape, s, KNOWN / l), Unit::Ratio));
+            all.insert(0, DROP_AT_15.at(fall(shape, s, KNOWN / l)));
         }
         match shape {
             Shape::Parabola => {}
-            Shape::Begins { corner } => all.push(Parameter::new("begins_at", corner * l, Unit::Position)),
-            Shape::Ends { corner } => all.push(Parameter::new("ends_at", corner * l, Unit::Position)),
-            Shape::Polynomial => all.extend([
-                Parameter::new("slope", s[0] / l, Unit::PerPosition),
-                Parameter::new("quartic", s[2] / l.powi(4), Unit::Named("1/position^4")),
-                Parameter::new("sextic", s[3] / l.powi(6), Unit::Named("1/position^6")),
-            ]),
+            Shape::Begins { corner } => all.push(BEGINS_AT.at(corner * l)),
+            Shape::Ends { corner } => all.push(ENDS_AT.at(corner * l)),
+            Shape::Polynomial => {
+                all.extend([SLOPE.at(s[0] / l), QUARTIC.at(s[2] / l.powi(4)), SEXTIC.at(s[3] / l.powi(6))])
+            }
         }
         all
     }
 
     fn setting_of(given: &Given, scene: &Scene) -> Result<(TorqueFactorRolloff, Vec<f64>), PhysicsError> {
         let l = scene.travel;
-        let shape = if given.has("begins_at") {
-            Shape::Begins { corner: given.positive("begins_at")? / l }
-        } else if given.has("ends_at") {
-            Shape::Ends { corner: given.positive("ends_at")? / l }
-        } else if ["slope", "quartic", "sextic"].iter().any(|p| given.has(p)) {
+        let shape = if given.has(&BEGINS_AT) {
+            Shape::Begins { corner: given.need(&BEGINS_AT)? / l }
+        } else if given.has(&ENDS_AT) {
+            Shape::Ends { corner: given.need(&ENDS_AT)? / l }
+        } else if [SLOPE, QUARTIC, SEXTIC].iter().any(|k| given.has(k)) {
             Shape::Polynomial
         } else {
             Shape::Parabola
         };
-        let lead = match given.need("curvature") {
+        let lead = match given.need(&CURVATURE) {
             Ok(a) => a * l.powi(2),
             // A fall that begins beyond the known position is not told by it.
             Err(missing) => match bowl(shape, KNOWN / l) {
-                known if known > 0.0 => given.need("drop_at_15").map_err(|_| missing)? / known,
+                known if known > 0.0 => given.need(&DROP_AT_15).map_err(|_| missing)? / known,
                 _ => return Err(missing),
             },
         };
         let strengths = vec![
-            given.or("slope", 0.0) * l,
+            given.or_else(&SLOPE, 0.0)? * l,
             lead,
-            given.or("quartic", 0.0) * l.powi(4),
-            given.or("sextic", 0.0) * l.powi(6),
+            given.or_else(&QUARTIC, 0.0)? * l.powi(4),
+            given.or_else(&SEXTIC, 0.0)? * l.powi(6),
         ];
         Ok((TorqueFactorRolloff { shape }, strengths))
     }

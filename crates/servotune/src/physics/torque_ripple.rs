@@ -4,6 +4,7 @@
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::encoder_cyclic_error::EncoderCyclicError;
+use super::key::{Bound, Key, Measure};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
 use std::cell::Cell;
@@ -18,6 +19,15 @@ pub struct TorqueRipple {
     pub of_factor: bool,
 }
 
+const AMPLITUDE_COMMAND: Key =
+    Key::new("amplitude_command", Unit::Command, "of a torque of its own").unless(&["amplitude_relative"]);
+const AMPLITUDE_RELATIVE: Key =
+    Key::new("amplitude_relative", Unit::Ratio, "of a wave of the torque factor").unless(&["amplitude_command"]);
+const PERIOD: Key = Key::new("period", Unit::Position, "length of the wave")
+    .positive()
+    .scan(Bound::Greatest(&[(8.0, Measure::Noise), (0.01, Measure::Travel)]), Bound::At(0.6, Measure::Travel));
+const PHASE_DEG: Key = Key::new("phase_deg", Unit::Degree, "phase").or(0.0);
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "torque_ripple",
@@ -27,6 +37,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "tau = a cos(2 pi x/P + phi), or i a cos(2 pi x/P + phi)",
+    keys: &[AMPLITUDE_COMMAND, AMPLITUDE_RELATIVE, PERIOD, PHASE_DEG],
+    source: "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition, 2003",
     says: "the torque has a wave that repeats with the position: the arm is pulled towards certain places",
     confused_with: &["encoder_cyclic_error", "nonlinear_spring", "cable_spring"],
     experiment: "constant-velocity moves at three speeds: the line moves with the speed and weakens with its square",
@@ -89,21 +101,17 @@ impl Parametric for TorqueRipple {
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         let [a, b] = [strengths[0], strengths[1]];
         let amplitude = match self.of_factor {
-            true => Parameter::new("amplitude_relative", a.hypot(b), Unit::Ratio),
-            false => Parameter::new("amplitude_command", a.hypot(b), Unit::Command),
+            true => AMPLITUDE_RELATIVE.at(a.hypot(b)),
+            false => AMPLITUDE_COMMAND.at(a.hypot(b)),
         };
-        vec![
-            amplitude,
-            Parameter::new("period", self.period, Unit::Position),
-            Parameter::new("phase_deg", (-b).atan2(a).to_degrees(), Unit::Degree),
-        ]
+        vec![amplitude, PERIOD.at(self.period), PHASE_DEG.at((-b).atan2(a).to_degrees())]
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(TorqueRipple, Vec<f64>), PhysicsError> {
-        let of_factor = given.has("amplitude_relative");
-        let amplitude = given.need(if of_factor { "amplitude_relative" } else { "amplitude_command" })?;
-        let phase = given.or("phase_deg", 0.0).to_radians();
+        let of_factor = given.has(&AMPLITUDE_RELATIVE);
+        let amplitude = given.need(if of_factor { &AMPLITUDE_RELATIVE } else { &AMPLITUDE_COMMAND })?;
+        let phase = given.or(&PHASE_DEG)?.to_radians();
         let strengths = vec![amplitude * phase.cos(), -amplitude * phase.sin()];
-        Ok((TorqueRipple { period: given.positive("period")?, of_factor }, strengths))
+        Ok((TorqueRipple { period: given.need(&PERIOD)?, of_factor }, strengths))
     }
 }

@@ -13,6 +13,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "none in the library",
+    keys: &[],
+    source: "M. C. Kennedy, A. O'Hagan, Bayesian Calibration of Computer Models, Journal of the Royal Statistical Society B 63(3), 2001",
     says: "there is a mismatch that nothing in the library explains",
     confused_with: &[],
     experiment: "repeats at three amplitudes, two speeds and two zones",

@@ -4,6 +4,7 @@
 //! modal form). Exact for a command held between samples.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::{Bound, Key, Measure, Takes};
 use super::oscillator::Oscillator;
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene};
@@ -21,6 +22,17 @@ pub struct UnmodelledResonance {
     pub damping_ratio: f64,
 }
 
+const FREQUENCY_HZ: Key = Key::new("frequency_hz", Unit::Hertz, "natural frequency")
+    .positive()
+    .scan(Bound::Least(&[(30.0, Measure::One), (0.0045, Measure::SampleRate)]), Bound::At(0.45, Measure::SampleRate));
+const DAMPING_RATIO: Key =
+    Key::new("damping_ratio", Unit::Ratio, "damping ratio; refined from a third of the first to three times the last")
+        .takes(Takes::Between(0.0, 1.0, "above 0 and below 1"))
+        .points(&[0.005, 0.02, 0.06]);
+const STATIC_GAIN: Key = Key::new("static_gain", Unit::PositionPerCommand, "a");
+const RATE_GAIN: Key = Key::new("rate_gain", Unit::PositionPerCommand, "b").or(0.0);
+const PEAK_GAIN: Key = Key::reported("peak_gain", Unit::PositionPerCommand, "gain at the peak");
+
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
     name: "unmodelled_resonance",
@@ -30,6 +42,8 @@ pub static FACTS: Facts = Facts {
     fixed: false,
     per_record: false,
     equation: "m = x + (a w^2 + b w s)/(s^2 + 2 z w s + w^2) i",
+    keys: &[FREQUENCY_HZ, DAMPING_RATIO, STATIC_GAIN, RATE_GAIN, PEAK_GAIN],
+    source: "D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd edition, 2000",
     says: "the structure vibrates at a frequency that the model does not have",
     confused_with: &["aliased_mode", "mode_shift", "line_disturbance", "base_mode", "linear_parameters"],
     experiment: "a multisine through the band at two amplitudes: a vibration follows the command, a disturbance does not",
@@ -113,11 +127,11 @@ impl Parametric for UnmodelledResonance {
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
         let [a, b] = [strengths[0], strengths[1]];
         vec![
-            Parameter::new("frequency_hz", self.frequency_hz, Unit::Hertz),
-            Parameter::new("damping_ratio", self.damping_ratio, Unit::Ratio),
-            Parameter::new("static_gain", a, Unit::PositionPerCommand),
-            Parameter::new("rate_gain", b, Unit::PositionPerCommand),
-            Parameter::new("peak_gain", a.hypot(b) / (2.0 * self.damping_ratio), Unit::PositionPerCommand),
+            FREQUENCY_HZ.at(self.frequency_hz),
+            DAMPING_RATIO.at(self.damping_ratio),
+            STATIC_GAIN.at(a),
+            RATE_GAIN.at(b),
+            PEAK_GAIN.at(a.hypot(b) / (2.0 * self.damping_ratio)),
         ]
     }
 
@@ -126,8 +140,8 @@ impl Parametric for UnmodelledResonance {
     }
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(UnmodelledResonance, Vec<f64>), PhysicsError> {
-        let damping = given.between("damping_ratio", 0.0, 1.0, "above 0 and below 1")?;
-        let strengths = vec![given.need("static_gain")?, given.or("rate_gain", 0.0)];
-        Ok((UnmodelledResonance::at([given.positive("frequency_hz")?, damping]), strengths))
+        let damping = given.need(&DAMPING_RATIO)?;
+        let strengths = vec![given.need(&STATIC_GAIN)?, given.or(&RATE_GAIN)?];
+        Ok((UnmodelledResonance::at([given.need(&FREQUENCY_HZ)?, damping]), strengths))
     }
 }
