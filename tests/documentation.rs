@@ -67,7 +67,8 @@ fn a_sentence_ends_at_its_stop() {
     let text = "# A\n\nOne: two;\nthree `a b. c`. (Four.) Five?\n- six\n  seven 1.5\n1. eight\n\n| nine. ten | eleven |\n```\nno. no\n```\ntwelve";
     let mut read = sentences(text);
     read.retain(|s| !s.is_empty() && s != "1.");
-    let expected = ["One: two; three code.", "(Four.)", "Five?", "- six seven 1.5", "eight", "nine.", "ten", "eleven", "twelve"];
+    let expected =
+        ["One: two; three code.", "(Four.)", "Five?", "- six seven 1.5", "eight", "nine.", "ten", "eleven", "twelve"];
     assert_eq!(read, expected);
 }
 
