@@ -208,3 +208,59 @@ fn every_file_of_tests_is_run() {
         }
     });
 }
+
+/// Paths that a text names below the root: specs' pages and settings, results, test files. Patterns with a blank to fill in are left out.
+fn named_paths(text: &str) -> Vec<&str> {
+    let inside = |c: char| c.is_ascii_alphanumeric() || "/._-{}*<>".contains(c);
+    let mut found = Vec::new();
+    for (root, endings) in
+        [("specs/", &["md", "toml"][..]), ("results/", &["md", "json", "txt", "svg", "png"]), ("tests/", &["rs"])]
+    {
+        for (at, _) in text.match_indices(root) {
+            if text[..at].ends_with(|c: char| inside(c) || c == ':') {
+                continue;
+            }
+            let rest = &text[at..];
+            let path = rest[..rest.find(|c| !inside(c)).unwrap_or(rest.len())].trim_end_matches('.');
+            let ends = path.rsplit_once('.').is_some_and(|(_, e)| endings.contains(&e));
+            if ends && !path.contains(['{', '*', '<']) {
+                found.push(path);
+            }
+        }
+    }
+    found
+}
+
+/// What git does not keep, or a command writes only when it is asked.
+const MADE_ON_DEMAND: [&str; 2] = ["results/certificate_loops.json", "results/search_variants.md"];
+
+#[test]
+fn every_page_and_test_that_is_named_exists() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (mut files, mut folders) = (Vec::new(), vec![root.to_path_buf()]);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if path.is_dir() && !name.starts_with('.') && name != "target" && name != "node_modules" {
+                folders.push(path);
+            } else if [".rs", ".md", ".py", ".toml", ".sh"].iter().any(|e| name.ends_with(e)) {
+                files.push(path);
+            }
+        }
+    }
+    let (mut wrong, mut seen) = (Vec::new(), 0);
+    for file in files {
+        let Ok(text) = std::fs::read_to_string(&file) else { continue };
+        for path in named_paths(&text) {
+            seen += 1;
+            // A source may name what stands beside it.
+            let there = root.join(path).exists() || file.with_file_name(path).exists();
+            if !there && !MADE_ON_DEMAND.contains(&path) {
+                wrong.push(format!("{}: {path}", file.strip_prefix(root).unwrap().display()));
+            }
+        }
+    }
+    assert!(seen > 300, "{seen} paths named");
+    assert!(wrong.is_empty(), "named, but not there:\n{}", wrong.join("\n"));
+}

@@ -1,4 +1,5 @@
-//! The documents: links lead somewhere, every page of the site is in its list, commands are understood, and the first tutorial runs as written.
+//! The documents: sentences are short, links lead somewhere, every page of the site is in its list, commands are understood, and the first
+//! tutorial runs as written.
 #![allow(clippy::unwrap_used)]
 
 use crate::program_common::{folder, root, servotune, servotune_with};
@@ -18,6 +19,85 @@ fn documents() -> Vec<PathBuf> {
         all.extend(markdown(dir));
     }
     all
+}
+
+/// Longest sentence of a page written by hand (words).
+const WORDS: usize = 40;
+
+/// Sentences of a page, which end at full stops, question and exclamation marks only. Paragraphs, list items, cells of tables stand apart;
+/// code counts as one word, fenced code as none. `scripts/house.py` counts by the same rule.
+fn sentences(text: &str) -> Vec<String> {
+    let unfenced: String = text.split("```").step_by(2).collect::<Vec<_>>().join("\n\n");
+    let mut blocks = vec![String::new()];
+    for line in unfenced.lines() {
+        let code = line.split('`').enumerate().map(|(i, part)| if i % 2 == 0 { part } else { "code" });
+        let plain = code.collect::<String>();
+        let plain = plain.trim();
+        let number = plain.split_once(". ").is_some_and(|(n, _)| n.chars().all(|c| c.is_ascii_digit()));
+        if plain.starts_with('|') {
+            blocks.extend(plain.split('|').map(str::to_owned));
+            blocks.push(String::new());
+        } else if plain.is_empty() || plain.starts_with('#') {
+            blocks.push(String::new());
+        } else {
+            if number || plain.starts_with("- ") || plain.starts_with("* ") {
+                blocks.push(String::new());
+            }
+            let last = blocks.last_mut().unwrap();
+            last.push(' ');
+            last.push_str(plain);
+        }
+    }
+    let mut found = Vec::new();
+    for block in blocks {
+        let mut sentence = Vec::new();
+        for word in block.split_whitespace() {
+            sentence.push(word);
+            if word.trim_end_matches(['"', '\'', ')', ']', '*', '_']).ends_with(['.', '?', '!']) {
+                found.push(std::mem::take(&mut sentence).join(" "));
+            }
+        }
+        found.push(sentence.join(" "));
+    }
+    found
+}
+
+#[test]
+fn a_sentence_ends_at_its_stop() {
+    let text = "# A\n\nOne: two;\nthree `a b. c`. (Four.) Five?\n- six\n  seven 1.5\n1. eight\n\n| nine. ten | eleven |\n```\nno. no\n```\ntwelve";
+    let mut read = sentences(text);
+    read.retain(|s| !s.is_empty() && s != "1.");
+    let expected =
+        ["One: two; three code.", "(Four.)", "Five?", "- six seven 1.5", "eight", "nine.", "ten", "eleven", "twelve"];
+    assert_eq!(read, expected);
+}
+
+/// Pages of results that a person writes; the others are made by commands whole.
+const WRITTEN_RESULTS: [&str; 4] = ["README.md", "comparison.md", "mismatch/history.md", "mismatch/shortfalls.md"];
+
+#[test]
+fn no_sentence_is_longer_than_forty_words() {
+    let mut pages = vec![root("README.md"), root("CHANGELOG.md")];
+    for dir in ["specs", "specs/decisions", "book/src"] {
+        pages.extend(markdown(dir));
+    }
+    pages.extend(WRITTEN_RESULTS.map(|p| root("results").join(p)));
+    let (mut wrong, mut seen) = (Vec::new(), 0);
+    for page in pages.iter().filter(|p| !p.ends_with("specs/rules.md")) {
+        let text = std::fs::read_to_string(page).unwrap();
+        // The catalogue of laws and the table of rules are made from the code: lists of parameters, no sentences.
+        let (before, laws) = text.split_once("\n## Laws\n").unwrap_or((&text, ""));
+        let behind = laws.split_once("\n## ").map_or("", |(_, rest)| rest);
+        for sentence in sentences(before).into_iter().chain(sentences(behind)) {
+            let words = sentence.split_whitespace().count();
+            seen += 1;
+            if words > WORDS {
+                wrong.push(format!("{}: {words} words: {sentence}", page.display()));
+            }
+        }
+    }
+    assert!(seen > 2000, "{seen} sentences");
+    assert!(wrong.is_empty(), "{} sentences above {WORDS} words:\n{}", wrong.len(), wrong.join("\n"));
 }
 
 /// Targets of `[words](target)`, code left out.
