@@ -7,7 +7,7 @@ use super::found::{Effort, Found};
 use super::judge::{judged, lasting_objective};
 use super::loop_rows::FAR_CROSSING_OF_COMPROMISE;
 use super::neighbours::{BETTER, spread};
-use super::outcome::{Outcome, Reached, Tuned, Work};
+use super::outcome::{Outcome, Reached, SearchWork, Tuned};
 use super::parameters::PID_FILTER;
 use super::polish::{Goal, polish};
 use super::score::UNSTABLE;
@@ -219,7 +219,7 @@ fn tune_as_said(job: Job<'_>, spec: &Spec, start: Option<&Controller>) -> Result
         found.join(second);
     }
     let best = best.ok_or(TuneError::NoStableLoop { starts: found.starts })?;
-    let work = |ending: &Ending<'_>| Work {
+    let work = |ending: &Ending<'_>| SearchWork {
         route: machines[0].route(),
         starts: found.starts,
         evaluations: found.evaluations + ending.evaluations,
