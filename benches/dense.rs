@@ -4,7 +4,7 @@
 
 use divan::{Bencher, black_box};
 use faer::MatRef;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use servotune::numeric::dense;
 use servotune::numeric::least_squares::Qr;
 use servotune::numeric::random::Random;
@@ -68,4 +68,38 @@ fn qr_own(b: Bencher, shape: (usize, usize)) {
     let m = tall(shape);
     let mut qr = Qr::default();
     b.bench_local(|| qr.factor(shape.0, shape.1, |a| a.copy_from_slice(black_box(m.as_slice()))));
+}
+
+/// Normal equations of unit diagonal, as the search of effects solves one for every law that it tries.
+fn normal(n: usize) -> (DMatrix<f64>, DVector<f64>) {
+    let a = tall((200, n));
+    let size: Vec<f64> = a.column_iter().map(|c| c.norm()).collect();
+    let gram = DMatrix::from_fn(n, n, |i, j| a.column(i).dot(&a.column(j)) / (size[i] * size[j]));
+    (gram, DVector::from_fn(n, |i, _| i as f64 - 1.5))
+}
+
+const NORMAL: [usize; 4] = [2, 4, 8, 20];
+
+#[divan::bench(args = NORMAL)]
+fn least_squares_faer(b: Bencher, n: usize) {
+    let (a, y) = normal(n);
+    b.bench_local(|| dense::least_squares(black_box(&a), &y, 1e-8).unwrap());
+}
+
+#[divan::bench(args = NORMAL)]
+fn least_squares_nalgebra(b: Bencher, n: usize) {
+    let (a, y) = normal(n);
+    b.bench_local(|| black_box(&a).clone().svd(true, true).solve(&y, 1e-8).unwrap());
+}
+
+#[divan::bench(args = NORMAL)]
+fn positive_solve_faer(b: Bencher, n: usize) {
+    let (a, y) = normal(n);
+    b.bench_local(|| dense::positive_solve(black_box(&a), &y).unwrap());
+}
+
+#[divan::bench(args = NORMAL)]
+fn positive_solve_nalgebra(b: Bencher, n: usize) {
+    let (a, y) = normal(n);
+    b.bench_local(|| black_box(&a).clone().cholesky().unwrap().solve(&y));
 }

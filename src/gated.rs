@@ -10,7 +10,7 @@ use servotune::controller::Controller;
 use servotune::document::{FileSet, below, sha256_hex, write_text};
 use servotune::frf::{Hold, ReadSettings, read_file};
 use servotune::gate::features::{features, machine_folders, read_machines};
-use servotune::gate::{Action, Gate, Table, Verdict};
+use servotune::gate::{Action, Gate, GateVerdict, Table};
 use servotune::identify::{IdentifySettings, identify};
 use servotune::tune::{GainTable, InputDigest, Machine, Spec, TuneSettings, tune};
 use servotune_answer::Proof;
@@ -146,7 +146,7 @@ pub(super) const TABLE: &str = "machines.csv";
 fn judge(
     gate: &Gate,
     machines: &[servotune::gate::features::RawMachine],
-) -> Result<(Vec<Verdict>, Vec<String>), Failure> {
+) -> Result<(Vec<GateVerdict>, Vec<String>), Failure> {
     let mut table = features(machines);
     let needed = gate.main.scale.features.iter().chain(&gate.novelty.features).map(String::as_str);
     let added = table.complete(needed);
@@ -155,7 +155,7 @@ fn judge(
 }
 
 /// The row of a verdict. A machine with a broken file is looked at by a person, whatever the rest of it says.
-fn judged(id: String, v: Verdict, problems: &[String]) -> Row {
+fn judged(id: String, v: GateVerdict, problems: &[String]) -> Row {
     let broken = !problems.is_empty();
     let why = if broken { format!("a file is broken or absent; from what there is: {}", v.why) } else { v.why };
     Row {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms of the library by rank; a room uses lower ranks only (`specs/decisions/rooms.md`). Between crates the manifests hold the direction.
 const RANKS: [&[&str]; 7] = [
-    &["units", "document", "numeric"],
+    &["document", "numeric"],
     &["frf", "recording", "lti"],
     &["controller", "physics"],
     &["identify", "feedback"],

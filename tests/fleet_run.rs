@@ -166,7 +166,7 @@ fn a_bad_slot_is_a_row_and_revisions_keep_everything() {
     assert_eq!((rows[2].verdict, rows[2].error.as_deref()), (Verdict::Failed, Some("response.bod:7: no number")));
     let tuned = rows.iter().find(|r| r.verdict == Verdict::Tuned).expect("the floor has slots to be tuned");
     let slot = tuned.id();
-    assert!(tuned.table.as_ref().unwrap().proved.passes);
+    assert!(tuned.table.as_ref().unwrap().judged.passes);
 
     // What is out of order is refused, with what was found.
     let refused = one(&mut store, &slot, Action::Apply, None).unwrap_err();

@@ -10,7 +10,7 @@ use servotune::numeric::random::Random;
 use servotune::tune::{GainTable, Machine, Provenance, Route, Spec, Summary, judge};
 use servotune::twin::plants::random_plant;
 use servotune::verify::{
-    Certificate, Inputs, LEAST_DAMPING, ProvenLimit, Source, Uncertainty, Verdict, VerifySettings, Word, certify,
+    Certificate, Inputs, LEAST_DAMPING, LimitVerdict, ProvenLimit, Source, Uncertainty, VerifySettings, Word, certify,
 };
 use std::f64::consts::TAU;
 
@@ -353,8 +353,8 @@ fn the_end_of_a_move_is_that_of_an_integrator_s_recursion() {
     let over = limit(&certificate, "move.overshoot");
     let [low, high] = [over.proven.low.unwrap(), over.proven.high.unwrap()];
     assert!(low <= beyond * (1.0 + 1e-9) && beyond <= high * (1.0 + 1e-9) && high - low < 1e-8 * 0.3, "{over:?}");
-    assert_eq!(over.verdict, Verdict::Proved);
+    assert_eq!(over.verdict, LimitVerdict::Proved);
     let late = limit(&certificate, "move.settling_s");
     assert!((late.proven.low.unwrap() - settled).abs() < 1e-9, "{late:?} {settled}");
-    assert_eq!(late.verdict, Verdict::Violated);
+    assert_eq!(late.verdict, LimitVerdict::Violated);
 }

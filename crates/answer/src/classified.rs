@@ -1,7 +1,7 @@
 //! The document of `classify`.
 
 use serde::Serialize;
-use servotune::gate::{Action, Decisions, Drift, Gate, GateError, Label, Table, Verdict, decisions};
+use servotune::gate::{Action, Decisions, Drift, Gate, GateError, GateVerdict, Label, Table, decisions};
 use std::path::Path;
 
 /// Every row's class and action, and how the table differs from the gate's.
@@ -11,7 +11,7 @@ pub struct Classified<'a> {
     classes: &'a [Label],
     class_names: &'a [String],
     /// One for each row of the table, in its order.
-    pub rows: Vec<Verdict>,
+    pub rows: Vec<GateVerdict>,
     /// Rows that were left to a person.
     pub abstained: usize,
     /// Features that are not distributed as in training.
@@ -42,7 +42,7 @@ pub fn classified<'a>(file: Option<&'a Path>, gate: &'a Gate, table: &Table) -> 
 }
 
 /// Rows whose label is one of the gate's classes, judged.
-fn judged(gate: &Gate, table: &Table, rows: &[Verdict]) -> Option<Judged> {
+fn judged(gate: &Gate, table: &Table, rows: &[GateVerdict]) -> Option<Judged> {
     let labels = table.labels()?;
     let place = |l: &Label| gate.classes.labels.iter().position(|x| x == l);
     let known =

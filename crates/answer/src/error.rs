@@ -13,6 +13,7 @@ use servotune::tune::{GainTableError, TuneError};
 use servotune::verify::VerifyError;
 use servotune_fleet::FleetError;
 use servotune_report::ReportError;
+use servotune_report::workflow::WorkflowError;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -54,4 +55,15 @@ pub enum AnswerError {
     Fleet(#[from] FleetError),
     #[error(transparent)]
     Report(#[from] ReportError),
+}
+
+impl From<WorkflowError> for AnswerError {
+    fn from(e: WorkflowError) -> AnswerError {
+        match e {
+            WorkflowError::Feedback(e) => e.into(),
+            WorkflowError::Tune(e) => e.into(),
+            WorkflowError::GainTable(e) => e.into(),
+            WorkflowError::Verify(e) => e.into(),
+        }
+    }
 }

@@ -94,7 +94,7 @@ fn line(row: &SlotRow, shared: Option<String>) -> SlotLine {
     // A slot that keeps its gains has the same figures after as before.
     let then = match row.verdict {
         Verdict::Keeps => now,
-        _ => row.table.as_ref().or(row.nearest.as_ref()).map(|t| &t.proved),
+        _ => row.table.as_ref().or(row.nearest.as_ref()).map(|t| &t.judged),
     };
     let of = |f: &dyn Fn(&WorstCase) -> Option<f64>| [now, then].map(|p| p.and_then(f).unwrap_or(f64::NAN));
     let gate = row.gate.as_ref();

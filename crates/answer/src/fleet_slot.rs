@@ -4,7 +4,7 @@ use super::AnswerError;
 use super::slot::{self, Slot, provenance};
 use servotune::frf::Sweep;
 use servotune::lti::Plant;
-use servotune::tune::{Machine, Outcome, Reached, Route, Tuned, Work, judge, ranges};
+use servotune::tune::{Machine, Outcome, Reached, Route, SearchWork, Tuned, judge, ranges};
 use servotune_fleet::{Context, OwnTable, SlotRow, SlotSource, gain_table_of};
 use servotune_report::page::Block;
 use servotune_report::table::Verdict;
@@ -26,10 +26,10 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
     // The best table there is; where none was sought, the gains in the slot.
     let found = row.table.as_ref().or(row.nearest.as_ref());
     let gains = found.map_or(start, |t| &t.gains);
-    let proved = found.map_or(current, |t: &OwnTable| &t.proved);
+    let judged = found.map_or(current, |t: &OwnTable| &t.judged);
     let frf = frf.with_hold(context.hold);
     let machine = Machine::Response { frf: &frf, continuation: Some(&plant) };
-    let work = Work {
+    let work = SearchWork {
         route: Route::Response,
         starts: 0,
         evaluations: 0,
@@ -46,7 +46,7 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
         ranges: ranges(&[machine], &context.spec, context.base.sample_time_s),
         work,
     });
-    let table = gain_table_of(context, row, gains, proved)?;
+    let table = gain_table_of(context, row, gains, judged)?;
     let digest = loaded.digest;
     let sweep =
         Sweep { coherence: None, notes: Vec::new(), rows_read: frf.len(), source_digest: digest, frf: frf.clone() };
@@ -70,13 +70,13 @@ pub(super) fn html(context: &Context, source: &dyn SlotSource, row: &SlotRow) ->
     let mut page = page;
     // The page's verdict is that of the response as measured; the fleet asks for more, and its badge with it.
     let notice = page.sections.first_mut().and_then(|s| s.blocks.first_mut());
-    if let (false, Some(Block::Notice(verdict, text))) = (proved.passes, notice) {
+    if let (false, Some(Block::Notice(verdict, text))) = (judged.passes, notice) {
         *verdict = Verdict::Fail;
         *text = format!(
             "In the worst case ({}) {} is missed by {:.1} %.",
-            if proved.case.is_empty() { "as measured" } else { &proved.case },
-            figure_name(proved.limit),
-            100.0 * proved.worst
+            if judged.case.is_empty() { "as measured" } else { &judged.case },
+            figure_name(judged.limit),
+            100.0 * judged.worst
         );
     }
     Ok(Some(page.html()))

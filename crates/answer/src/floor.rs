@@ -53,7 +53,7 @@ fn slot_pages(
 ) -> Result<(Vec<PathBuf>, BTreeSet<String>), AnswerError> {
     let mut worst: Vec<(f64, SlotRow)> = Vec::new();
     store.each_row(run, None, |row| {
-        let best = row.table.as_ref().or(row.nearest.as_ref()).map(|t| &t.proved).or(row.current.as_ref());
+        let best = row.table.as_ref().or(row.nearest.as_ref()).map(|t| &t.judged).or(row.current.as_ref());
         let Some(now) = best.map(|p| p.worst) else { return Ok(()) };
         // Rows come in order: of equals the earlier stays.
         if worst.len() < wanted.pages || worst.last().is_some_and(|w| now > w.0) {

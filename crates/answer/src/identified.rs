@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use servotune::frf::Sweep;
-use servotune::identify::{HeldOut, Identified, Intervals, LadderRung, TrustedBand, Work};
+use servotune::identify::{FitWork, HeldOut, Identified, Intervals, LadderRung, TrustedBand};
 use servotune::lti::PlantFile;
 
 /// A model with what is known of its quality.
@@ -21,7 +21,7 @@ pub struct IdentifiedDocument<'a> {
     converged: bool,
     chi_square: f64,
     condition: f64,
-    work: &'a Work,
+    work: &'a FitWork,
     notes: Vec<String>,
     source_digest: &'a str,
 }

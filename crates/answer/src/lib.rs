@@ -32,9 +32,10 @@ pub use named::{Named, controller, plant, profile};
 pub use pages::{compared_page, identified_page, margins_page};
 pub use physics::{for_a_loop, outside, restored};
 pub use proof::Proof;
+pub use servotune_report::workflow::{Asked, Given, Reached};
 pub use simulated::{Simulated, simulated, written_page};
 pub use sweep::{Ran, adjusted, opened};
-pub use tuned::{Asked, Given, Reached, TunedDocument, given_model, given_sweep, tuned};
+pub use tuned::{TunedDocument, given_model, given_sweep, tuned};
 
 /// Who is told what was decided on the way.
 pub type Say<'a> = &'a mut dyn FnMut(&str);

@@ -1,14 +1,14 @@
 //! A second opinion on a slot's final table: its margins bounded at every frequency, between the points of the sweep too, by the prover of
 //! [`servotune::verify`], which shares no algorithm with the search and its margins.
 //!
-//! In: the plants of every case, identified, drawn and at each temperature. Out: [`Certified`]. It speaks of these models, [`super::prove()`] of the
+//! In: the plants of every case, identified, drawn and at each temperature. Out: [`Certified`]. It speaks of these models, [`super::worst_case()`] of the
 //! measured curve: the two differ by what the model leaves over. The write is not in it. Spec: `specs/fleet.md`, "Acceptance".
 
 use super::{Context, Evidence};
 use serde::{Deserialize, Serialize};
 use servotune::controller::Controller;
 use servotune::tune::{Limits, Requirement, Side, What};
-use servotune::verify::{Bounds, Stability, Uncertainty, VerifySettings, prove_loop};
+use servotune::verify::{LoopBounds, Stability, Uncertainty, VerifySettings, prove_loop};
 
 /// What is proved of a table on the models of all cases.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -65,7 +65,7 @@ pub fn certified(context: &Context, evidence: &Evidence, gains: &Controller) -> 
 }
 
 /// The violation at the bad end of what is proved; none where that end is open.
-fn missed(w: &Requirement, b: &Bounds) -> Option<f64> {
+fn missed(w: &Requirement, b: &LoopBounds) -> Option<f64> {
     let found = match w.what {
         What::PhaseMargin => b.phase_margin_deg,
         What::GainMargin => b.gain_margin_db,

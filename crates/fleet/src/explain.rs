@@ -5,9 +5,9 @@
 //! with a table polished anew for every trial and judged at the end.
 
 use super::certified::{Certified, certified};
-use super::prove::{WorstCase, prove};
 use super::row::{OwnTable, SlotRow};
 use super::slot::{Prepared, search};
+use super::worst_case::{WorstCase, worst_case};
 use super::{Context, Evidence, Ready};
 use serde::{Deserialize, Serialize};
 use servotune::controller::Controller;
@@ -99,7 +99,7 @@ pub struct Explained {
     pub slot: String,
     /// A table that the full search found after all; then there is nothing to explain.
     pub table: Option<OwnTable>,
-    /// What the second prover says of it.
+    /// What `verify` proves of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certified: Option<Certified>,
     /// The nearest that any search came.
@@ -172,8 +172,8 @@ impl Changed<'_> {
         let (spec, guarded) = (self.spec(&c.spec, factor), self.spec(&c.guarded, factor));
         let mut ready = Ready::of(&evidence, &spec, &guarded, &c.base).ok()?;
         let (gains, _) = ready.polish(start, STEPS)?;
-        let proved = prove(&mut ready, &gains).ok()?;
-        proved.passes.then_some(OwnTable { gains, way: super::Way::Polished, proved })
+        let judged = worst_case(&mut ready, &gains).ok()?;
+        judged.passes.then_some(OwnTable { gains, way: super::Way::Polished, judged })
     }
 
     /// The smallest factor between 1 and `largest`, if any up to there helps.
@@ -204,19 +204,19 @@ pub(super) fn explain(context: &Context, slot: &Prepared, row: &SlotRow) -> Expl
         remedies: Vec::new(),
     };
     if let Ok(table) = search(context, &slot.evidence) {
-        if table.proved.passes {
+        if table.judged.passes {
             found.certified = Some(certified(context, &slot.evidence, &table.gains));
             found.table = Some(table);
             return found;
         }
-        if found.nearest.as_ref().is_none_or(|n| table.proved.worst < n.proved.worst) {
+        if found.nearest.as_ref().is_none_or(|n| table.judged.worst < n.judged.worst) {
             found.nearest = Some(table);
         }
     }
     let Some(nearest) = found.nearest.clone() else { return found };
     found.cause = Some(cause(context, slot, &nearest));
     let largest = context.file.untunable.largest_change;
-    for change in changes(&slot.plant, nearest.proved.at_hz) {
+    for change in changes(&slot.plant, nearest.judged.at_hz) {
         found.remedies.extend(Changed { context, slot, change }.smallest(largest, &nearest.gains));
     }
     found.remedies.sort_by(|a, b| a.factor.total_cmp(&b.factor));
@@ -259,7 +259,7 @@ fn guilty(plant: &Plant, at_hz: Option<f64>) -> Option<Mode> {
 
 /// The cause: of a margin the mode or the dead time at its frequency; of a figure of the write the noise, or the move.
 fn cause(context: &Context, slot: &Prepared, nearest: &OwnTable) -> Cause {
-    let p: &WorstCase = &nearest.proved;
+    let p: &WorstCase = &nearest.judged;
     let write = matches!(p.limit, What::DftLow | What::DftHigh | What::Harmonic { .. } | What::CommandPeak);
     if write {
         let mut quiet = context.spec.clone();
@@ -267,7 +267,8 @@ fn cause(context: &Context, slot: &Prepared, nearest: &OwnTable) -> Cause {
             (noise.encoder_rms, noise.windage_rms) = (0.0, 0.0);
         }
         let without = Ready::of(&slot.evidence, &quiet, &quiet, &context.base);
-        let met = without.and_then(|mut r| prove(&mut r, &nearest.gains)).is_ok_and(|q| q.limit != p.limit || q.passes);
+        let met =
+            without.and_then(|mut r| worst_case(&mut r, &nearest.gains)).is_ok_and(|q| q.limit != p.limit || q.passes);
         return if met { Cause::Noise } else { Cause::Move };
     }
     let hz = p.at_hz.or(p.figures.gain_crossover_hz).unwrap_or(0.0);

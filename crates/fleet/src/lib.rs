@@ -1,7 +1,7 @@
 //! The fleet: gain tables for every slot of every tester.
 //!
 //! In: FLEET.toml, a source of slots. Out: a row for each slot, tables for each slot and shared ones, all in a store from which every other
-//! output is derived. Reading order: `settings`, `source`, `context`, `evidence`, `prove`, `row`, `library`, `slot`, `pilot`, `store`, `run`, `revision`, `order`, `act`.
+//! output is derived. Reading order: `settings`, `source`, `context`, `evidence`, `worst_case`, `row`, `library`, `slot`, `pilot`, `store`, `run`, `revision`, `order`, `act`.
 //! Convention: a slot's row depends on the slot, the settings and the library only, so bytes are equal for any number of threads and after
 //! any interruption. Spec: `specs/fleet.md`.
 
@@ -26,7 +26,6 @@ mod output;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod pilot;
-mod prove;
 mod ready;
 mod rest;
 mod revision;
@@ -45,6 +44,7 @@ mod store_run;
 mod table_source;
 mod twin_source;
 mod work_list;
+mod worst_case;
 
 pub use certified::{Certified, certified};
 pub use check::Checked;
@@ -62,7 +62,6 @@ pub use look::{Level, looks, nearest};
 pub use order::{Carried, End, Healed, Order, Which};
 pub use output::{Asked, gain_table, gain_table_of, page_file, write_tables};
 pub use pilot::{Pilot, pilot, places};
-pub use prove::{UNSTABLE, WorstCase, prove};
 pub use ready::{Quick, Ready};
 pub use revision::{Action, Revision, table_text};
 pub use row::{GateRow, ModelRow, OwnTable, Serves, SlotRow, Verdict, Way};
@@ -77,3 +76,4 @@ pub use store::Store;
 pub use store_run::{Inputs, Run, Stamp};
 pub use twin_source::TwinSource;
 pub use work_list::{WorkItem, work_list};
+pub use worst_case::{UNSTABLE, WorstCase, worst_case};

@@ -4,6 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 use servotune::lti::{FrequencyResponse, Plant};
+use servotune::numeric::unwrap::unwrap;
 use std::f64::consts::TAU;
 
 /// Frequencies at which plants are compared (Hz): the decade around the crossover, and on to the modes that limit it.
@@ -23,16 +24,9 @@ pub struct Level {
 /// What a plant looks like to a loop: ln |P| and phase (rad) over the compared frequencies.
 pub fn looks(plant: &Plant) -> Vec<f64> {
     let step = (COMPARED_HZ[1] / COMPARED_HZ[0]).powf(1.0 / (COMPARED - 1) as f64);
-    let mut all = Vec::with_capacity(2 * COMPARED);
-    let mut phase = 0.0f64;
-    for i in 0..COMPARED {
-        let v = plant.at(TAU * COMPARED_HZ[0] * step.powi(i as i32));
-        // Continued from point to point.
-        let turned = v.arg() - phase;
-        phase += turned - TAU * (turned / TAU).round();
-        all.extend([v.norm().ln(), phase]);
-    }
-    all
+    let value: Vec<_> = (0..COMPARED).map(|i| plant.at(TAU * COMPARED_HZ[0] * step.powi(i as i32))).collect();
+    let phase = unwrap(&value.iter().map(|v| v.arg()).collect::<Vec<f64>>());
+    value.iter().zip(phase).flat_map(|(v, phase)| [v.norm().ln(), phase]).collect()
 }
 
 pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {

@@ -4,10 +4,10 @@
 
 use super::drift::{SlotDrift, Trend};
 use super::leftovers::clear_tables;
-use super::prove::WorstCase;
 use super::row::{SlotRow, Verdict};
 use super::share::assigned;
 use super::store_run::json;
+use super::worst_case::WorstCase;
 use super::{Context, FleetError, Library, Shared, Store, WorkItem};
 use servotune::controller::Controller;
 use servotune::document::{DocumentError, Temporary, below, check_name};
@@ -80,7 +80,7 @@ fn figures(s: Option<&Summary>) -> [String; 5] {
 fn fields(r: &SlotRow, shared: Option<String>) -> Vec<String> {
     let (gate, model) = (r.gate.as_ref(), r.model.as_ref());
     let (before, table) = (r.current.as_ref(), r.table.as_ref().or(r.nearest.as_ref()));
-    let after = table.map(|t| &t.proved);
+    let after = table.map(|t| &t.judged);
     let gains = table.map(|t| &t.gains);
     let mut f: Vec<String> = vec![
         r.tester.clone(),
@@ -142,7 +142,7 @@ const WORDS: [&str; 16] = [
 
 /// The gain table of a tuned slot as a document.
 pub fn gain_table(context: &Context, row: &SlotRow) -> Result<Option<GainTable>, FleetError> {
-    row.table.as_ref().map(|t| gain_table_of(context, row, &t.gains, &t.proved)).transpose()
+    row.table.as_ref().map(|t| gain_table_of(context, row, &t.gains, &t.judged)).transpose()
 }
 
 /// Any gains in a slot as a document: before is what was found there.
@@ -150,7 +150,7 @@ pub fn gain_table_of(
     context: &Context,
     row: &SlotRow,
     gains: &Controller,
-    proved: &WorstCase,
+    judged: &WorstCase,
 ) -> Result<GainTable, FleetError> {
     let digest = |role: &str, sha256: &str| InputDigest { role: role.into(), sha256: sha256.into() };
     let mut inputs = vec![digest("slot", &row.digest)];
@@ -159,7 +159,7 @@ pub fn gain_table_of(
     let provenance = Provenance {
         program: env!("CARGO_PKG_VERSION").into(),
         route: Route::Response,
-        feasible: proved.passes,
+        feasible: judged.passes,
         seed: context.spec.search.seed,
         evaluations: 0,
         spec_sha256: spec,
@@ -171,7 +171,7 @@ pub fn gain_table_of(
         inputs,
     };
     let before = row.current.as_ref().map(|p| p.figures.clone());
-    Ok(GainTable::new(gains, before, proved.figures.clone(), provenance)?)
+    Ok(GainTable::new(gains, before, judged.figures.clone(), provenance)?)
 }
 
 /// What is written of a run.

@@ -48,7 +48,7 @@ pub fn pilot(context: &Context, source: &dyn SlotSource, index: usize) -> Pilot 
     if !matches!(action, Some(Action::None | Action::Tune)) {
         return found;
     }
-    found.table = search(context, &cases).ok().filter(|t| t.proved.passes);
+    found.table = search(context, &cases).ok().filter(|t| t.judged.passes);
     found
 }
 

@@ -6,11 +6,11 @@
 
 use super::grow::{Scout, grown};
 use super::library::{Candidate, Library};
-use super::prove::prove;
 use super::row::{Serves, SlotRow, Verdict};
 use super::slot::Prepared;
 use super::source::SlotSource;
 use super::store_run::Part;
+use super::worst_case::worst_case;
 use super::{Context, FleetError, Ready, Store};
 use rayon::prelude::*;
 use servotune::controller::Controller;
@@ -70,7 +70,7 @@ pub(super) fn rest(
             let mut serves = Vec::new();
             for (candidate, t) in (first..).zip(&tables) {
                 // Few slots: every table is judged exactly.
-                if let Some(p) = prove(&mut ready, &t.gains).ok().filter(|p| p.passes) {
+                if let Some(p) = worst_case(&mut ready, &t.gains).ok().filter(|p| p.passes) {
                     let dft = p.figures.dft();
                     serves.push(Serves { candidate, room: -p.worst, dft });
                 }

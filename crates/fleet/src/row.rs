@@ -1,9 +1,9 @@
 //! What a run knows of one slot: a row of the store and of every table that is written.
 //!
-//! Units stand in the fields' names; figures are those of [`super::prove`].
+//! Units stand in the fields' names; figures are those of [`super::worst_case()`].
 
 use super::certified::Certified;
-use super::prove::WorstCase;
+use super::worst_case::WorstCase;
 use serde::{Deserialize, Serialize};
 use servotune::controller::Controller;
 use servotune::lti::PlantFile;
@@ -85,7 +85,8 @@ pub struct OwnTable {
     /// How it was found.
     pub way: Way,
     /// What it reaches.
-    pub proved: WorstCase,
+    #[serde(rename = "proved")]
+    pub judged: WorstCase,
 }
 
 /// A candidate of the library that is accepted in a slot.
@@ -152,7 +153,7 @@ pub struct SlotRow {
     pub current: Option<WorstCase>,
     /// The table found for it.
     pub table: Option<OwnTable>,
-    /// What the second prover says of that table.
+    /// What `verify` proves of that table.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certified: Option<Certified>,
     /// The best that was found where none passes.

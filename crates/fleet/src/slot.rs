@@ -6,11 +6,11 @@
 use super::certified::certified;
 use super::library::Library;
 use super::look::looks;
-use super::prove::prove;
 use super::ready::{Quick, Ready};
 use super::row::{GateRow, ModelRow, OwnTable, Serves, SlotRow, Verdict, Way};
 use super::slot_files::SlotName;
 use super::source::{Loaded, SlotSource};
+use super::worst_case::worst_case;
 use super::{Context, Evidence};
 use servotune::frf::{Frf, FrfShapeError};
 use servotune::gate::features::{RawMachine, features};
@@ -132,7 +132,7 @@ fn fill(
     let look = looks(&plant);
     row.model = Some(model);
     let mut ready = Ready::of(&evidence, &context.spec, &context.guarded, &context.base)?;
-    row.current = Some(prove(&mut ready, row.own_gains.as_ref().unwrap_or(&context.base))?);
+    row.current = Some(worst_case(&mut ready, row.own_gains.as_ref().unwrap_or(&context.base))?);
     row.verdict = match action {
         Action::RepairSensor | Action::RepairPushpin => Verdict::Repair,
         Action::Inspect => Verdict::Inspect,
@@ -276,7 +276,7 @@ fn covered(context: &Context, library: &Library, look: &[f64], ready: &mut Ready
         if clear {
             serves.push(Serves { candidate, room: guard - q.violation, dft });
         } else if candidate == 0 || q.violation <= 1.1 * guard + NEAR_MISS {
-            let p = prove(ready, &t.gains)?;
+            let p = worst_case(ready, &t.gains)?;
             if p.passes {
                 let dft = p.figures.dft();
                 serves.push(Serves { candidate, room: -p.worst, dft });
@@ -300,21 +300,21 @@ fn own_table(
     let mut nearest: Option<OwnTable> = None;
     for &&(i, _) in order.iter().take(POLISHED) {
         let Some((gains, _)) = ready.polish(&library.tables[i].gains, POLISH_STEPS) else { continue };
-        let table = OwnTable { proved: prove(ready, &gains)?, gains, way: Way::Polished };
-        if table.proved.passes {
+        let table = OwnTable { judged: worst_case(ready, &gains)?, gains, way: Way::Polished };
+        if table.judged.passes {
             return Ok((Some(table), None));
         }
         keep(&mut nearest, table);
     }
     if let Some(best) = looked.serves.iter().min_by(|a, b| a.dft.total_cmp(&b.dft)) {
         let gains = library.tables[best.candidate].gains.clone();
-        return Ok((Some(OwnTable { proved: prove(ready, &gains)?, gains, way: Way::Library }), None));
+        return Ok((Some(OwnTable { judged: worst_case(ready, &gains)?, gains, way: Way::Library }), None));
     }
     Ok((None, nearest))
 }
 
 fn keep(nearest: &mut Option<OwnTable>, table: OwnTable) {
-    if nearest.as_ref().is_none_or(|n| table.proved.worst < n.proved.worst) {
+    if nearest.as_ref().is_none_or(|n| table.judged.worst < n.judged.worst) {
         *nearest = Some(table);
     }
 }
@@ -324,5 +324,5 @@ pub(super) fn search(context: &Context, evidence: &Evidence) -> Result<OwnTable,
     let found = tune_jointly(&evidence.machines(), &context.guarded, Some(&context.base), &context.search)?;
     let gains = found.controller().clone();
     let mut ready = Ready::of(evidence, &context.spec, &context.guarded, &context.base)?;
-    Ok(OwnTable { proved: prove(&mut ready, &gains)?, gains, way: Way::Searched })
+    Ok(OwnTable { judged: worst_case(&mut ready, &gains)?, gains, way: Way::Searched })
 }

@@ -35,7 +35,7 @@ pub fn work_list(store: &Store, run: &str) -> Result<Vec<WorkItem>, FleetError> 
         let dft = |p: &super::WorstCase| p.figures.dft();
         match row.verdict {
             Verdict::Keeps => good.extend(row.current.as_ref().map(dft)),
-            Verdict::Tuned => good.extend(row.table.as_ref().map(|t| dft(&t.proved))),
+            Verdict::Tuned => good.extend(row.table.as_ref().map(|t| dft(&t.judged))),
             Verdict::Repair => {
                 let gate = row.gate.as_ref();
                 let word = gate.map_or("repair", |g| {
@@ -74,7 +74,7 @@ pub fn work_list(store: &Store, run: &str) -> Result<Vec<WorkItem>, FleetError> 
 fn untunable(row: &SlotRow, found: Option<&super::Explained>) -> WorkItem {
     let nearest = found.and_then(|f| f.nearest.as_ref()).or(row.nearest.as_ref());
     let mut why = nearest.map_or("no stable loop was found".to_owned(), |n| {
-        format!("{} missed by {:.1} % {}", n.proved.limit, 100.0 * n.proved.worst, n.proved.case)
+        format!("{} missed by {:.1} % {}", n.judged.limit, 100.0 * n.judged.worst, n.judged.case)
     });
     if let Some(cause) = found.and_then(|f| f.cause.as_ref()) {
         why += &match cause {
@@ -95,8 +95,8 @@ fn untunable(row: &SlotRow, found: Option<&super::Explained>) -> WorkItem {
         slot: row.id(),
         work,
         why,
-        dft_now: nearest.map(|n| dft(&n.proved)),
-        dft_after: remedy.map(|r| dft(&r.after.proved)),
+        dft_now: nearest.map(|n| dft(&n.judged)),
+        dft_after: remedy.map(|r| dft(&r.after.judged)),
         gain: 0.0,
     }
 }

@@ -4,7 +4,7 @@ use super::certificate_loops::{LoopCase, loops, rows};
 use super::certificate_mutations::{BOX, Certified, machines, mutations};
 use super::certificate_sweeps::{benchmark, sweeps};
 use super::{Study, StudyError};
-use servotune::verify::Verdict;
+use servotune::verify::LimitVerdict;
 use servotune_report::certificate::certificate_text;
 use std::path::Path;
 
@@ -136,7 +136,7 @@ fn machine_table(all: &[Certified]) -> String {
             let open: Vec<String> = c.cases[0]
                 .limits
                 .iter()
-                .filter(|l| l.verdict != Verdict::Proved)
+                .filter(|l| l.verdict != LimitVerdict::Proved)
                 .map(|l| {
                     let end = if l.side == "at_least" { l.proven.low } else { l.proven.high };
                     let end = end.map_or("unbounded".to_owned(), |x| format!("{x:.4}"));

@@ -7,6 +7,7 @@ use super::recordings::{Recording, case, motor, silverbox};
 use super::{Study, StudyError};
 use servotune::diagnose::{DiagnoseSettings, Diagnosed, diagnose, missing_curve};
 use servotune::lti::{Body, Plant};
+use servotune::numeric::statistics::rms_of;
 use servotune::recording::{Case, ColumnNames, Record, RecordEntry, RecordSettings, Role};
 use servotune_report::diagnosis::diagnosis_page;
 use servotune_report::diagnosis_curve::curve_figure;
@@ -62,8 +63,7 @@ fn pulley(data: &Path) -> Result<(Case, Plant), StudyError> {
 
 /// Root mean square behind the first samples.
 fn rms(errors: &[f64], skip: usize) -> f64 {
-    let e = &errors[skip.min(errors.len())..];
-    (e.iter().map(|v| v * v).sum::<f64>() / e.len().max(1) as f64).sqrt()
+    rms_of(errors.iter().skip(skip).copied())
 }
 
 /// What a diagnosis says, and its held-out errors record by record.

@@ -7,7 +7,7 @@ use super::{Study, StudyError};
 use rayon::prelude::*;
 use serde::Serialize;
 use servotune::gate::features::RawMachine;
-use servotune::gate::{Action, Doubt, Gate, Table, TrainSettings, Verdict, calibration_error, train};
+use servotune::gate::{Action, Doubt, Gate, GateVerdict, Table, TrainSettings, calibration_error, train};
 use servotune::twin::line::{LineSettings, UnknownKind, unknown_line};
 use servotune_report::number::NumberFormat;
 use servotune_report::table::{self as sheet, Column};
@@ -81,7 +81,7 @@ fn one(seed: u64) -> Result<Seed, StudyError> {
     let fresh = table_of(&of(FRESH + seed))?;
     let said = gate.classify(&fresh)?;
     let truth = truths(gate, &fresh);
-    let names = |v: &Verdict| gate.classes.labels.iter().position(|l| *l == v.class);
+    let names = |v: &GateVerdict| gate.classes.labels.iter().position(|l| *l == v.class);
     let n = said.len().max(1) as f64;
     let right = said.iter().zip(&truth).filter(|(v, t)| names(v) == **t).count();
     let known: Vec<(usize, Vec<f64>)> =

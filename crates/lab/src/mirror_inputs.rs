@@ -9,6 +9,7 @@ use servotune::diagnose::{DiagnoseSettings, Diagnosed, diagnose};
 use servotune::frf::Hold;
 use servotune::identify::{BodyChoice, IdentifySettings, OrderChoice, identify};
 use servotune::lti::{Body, Plant};
+use servotune::numeric::statistics::rms_of;
 use servotune::recording::{Case, Record, RecordEntry, Role, read_columns};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -137,8 +138,7 @@ fn between_periods(position: &[f64], experiment: &[f64]) -> f64 {
 /// Error of a model on the whole periods of the held-out records (um).
 fn whole_periods(made: &Diagnosed, model: usize) -> f64 {
     let held = made.data.runs.iter().zip(&made.errors[model]).filter(|(r, _)| r.role == Role::Holdout);
-    let (sum, count) = held.flat_map(|(_, e)| e.iter().skip(RUN_IN)).fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
-    (sum / f64::max(count, 1.0)).sqrt()
+    rms_of(held.flat_map(|(_, e)| e.iter().skip(RUN_IN).copied()))
 }
 
 fn page(axes: &[Axis]) -> String {

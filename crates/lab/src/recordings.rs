@@ -8,6 +8,7 @@ use servotune::diagnose::{DiagnoseSettings, Diagnosed, diagnose};
 use servotune::frf::{PeriodicSettings, periodic};
 use servotune::identify::{BodyChoice, IdentifySettings, OrderChoice, identify};
 use servotune::lti::{Body, Plant};
+use servotune::numeric::statistics::rms_of;
 use servotune::recording::{Case, ColumnNames, Record, RecordEntry, RecordSettings, Role, read_columns};
 use servotune_report::diagnosis::diagnosis_page;
 use std::fmt::Write;
@@ -156,10 +157,7 @@ fn made(r: &Recording, data: &Path) -> Result<Diagnosed, StudyError> {
 fn section(r: &Recording, m: &Diagnosed) -> String {
     let d = &m.diagnosis;
     let held = m.data.runs.iter().position(|run| run.role == Role::Holdout).unwrap_or(0);
-    let rmse = |errors: &[Vec<f64>]| {
-        let e = &errors[held][r.skip.min(errors[held].len())..];
-        r.metric.0 * (e.iter().map(|v| v * v).sum::<f64>() / e.len().max(1) as f64).sqrt()
-    };
+    let rmse = |errors: &[Vec<f64>]| r.metric.0 * rms_of(errors[held].iter().skip(r.skip).copied());
     let verdict = serde_json::to_string(&d.verdict).unwrap_or_default();
     let unit = r.metric.1;
     let mut text = format!(

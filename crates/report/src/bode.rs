@@ -7,6 +7,7 @@ use super::error::{ReportError, same_length};
 use super::figure::{Axis, Figure, Ink, Kind, Mark, Note, Panel, Region, RuleLine, Series};
 use super::number::NumberFormat;
 use nalgebra::Complex;
+use servotune::numeric::unwrap::nearest;
 
 /// One response to draw.
 #[derive(Clone, Copy, Debug)]
@@ -122,8 +123,7 @@ pub(super) fn unwrapped_degrees(response: &[Complex<f64>]) -> Vec<f64> {
             return f64::NAN;
         }
         let raw = value.arg().to_degrees();
-        let near = before.unwrap_or(-135.0);
-        let found = raw + 360.0 * ((near - raw) / 360.0).round();
+        let found = nearest(raw, before.unwrap_or(-135.0), 360.0);
         before = Some(found);
         found
     };

@@ -4,7 +4,7 @@ use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Column, Table};
 use servotune::verify::{
-    Bounded, CaseProof, Certificate, Finding, ProvenLimit, Stability, Verdict, WriteBox, WriteOpen,
+    Bounded, CaseProof, Certificate, Finding, LimitVerdict, ProvenLimit, Stability, WriteBox, WriteOpen,
 };
 
 /// Columns of a table of limits with what is proved of each.
@@ -37,9 +37,9 @@ pub fn certificate_text(c: &Certificate) -> Result<String, ReportError> {
         for l in &case.limits {
             let side = if l.side == "at_least" { "at least" } else { "at most" };
             let verdict = match l.verdict {
-                Verdict::Proved => "proved",
-                Verdict::Violated => "VIOLATED",
-                Verdict::NotProved => "NOT PROVED",
+                LimitVerdict::Proved => "proved",
+                LimitVerdict::Violated => "VIOLATED",
+                LimitVerdict::NotProved => "NOT PROVED",
             };
             table.push(vec![
                 l.name.as_str().into(),
@@ -99,7 +99,7 @@ pub fn certificate_sentence(c: &Certificate) -> String {
             Stability::Unstable => parts.push(format!("{of}the loop is unstable")),
             Stability::Undecided => parts.push(format!("{of}stability is not proved")),
         }
-        for l in case.limits.iter().filter(|l| l.verdict != Verdict::Proved) {
+        for l in case.limits.iter().filter(|l| l.verdict != LimitVerdict::Proved) {
             let side = if l.side == "at_least" { "at least" } else { "at most" };
             let proven = open_reason(c, case, l);
             // A certificate keeps the field of the plant file in which the unit stands; a sentence says what it means.

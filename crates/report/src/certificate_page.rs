@@ -12,7 +12,7 @@ use super::proven_limit::{in_words, name, word};
 use super::proven_room::{room, room_figure};
 use super::table::{Cell, Column, Table, Verdict};
 use super::tuned::Units;
-use servotune::verify::{Bounded, CaseProof, Certificate, ProvenLimit, Stability, Verdict as Proven, Word};
+use servotune::verify::{Bounded, CaseProof, Certificate, LimitVerdict as Proven, ProvenLimit, Stability, Word};
 
 /// A certificate with the names that it does not hold itself.
 #[derive(Clone, Debug)]

@@ -8,14 +8,14 @@ use super::histogram::{Group, histogram};
 use super::number::NumberFormat;
 use super::page::{Block, Card, Page, Section};
 use super::table::{Cell, Column, Table, Verdict as Colour};
-use servotune::gate::{Action, Decisions, Drift, Verdict};
+use servotune::gate::{Action, Decisions, Drift, GateVerdict};
 
 /// The machines in the table's order.
-pub fn machines_table(rows: &[Verdict]) -> Result<Table, ReportError> {
+pub fn machines_table(rows: &[GateVerdict]) -> Result<Table, ReportError> {
     table(rows, |action| Cell::from(action.word()))
 }
 
-fn table(rows: &[Verdict], action: impl Fn(Action) -> Cell) -> Result<Table, ReportError> {
+fn table(rows: &[GateVerdict], action: impl Fn(Action) -> Cell) -> Result<Table, ReportError> {
     let mut t = Table::new(
         "Machines",
         vec![
@@ -45,7 +45,7 @@ pub struct ClassifiedView<'a> {
     /// The table.
     pub name: &'a str,
     /// Its machines.
-    pub rows: &'a [Verdict],
+    pub rows: &'a [GateVerdict],
     /// How the table differs from the gate's.
     pub drift: &'a Drift,
     /// Rows whose label the table has, the share of them that is right, and what the decisions came to.

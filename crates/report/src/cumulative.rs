@@ -45,6 +45,7 @@ pub fn cumulative_spectrum(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use servotune::numeric::statistics::deviation;
     use std::f64::consts::TAU;
 
     /// Parseval: the right end is the standard deviation, found in the time domain, of even and of odd windows.
@@ -62,8 +63,7 @@ mod tests {
                 Harmonic { k, hz, amplitude: part(f64::cos).hypot(part(f64::sin)) / n as f64 }
             };
             let harmonics: Vec<Harmonic> = (1..=n / 2).map(harmonic).collect();
-            let mean = x.iter().sum::<f64>() / n as f64;
-            let std = (x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
+            let std = deviation(&x);
             let end = *cumulative(&harmonics, 27_480.0).last().unwrap();
             assert!((end / std - 1.0).abs() < 1e-12, "{n}: {end} {std}");
         }

@@ -186,7 +186,7 @@ fn at_amplitude(plant: &Plant, effects: &[&Setting], scene: &Scene, amplitude: f
 pub(super) fn amplitude_figure(s: &Shown) -> Result<Option<Figure>, ReportError> {
     let (fixed, scene) = (&s.made.corrected, &s.made.data.scene);
     let effects: Vec<&Setting> = fixed.effects.iter().filter(|s| s.law.effect().acts_on_body()).collect();
-    if effects.iter().all(|s| matches!(s.law, AnyLaw::CableSpring(_))) {
+    if !effects.iter().any(|s| s.law.effect().changes_with_amplitude()) {
         return Ok(None);
     }
     let amplitudes = servotune::physics::logarithmic(1e-3 * scene.travel, 2.0 * scene.travel, 25);

@@ -65,6 +65,7 @@ pub mod table;
 pub mod time;
 pub mod trained;
 pub mod tuned;
+pub mod workflow;
 pub mod write;
 
 pub use error::ReportError;

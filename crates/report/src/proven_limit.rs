@@ -1,7 +1,7 @@
 //! A proven limit in words: its name with its unit, and its verdict.
 
 use super::table::Verdict;
-use servotune::verify::{CaseProof, ProvenLimit, Verdict as Proven};
+use servotune::verify::{CaseProof, LimitVerdict as Proven, ProvenLimit};
 
 /// The verdict on one limit in a word, with its colour.
 pub(super) fn word(p: Proven) -> (Verdict, &'static str) {

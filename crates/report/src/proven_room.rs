@@ -6,7 +6,7 @@
 use super::ReportError;
 use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Series};
 use super::proven_limit::{name, word};
-use servotune::verify::{Certificate, ProvenLimit, Verdict as Proven};
+use servotune::verify::{Certificate, LimitVerdict as Proven, ProvenLimit};
 
 /// Machines drawn in one figure.
 const DRAWN: usize = 6;

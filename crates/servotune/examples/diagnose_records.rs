@@ -3,15 +3,14 @@
 //! The machine is the paper's with a bearing that sticks; the model does not know of it. Records of your own come from a folder with
 //! `Case::read`.
 
-use servotune::diagnose::{DiagnoseSettings, Verdict, diagnose};
-use servotune::document::{parse_toml, read_text};
-use servotune::lti::PlantFile;
+use servotune::diagnose::Verdict;
+use servotune::document::read_toml;
 use servotune::numeric::random::Random;
 use servotune::physics::Setting;
 use servotune::physics::pivot_friction::{Loading, PivotFriction};
 use servotune::recording::{RecordColumns, RecordEntry, Role};
 use servotune::twin::recording::{multisine, record, scene, stroke};
-use servotune::{Case, Controller, Plant, Record};
+use servotune::{Case, Controller, DiagnoseSettings, Plant, PlantFile, Record, diagnose};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
@@ -23,8 +22,8 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().find(|p| p.join("specs/machines").is_dir());
     let specs = root.ok_or("run it from a checkout")?.join("specs");
     let [machine, gains] = ["machines/healthy.toml", "controllers/nominal.toml"].map(|f| specs.join(f));
-    let plant = Plant::try_from(parse_toml::<PlantFile>(&machine, &read_text(&machine)?)?)?;
-    let controller: Controller = parse_toml(&gains, &read_text(&gains)?)?;
+    let plant = Plant::try_from(read_toml::<PlantFile>(&machine)?)?;
+    let controller: Controller = read_toml(&gains)?;
 
     let scene = scene(&plant, controller.sample_time_s, 15.0, SAMPLES, 3e-3);
     let bearing = PivotFriction { sliding_length: 0.5, loading: Loading::Dahl };

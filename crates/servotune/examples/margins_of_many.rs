@@ -3,10 +3,8 @@
 //!
 //! What other ways to the same figures are held against to the last bit: numbers are written so that reading them gives them back.
 
-use servotune::controller::Controller;
-use servotune::document::{parse_toml, read_text};
-use servotune::feedback::{ModelLoop, margins};
-use servotune::lti::{DiscretePlant, Plant, PlantFile};
+use servotune::document::read_toml;
+use servotune::{Controller, DiscretePlant, ModelLoop, Plant, PlantFile, margins};
 use std::error::Error;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -18,7 +16,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().find(|p| p.join("specs/machines").is_dir());
     let specs = root.ok_or("run it from a checkout")?.join("specs");
     let file = given.next().unwrap_or_else(|| specs.join("controllers/nominal.toml"));
-    let controller: Controller = parse_toml(&file, &read_text(&file)?)?;
+    let controller: Controller = read_toml(&file)?;
     let sections = controller.sections()?;
     let mut plants: Vec<PathBuf> = given.collect();
     if plants.is_empty() {
@@ -26,7 +24,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     }
     let mut out = std::io::stdout().lock();
     for file in plants {
-        let plant: Plant = parse_toml::<PlantFile>(&file, &read_text(&file)?)?.try_into()?;
+        let plant: Plant = read_toml::<PlantFile>(&file)?.try_into()?;
         let sampled = DiscretePlant::of(&plant, controller.sample_time_s)?;
         let found = margins(&ModelLoop::new(&sampled, &sections)?);
         writeln!(out, "{}", serde_json::to_string(&found)?)?;

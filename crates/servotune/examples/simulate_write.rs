@@ -1,9 +1,8 @@
 //! The position error of one spiral write: `cargo run -p servotune --example simulate_write`.
 
-use servotune::document::{parse_toml, read_text};
-use servotune::lti::PlantFile;
-use servotune::pes::{figures, simulate};
-use servotune::{Controller, Plant, Profile};
+use servotune::document::read_toml;
+use servotune::pes::figures;
+use servotune::{Controller, Plant, PlantFile, Profile, simulate};
 use std::error::Error;
 use std::path::Path;
 
@@ -13,9 +12,9 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let specs = root.ok_or("run it from a checkout")?.join("specs");
     let [machine, gains, write] =
         ["machines/healthy.toml", "controllers/nominal.toml", "profiles/spiral.toml"].map(|f| specs.join(f));
-    let plant = Plant::try_from(parse_toml::<PlantFile>(&machine, &read_text(&machine)?)?)?;
-    let controller: Controller = parse_toml(&gains, &read_text(&gains)?)?;
-    let profile: Profile = parse_toml(&write, &read_text(&write)?)?;
+    let plant = Plant::try_from(read_toml::<PlantFile>(&machine)?)?;
+    let controller: Controller = read_toml(&gains)?;
+    let profile: Profile = read_toml(&write)?;
 
     let run = simulate(&plant, &controller, &profile)?;
     let found = figures(&run.pes, &profile);

@@ -2,12 +2,11 @@
 //!
 //! The sweep is that of a linear stage (`examples/stage`), position in um, command in A, taken at 10 kHz.
 
-use servotune::controller::Controller;
-use servotune::document::{parse_toml, read_text};
-use servotune::feedback::{MeasuredLoop, ModelLoop, margins, measured_margins};
+use servotune::document::read_toml;
 use servotune::frf::{ReadSettings, read_file};
-use servotune::identify::{IdentifySettings, identify};
-use servotune::lti::DiscretePlant;
+use servotune::{
+    Controller, DiscretePlant, IdentifySettings, MeasuredLoop, ModelLoop, identify, margins, measured_margins,
+};
 use std::error::Error;
 use std::path::Path;
 
@@ -17,7 +16,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let folder = root.ok_or("run it from a checkout")?.join("examples/stage");
     let sweep = read_file(&folder.join("sweep.csv"), &ReadSettings::default())?;
     let file = folder.join("controller.toml");
-    let controller: Controller = parse_toml(&file, &read_text(&file)?)?;
+    let controller: Controller = read_toml(&file)?;
     let sections = controller.sections()?;
 
     let model = identify(&sweep.frf, &IdentifySettings::default())?.plant;

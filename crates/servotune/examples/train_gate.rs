@@ -4,8 +4,9 @@
 //! with `gate::features::read_machines`.
 
 use servotune::gate::features::{RawMachine, features};
-use servotune::gate::{Action, Table, TrainSettings, train};
+use servotune::gate::{Action, Table};
 use servotune::twin::line::{LineSettings, line};
+use servotune::{TrainSettings, train};
 use std::error::Error;
 use std::path::Path;
 

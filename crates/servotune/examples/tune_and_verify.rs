@@ -1,9 +1,8 @@
 //! Gains that meet limits, and their proof by other algorithms: `cargo run -p servotune --example tune_and_verify`.
 
-use servotune::document::{parse_toml, read_text};
-use servotune::lti::{Plant, PlantFile};
-use servotune::tune::{Machine, Outcome, Spec, TuneSettings, tune};
-use servotune::verify::{Uncertainty, VerifySettings, prove_loop};
+use servotune::document::read_toml;
+use servotune::verify::prove_loop;
+use servotune::{Machine, Outcome, Plant, PlantFile, Spec, TuneSettings, Uncertainty, VerifySettings, tune};
 use std::error::Error;
 use std::path::Path;
 
@@ -12,7 +11,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().find(|p| p.join("specs/machines").is_dir());
     let specs = root.ok_or("run it from a checkout")?.join("specs");
     let file = specs.join("machines/healthy.toml");
-    let plant = Plant::try_from(parse_toml::<PlantFile>(&file, &read_text(&file)?)?)?;
+    let plant = Plant::try_from(read_toml::<PlantFile>(&file)?)?;
     let spec = Spec::read(&specs.join("limits/paper.toml"))?;
     let settings = TuneSettings { sample_time_s: Some(39.6e-6), starts: 4, ..TuneSettings::default() };
     let outcome = tune(&Machine::Model(&plant), &spec, None, &settings)?;

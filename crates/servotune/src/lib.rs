@@ -18,8 +18,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod units;
-
 pub mod document;
 pub mod numeric;
 
@@ -44,10 +42,12 @@ pub mod verify;
 
 // The nouns and verbs of the common tasks, without their rooms.
 pub use controller::{Controller, Lowpass, Notch, Pid};
+pub use diagnose::{DiagnoseSettings, Diagnosed, Diagnosis, diagnose};
 pub use feedback::{Margins, MeasuredLoop, MeasuredMargins, ModelLoop, margins, measured_margins};
 pub use frf::{Frf, Sweep};
+pub use gate::{Gate, GateVerdict, TrainSettings, Trained, train};
 pub use identify::{Identified, IdentifySettings, identify};
-pub use lti::{Body, DiscretePlant, Mode, Plant};
+pub use lti::{Body, DiscretePlant, Mode, Plant, PlantFile};
 pub use numeric::interval::Interval;
 pub use pes::{PesFigures, Profile, simulate};
 pub use recording::{Case, Record};

@@ -5,6 +5,7 @@
 use super::DiagnoseError;
 use super::rules::BEYOND_MOTION;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::numeric::statistics::{deviation, rms_of};
 
 /// Refuses a ground on which nothing can be computed.
 pub(super) fn check(data: &DiagnosisData) -> Result<(), DiagnoseError> {
@@ -36,11 +37,9 @@ fn finite(data: &DiagnosisData) -> Result<(), DiagnoseError> {
 fn alike(data: &DiagnosisData) -> Result<(), DiagnoseError> {
     let none = vec![0.0; data.form.free_parameters.len()];
     for (record, error) in data.means.iter().zip(data.clone().fit(vec![]).errors(&none)) {
-        let mean = record.position.iter().sum::<f64>() / record.len() as f64;
-        let moved: Vec<f64> = record.position.iter().map(|x| x - mean).collect();
-        let size = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt();
-        let ratio = size(&error) / size(&moved);
-        if size(&moved) > 0.0 && (!ratio.is_finite() || ratio > BEYOND_MOTION) {
+        let moved = deviation(&record.position);
+        let ratio = rms_of(error) / moved;
+        if moved > 0.0 && (!ratio.is_finite() || ratio > BEYOND_MOTION) {
             return Err(DiagnoseError::Unlike { record: record.name.clone(), ratio });
         }
     }

@@ -5,7 +5,7 @@
 
 use super::cubic::Cubic;
 use super::{FeedbackError, SampledPlant};
-use crate::frf::Frf;
+use crate::frf::{Frf, log_steps};
 use crate::lti::{DiscretePlant, FrequencyResponse};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
@@ -53,8 +53,8 @@ impl ResponseCurve {
         let ln_w: Vec<f64> = w.iter().map(|w| w.ln()).collect();
         let p: Vec<Complex<f64>> = w.iter().zip(frf.value()).map(|(w, p)| p * hold(*w)).collect();
         let mut ln_p = vec![p[0].ln()];
-        for i in 1..n {
-            ln_p.push(ln_p[i - 1] + (p[i] / p[i - 1]).ln());
+        for (i, step) in log_steps(&w, &p).into_iter().enumerate() {
+            ln_p.push(ln_p[i] + step);
         }
         let last = ln_w.partition_point(|x| *x <= ln_w[0] + SLOPE_OCTAVES * 2f64.ln()).max(2) - 1;
         let slope = (ln_p[last].re - ln_p[0].re) / (ln_w[last] - ln_w[0]);
@@ -142,14 +142,7 @@ impl FrequencyResponse for ResponseCurve {
             return (self.ln_p[0] - self.integrators as f64 * (x - self.ln_w[0])).exp();
         }
         let i = self.ln_w.partition_point(|k| *k < x).clamp(1, n - 1) - 1;
-        if n < 4 {
-            let share = (x - self.ln_w[i]) / (self.ln_w[i + 1] - self.ln_w[i]);
-            return (self.ln_p[i] * (1.0 - share) + self.ln_p[i + 1] * share).exp();
-        }
-        let first = i.saturating_sub(1).min(n - 4);
-        let xs = std::array::from_fn(|k| self.ln_w[first + k]);
-        let ys = std::array::from_fn(|k| self.ln_p[first + k]);
-        Cubic::through(xs, ys).at(x).0.exp()
+        Cubic::around(&self.ln_w, i, |first, k| self.ln_p[first + k]).at(x).0.exp()
     }
 }
 

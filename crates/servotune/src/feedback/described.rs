@@ -137,12 +137,7 @@ const BALANCED: f64 = 1e-11;
 /// Least gain of the amplifier: a command wholly inside a dead band counts as this, so that L keeps a logarithm.
 const LEAST: f64 = 1e-9;
 
-impl<'a> Described<'a> {
-    /// The same with the command's amplitude given (command_unit).
-    pub fn with_command(self, amplitude: f64) -> Described<'a> {
-        self.plant.described(self.amplitude, amplitude)
-    }
-
+impl Described<'_> {
     /// Amplitude of the position (position_unit).
     pub fn amplitude(&self) -> f64 {
         self.amplitude

@@ -4,8 +4,10 @@
 //! points: the sections exactly, ln P as a cubic in ln w (from its own slopes for a model, through four neighbours for a sweep). What is
 //! read off stands in [`super::judge`]; spec: `specs/tuning.md`.
 
+use super::cubic::Cubic;
 use super::events::{NEAR_ONE, turns_back};
 use super::piece::Piece;
+use crate::frf::log_steps;
 use crate::lti::{DiscretePlant, Section};
 use crate::numeric::wide::{Wide, widest};
 use nalgebra::Complex;
@@ -98,7 +100,7 @@ impl SampledPlant {
             cos: lanes(&|i| angle(i).cos()),
             sin: lanes(&|i| angle(i).sin()),
             lift,
-            pieces: pieces(&ln_w[..points], value),
+            pieces: pieces(&w[..points], &ln_w[..points], &value[..points]),
             ln_w,
             w,
         }
@@ -280,33 +282,18 @@ impl Wide for Look<'_> {
 }
 
 /// Every interval's cubic through its two ends and their outer neighbours.
-fn pieces(x: &[f64], value: &[Complex<f64>]) -> Vec<Piece> {
-    let n = x.len();
-    let step = |i: usize| (value[i + 1] / value[i]).ln();
-    (1..n)
-        .map(|right| {
-            let i = right - 1;
-            let first = i.saturating_sub(1).min(n.saturating_sub(4));
-            let count = (n - first).min(4);
-            // Newton's divided differences from the first of the neighbours.
-            let mut c = [Complex::new(0.0, 0.0); 4];
-            for k in 1..count {
-                c[k] = c[k - 1] + step(first + k - 1);
+fn pieces(w: &[f64], ln_w: &[f64], value: &[Complex<f64>]) -> Vec<Piece> {
+    let steps = log_steps(w, value);
+    let piece = |(i, &step): (usize, &Complex<f64>)| {
+        // ln P less that of the first of the neighbours.
+        let mut above = Complex::new(0.0, 0.0);
+        let cubic = Cubic::around(ln_w, i, |first, k| {
+            if k > 0 {
+                above += steps[first + k - 1];
             }
-            for level in 1..count {
-                for k in (level..count).rev() {
-                    c[k] = (c[k] - c[k - 1]) / (x[first + k] - x[first + k - level]);
-                }
-            }
-            let slope = |at: f64| {
-                let (mut value, mut slope) = (c[count - 1], Complex::new(0.0, 0.0));
-                for k in (0..count - 1).rev() {
-                    slope = slope * (at - x[first + k]) + value;
-                    value = value * (at - x[first + k]) + c[k];
-                }
-                slope
-            };
-            Piece { step: step(i), left: slope(x[i]), right: slope(x[right]) }
-        })
-        .collect()
+            above
+        });
+        Piece { step, left: cubic.at(ln_w[i]).1, right: cubic.at(ln_w[i + 1]).1 }
+    };
+    steps.iter().enumerate().map(piece).collect()
 }

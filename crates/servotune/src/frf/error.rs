@@ -269,18 +269,6 @@ pub enum FrfError {
     Touchstone { file: String, line: u64, found: String, expected: &'static str },
     #[error("{file}: {source}")]
     Shape { file: String, source: FrfShapeError },
-    #[error(
-        "{points} points cannot carry a model of order {order}; expected at least {needed} (four for each pair of poles, and eight for the rigid body and the delay)"
-    )]
-    TooFewPoints { points: usize, order: usize, needed: usize },
-    #[error("the grids differ: {left} and {right} points; bring both onto one grid first")]
-    GridLength { left: usize, right: usize },
-    #[error("the grids differ at point {index}: {left_hz} Hz and {right_hz} Hz; bring both onto one grid first")]
-    Grid { index: usize, left_hz: f64, right_hz: f64 },
-    #[error(
-        "at {at_hz} Hz the result is not a finite, non-zero number: one plus the open loop is zero, or a number overflows"
-    )]
-    Singular { at_hz: f64 },
     #[error("a response needs records of one length: input {input}, output {output} samples")]
     RecordLength { input: usize, output: usize },
     #[error("sample {sample} of the {record} is not finite")]

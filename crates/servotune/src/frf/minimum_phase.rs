@@ -2,6 +2,7 @@
 //!
 //! In: log frequency and log gain. Out: phase in radians. Relation: Bode 1945, gain-phase integral; spec: `specs/frf.md`.
 
+use crate::numeric::statistics::line;
 use std::f64::consts::PI;
 
 /// 1/1, 1/9, 1/25, ...: as many as the series needs from 0.5 on, where e^(-39/2) is below 1e-8.
@@ -41,14 +42,8 @@ fn weight(x: f64) -> f64 {
 
 /// Slope of the least-squares line through (x, y); 0 where x does not vary.
 fn slope(x: &[f64], y: &[f64]) -> f64 {
-    let n = x.len() as f64;
-    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
-    let (mut sxy, mut sxx) = (0.0, 0.0);
-    for (a, b) in x.iter().zip(y) {
-        sxy += (a - mx) * (b - my);
-        sxx += (a - mx) * (a - mx);
-    }
-    if sxx > 0.0 { sxy / sxx } else { 0.0 }
+    let slope = line(x, y, 0.0).1;
+    if slope.is_nan() { 0.0 } else { slope }
 }
 
 /// Minimum phase (rad) at the grid points `at`, from ln w and ln |G| on an ascending grid.

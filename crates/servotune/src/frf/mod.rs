@@ -3,7 +3,6 @@
 //! In: sweep files, time records. Out: [`Frf`], the response on its own ascending grid.
 //! Convention: `specs/conventions.md`; files: `specs/frf.md`.
 
-mod algebra;
 mod bytes;
 mod causality;
 mod channel;
@@ -32,7 +31,6 @@ mod uff;
 mod uff_block;
 mod write;
 
-pub use algebra::{feedback, product, ratio};
 pub use causality::{Evidence, Misfit, Reading};
 pub use channel::{Channel, Dead};
 pub use closed_loop::{Opened, open_loop, scatter};
@@ -40,7 +38,7 @@ pub use error::{Doubt, FrfError, NotText, Question};
 pub use estimate::{Estimate, PeriodicSettings, SegmentSettings, periodic, segments};
 pub use gather::{GATHERED_ABOVE, Gathered, gathered};
 pub use note::{Ground, Note};
-pub use phase::{check_order, phase_rad};
+pub use phase::{log_steps, phase_rad};
 pub use read::{Sweep, read_bytes, read_file};
 pub use response::{Frf, FrfShapeError, Hold};
 pub use settings::{

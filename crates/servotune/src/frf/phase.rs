@@ -1,54 +1,66 @@
-//! The phase of a response on one continuous branch.
+//! The phase of a response on one continuous branch: the one rule for margins, search and gate.
 //!
 //! In: a response. Out: radians, without jumps of a full turn. Source: paper section 2.1, figures 4 and 5; spec: `specs/frf.md`.
 
 use super::causality::{Reading, misfits};
-use super::error::FrfError;
+use super::gather::GATHERED_ABOVE;
 use super::minimum_phase::minimum_phase;
 use super::response::Frf;
-use crate::numeric::unwrap::{unwrap, unwrap_along};
+use crate::numeric::unwrap::nearest;
+use nalgebra::Complex;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// The unwrapped phase at each point (rad), on the branch that the gain-phase relation gives.
+/// Steps beyond this may be others by a full turn (rad): a true one of up to three quarters of a turn shows as one of these.
+const UNSURE: f64 = FRAC_PI_2;
+
+/// ln of each value over the one before it, the step of its phase on its branch.
 ///
-/// A free inertia lies at -pi, not at +pi, and a step beyond half a turn at a sharp resonance or a long delay does no harm, because only the
-/// difference to minimum phase and delay is unwrapped. Short sweeps are unwrapped step by step.
-pub fn phase_rad(frf: &Frf) -> Vec<f64> {
-    let angles: Vec<f64> = frf.value().iter().map(|v| v.arg()).collect();
-    let w = frf.w_rad_s();
-    let gain: Vec<f64> = frf.value().iter().map(|v| v.norm()).collect();
-    let plain = Reading { decibels: false, degrees: false, margin: false, conjugated: false };
-    // An inverted sensor turns everything by half a turn and is no reason to lose the guide.
-    let found = misfits(w, &gain, &angles, &[plain, Reading { margin: true, ..plain }]);
-    let Some(best) = found.first().filter(|m| m.is_plausible()) else { return unwrap(&angles) };
-    let log_w: Vec<f64> = w.iter().map(|w| w.ln()).collect();
-    let log_gain: Vec<f64> = gain.iter().map(|g| g.ln()).collect();
-    let all: Vec<usize> = (0..w.len()).collect();
-    let half_turn = if best.reading.margin { std::f64::consts::PI } else { 0.0 };
-    let guide: Vec<f64> = minimum_phase(&log_w, &log_gain, &all)
-        .iter()
-        .zip(w)
-        .map(|(phase, w)| phase + half_turn - w * best.delay_s)
-        .collect();
-    unwrap_along(&angles, &guide)
+/// Steps are the shortest ones. A long one is taken on the branch that minimum phase and delay expect, so that one beyond half a turn at a sharp
+/// resonance or a long delay does no harm. A sweep of more than [`GATHERED_ABOVE`] points is dense, and its long steps are noise.
+pub fn log_steps(w_rad_s: &[f64], value: &[Complex<f64>]) -> Vec<Complex<f64>> {
+    let mut steps: Vec<Complex<f64>> = value.windows(2).map(|v| (v[1] / v[0]).ln()).collect();
+    let unsure: Vec<usize> = (0..steps.len()).filter(|&i| steps[i].im.abs() > UNSURE).collect();
+    if unsure.is_empty() || value.len() > GATHERED_ABOVE {
+        return steps;
+    }
+    let ends: Vec<usize> = unsure.iter().flat_map(|&i| [i, i + 1]).collect();
+    let Some(expected) = expected_phase(w_rad_s, value, &ends) else { return steps };
+    for (&i, ends) in unsure.iter().zip(expected.chunks_exact(2)) {
+        steps[i].im = nearest(steps[i].im, ends[1] - ends[0], TAU);
+    }
+    steps
 }
 
-/// Whether a response has the points that a model of `order` (number of poles) needs.
-///
-/// Each point gives two real numbers, a pair of poles with its pair of zeros asks for four; noise and the need to see both
-/// flanks of a peak double that: four points for each pair. Eight more carry rigid body and delay.
-pub fn check_order(frf: &Frf, order: usize) -> Result<(), FrfError> {
-    let needed = order.div_ceil(2).saturating_mul(4).saturating_add(8);
-    if frf.len() < needed {
-        return Err(FrfError::TooFewPoints { points: frf.len(), order, needed });
+/// The unwrapped phase at each point (rad). The first point is on the branch that the gain-phase relation gives: a free inertia lies at -pi, not at +pi.
+pub fn phase_rad(frf: &Frf) -> Vec<f64> {
+    let (w, value) = (frf.w_rad_s(), frf.value());
+    let angle = value[0].arg();
+    let mut phase = vec![expected_phase(w, value, &[0]).map_or(angle, |e| nearest(angle, e[0], TAU))];
+    for step in log_steps(w, value) {
+        phase.push(phase[phase.len() - 1] + step.im);
     }
-    Ok(())
+    phase
+}
+
+/// Minimum phase and the delay that fits best, at the points `at` (rad); none where they do not explain the response, or where it is short.
+fn expected_phase(w: &[f64], value: &[Complex<f64>], at: &[usize]) -> Option<Vec<f64>> {
+    let gain: Vec<f64> = value.iter().map(|v| v.norm()).collect();
+    let angle: Vec<f64> = value.iter().map(|v| v.arg()).collect();
+    let plain = Reading { decibels: false, degrees: false, margin: false, conjugated: false };
+    // An inverted sensor turns everything by half a turn and is no reason to lose the guide.
+    let found = misfits(w, &gain, &angle, &[plain, Reading { margin: true, ..plain }]);
+    let best = found.first().filter(|m| m.is_plausible())?;
+    let log_w: Vec<f64> = w.iter().map(|w| w.ln()).collect();
+    let log_gain: Vec<f64> = gain.iter().map(|g| g.ln()).collect();
+    let half_turn = if best.reading.margin { PI } else { 0.0 };
+    let minimum = minimum_phase(&log_w, &log_gain, at);
+    Some(minimum.iter().zip(at).map(|(phase, &i)| phase + half_turn - w[i] * best.delay_s).collect())
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used)]
     use super::*;
-    use nalgebra::Complex;
 
     #[test]
     fn the_branch_of_a_free_inertia_with_a_long_delay_is_found() {
@@ -62,10 +74,16 @@ mod tests {
         }
     }
 
+    /// A grid so coarse that the last step of the delay's phase is 3.6 rad.
     #[test]
-    fn orders_beyond_the_points_are_refused() {
-        let frf = Frf::new((1..=20).map(f64::from).collect(), vec![Complex::new(1.0, 0.0); 20], None).unwrap();
-        assert!(check_order(&frf, 6).is_ok());
-        assert!(matches!(check_order(&frf, 7), Err(FrfError::TooFewPoints { points: 20, order: 7, needed: 24 })));
+    fn steps_beyond_half_a_turn_take_the_branch_of_the_delay() {
+        let (w, delay_s): (Vec<f64>, f64) = ((0..20).map(|i| 250.0 * 1.25f64.powi(i)).collect(), 1.05e-3);
+        let value: Vec<_> = w.iter().map(|&w| Complex::from_polar(1e4 / (w * w), -PI - w * delay_s)).collect();
+        let steps = log_steps(&w, &value);
+        let long = steps.iter().filter(|s| s.im.abs() > PI).count();
+        for (s, w) in steps.iter().zip(w.windows(2)) {
+            assert!((s.im + (w[1] - w[0]) * delay_s).abs() < 1e-9, "{s} at {}", w[1]); // rounding of some turns
+        }
+        assert!(long > 0, "no step is long");
     }
 }

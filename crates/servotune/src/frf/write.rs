@@ -4,8 +4,7 @@
 
 use super::error::FrfError;
 use super::response::Frf;
-use crate::units::{Decibels, Degrees};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::io::Write;
 
 /// What the phase column of a written file shows.
@@ -32,13 +31,13 @@ pub fn write_bod_as(frf: &Frf, phase: PhaseDisplay, out: &mut impl Write) -> Res
     let extra = if frf.relative_std().is_some() { "\tStd (relative)" } else { "" };
     writeln!(out, "Frequency (Hz)\tMagnitude (dB)\tPhase (deg){extra}").map_err(failed)?;
     for (i, (w, value)) in frf.w_rad_s().iter().zip(frf.value()).enumerate() {
-        let response = Degrees::from_radians(value.arg()).0;
+        let response = value.arg() * 180.0 / PI;
         let shown = match phase {
             PhaseDisplay::Response => response,
             PhaseDisplay::Margin if response > 0.0 => response - 180.0,
             PhaseDisplay::Margin => response + 180.0,
         };
-        let magnitude = Decibels::from_ratio(value.norm()).0;
+        let magnitude = 20.0 * value.norm().log10();
         write!(out, "{}\t{magnitude}\t{shown}", hertz(*w)).map_err(failed)?;
         if let Some(std) = frf.relative_std() {
             write!(out, "\t{}", std[i]).map_err(failed)?;

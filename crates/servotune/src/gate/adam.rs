@@ -4,7 +4,7 @@
 //! Adam is algorithm 1 of Kingma & Ba (2015) with epsilon 1e-7. Moments and derivatives too
 //! small to matter are put to zero: numbers below 1e-38 cost a processor many times as much as others. Spec: `specs/gate.md`.
 
-use super::network::{Network, TILE, Workspace, softmax};
+use super::network::{Network, NetworkWorkspace, TILE, softmax};
 use super::settings::FitSettings;
 use super::split::shuffle;
 use crate::numeric::random::Random;
@@ -147,7 +147,7 @@ impl Sink for Adam {
 
 /// Loss (sum over rows, nat) and rows right, with the derivatives of the mean loss left in the last delta.
 #[inline(always)]
-fn output(network: &Network, class: &[usize], workspace: &mut Workspace) -> (f64, usize) {
+fn output(network: &Network, class: &[usize], workspace: &mut NetworkWorkspace) -> (f64, usize) {
     let last = network.layers();
     let k = network.sizes[last];
     let (mut loss, mut right) = (0.0, 0);
@@ -171,7 +171,7 @@ fn output(network: &Network, class: &[usize], workspace: &mut Workspace) -> (f64
 
 /// Derivatives through all layers, the last first; each row of weights is used for the layer below and then handed to the sink.
 #[inline(always)]
-fn backward(network: &mut Network, rows: usize, workspace: &mut Workspace, sink: &mut impl Sink) {
+fn backward(network: &mut Network, rows: usize, workspace: &mut NetworkWorkspace, sink: &mut impl Sink) {
     for l in (0..network.layers()).rev() {
         let (n, m) = (network.sizes[l], network.sizes[l + 1]);
         let at = network.offset(l);
@@ -225,7 +225,7 @@ pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
 }
 
 /// Mean cross-entropy (nat) and accuracy over `rows`.
-pub fn judge(network: &Network, rows: Rows<'_>, workspace: &mut Workspace) -> (f64, f64) {
+pub fn loss_and_accuracy(network: &Network, rows: Rows<'_>, workspace: &mut NetworkWorkspace) -> (f64, f64) {
     let d = network.sizes[0];
     let (mut loss, mut right) = (0.0, 0);
     for (x, y) in rows.inputs.chunks(d * workspace.batch).zip(rows.class.chunks(workspace.batch)) {
@@ -246,7 +246,7 @@ pub fn fit(sizes: &[usize], train: Rows<'_>, validate: Rows<'_>, settings: &FitS
     let mut random = Random::stream(seed, 3);
     let mut network = Network::start(sizes, &mut random);
     let (d, batch) = (sizes[0], settings.batch.max(1));
-    let mut workspace = Workspace::new(sizes, batch);
+    let mut workspace = NetworkWorkspace::new(sizes, batch);
     let mut adam = Adam::new(network.parameters(), settings.learning_rate);
     let mut order: Vec<usize> = (0..train.class.len()).collect();
     let mut class = vec![0; batch];
@@ -272,8 +272,11 @@ pub fn fit(sizes: &[usize], train: Rows<'_>, validate: Rows<'_>, settings: &FitS
         }
         let n = order.len().max(1) as f64;
         let (loss, accuracy) = (loss / n, right as f64 / n);
-        let (validation_loss, validation_accuracy) =
-            if validate.class.is_empty() { (loss, accuracy) } else { judge(&network, validate, &mut workspace) };
+        let (validation_loss, validation_accuracy) = if validate.class.is_empty() {
+            (loss, accuracy)
+        } else {
+            loss_and_accuracy(&network, validate, &mut workspace)
+        };
         history.push(Epoch { loss, accuracy, validation_loss, validation_accuracy });
         if validation_loss < best.0 {
             best = (validation_loss, epoch, std::mem::take(&mut best.2));
@@ -329,7 +332,7 @@ mod tests {
         let rows = 7;
         let x: Vec<f32> = (0..rows * 5).map(|_| random.normal() as f32).collect();
         let class: Vec<usize> = (0..rows).map(|i| i % 3).collect();
-        let mut workspace = Workspace::new(&sizes, rows);
+        let mut workspace = NetworkWorkspace::new(&sizes, rows);
         workspace.activations[0].copy_from_slice(&x);
         let mut moved = network.clone();
         let mut keep = Keep(vec![0.0; network.parameters()]);

@@ -4,7 +4,7 @@
 //! Integrated gradients (Sundararajan, Taly & Yan 2017, eq. (1)) from the medians to the row; the shares sum to the change of the lead.
 //! Spec: `specs/gate.md`.
 
-use super::network::{Network, Workspace};
+use super::network::{Network, NetworkWorkspace};
 use serde::Serialize;
 
 /// What one feature had to say.
@@ -44,7 +44,7 @@ pub fn shares(
     to: &[f32],
     class: usize,
     other: usize,
-    workspace: &mut Workspace,
+    workspace: &mut NetworkWorkspace,
 ) -> Vec<f64> {
     let (d, last) = (network.sizes[0], network.layers());
     let k = network.sizes[last];
@@ -89,7 +89,7 @@ mod tests {
     fn shares_sum_to_the_change_of_the_lead() {
         let mut random = Random::new(6);
         let network = Network::start(&[6, 40, 30, 3], &mut random);
-        let mut workspace = Workspace::new(&network.sizes, 10);
+        let mut workspace = NetworkWorkspace::new(&network.sizes, 10);
         for _ in 0..20 {
             let x: Vec<f32> = (0..6).map(|_| random.normal() as f32).collect();
             let zero = [0.0; 6];

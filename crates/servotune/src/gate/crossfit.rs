@@ -4,10 +4,10 @@
 //! normalised and trained anew on the other folds; a fifth of those, not the fold itself, chooses the epoch. Spec: `specs/gate.md`.
 
 use super::GateError;
-use super::adam::{Rows, judge};
+use super::adam::{Rows, loss_and_accuracy};
 use super::calibrate::Logits;
 use super::member::{Member, Said};
-use super::network::Workspace;
+use super::network::NetworkWorkspace;
 use super::parallel::each;
 use super::prepare::{PATIENCE, learn, prepare, reach, seed_of};
 use super::settings::TrainSettings;
@@ -54,10 +54,11 @@ pub(super) fn crossfit(
         let seed = seed_of(settings.seed, 200 + f as u64);
         let fitted = learn(&p, &train, &choose, class, classes, hidden, settings, Some(PATIENCE), seed)?;
         let unit = reach(&p, &fitted, if choose.is_empty() { &train } else { &choose }, classes);
-        let mut workspace = Workspace::new(&fitted.network.sizes, settings.batch);
+        let mut workspace = NetworkWorkspace::new(&fitted.network.sizes, settings.batch);
         let inputs = p.scale.inputs(&p.chosen, &held);
         let of_held: Vec<usize> = held.iter().map(|&r| class[r]).collect();
-        let (loss, accuracy) = judge(&fitted.network, Rows { inputs: &inputs, class: &of_held }, &mut workspace);
+        let (loss, accuracy) =
+            loss_and_accuracy(&fitted.network, Rows { inputs: &inputs, class: &of_held }, &mut workspace);
         let member = Member::of(p.scale, fitted.network, unit, &p.chosen, &others, class, classes)?;
         let said = member.say(&inputs, &mut workspace);
         Ok((Fold { loss, accuracy, rows: held.len() }, member, said))

@@ -3,7 +3,7 @@
 use super::GateError;
 use super::adam::Fitted;
 use super::confusion::Confusions;
-use super::network::Workspace;
+use super::network::NetworkWorkspace;
 use super::prepare::{Prepared, learn, seed_of};
 use super::settings::TrainSettings;
 use super::split::Split;
@@ -33,7 +33,7 @@ impl Job<'_> {
 
     /// Most probable class of each row.
     pub(super) fn predict(&self, p: &Prepared<'_>, f: &Fitted, rows: &[usize]) -> Vec<usize> {
-        let mut workspace = Workspace::new(&f.network.sizes, self.settings.batch);
+        let mut workspace = NetworkWorkspace::new(&f.network.sizes, self.settings.batch);
         let z = f.network.logits(&p.scale.inputs(&p.chosen, rows), &mut workspace);
         z.chunks(self.classes).map(super::conformal::top).collect()
     }

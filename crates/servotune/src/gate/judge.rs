@@ -13,11 +13,11 @@ use super::costs::Costs;
 use super::drift::{Drift, DriftReference, drift};
 use super::evidence::Evidence;
 use super::member::{Ensemble, Member, mean};
-use super::network::Workspace;
+use super::network::NetworkWorkspace;
 use super::novelty::Novelty;
 use super::parallel::each;
 use super::table::{Column, Table};
-use super::verdict::{Doubt, PlantEvidence, Verdict};
+use super::verdict::{Doubt, GateVerdict, PlantEvidence};
 use crate::numeric::digits::said;
 
 /// A trained gate.
@@ -89,7 +89,7 @@ const ABSENT: f64 = 0.1;
 
 impl Gate {
     /// A verdict for each row of a table.
-    pub fn classify(&self, table: &Table) -> Result<Vec<Verdict>, GateError> {
+    pub fn classify(&self, table: &Table) -> Result<Vec<GateVerdict>, GateError> {
         let found = self.find(table)?;
         let verdict = |row: usize| {
             let judged = self.judge(&found, row);
@@ -129,7 +129,7 @@ impl Gate {
     /// Logits by the published training's judge, and by that of each fold.
     fn ask(&self, found: &Found<'_>, row: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
         let one = |m: &Member, columns: &[&Column]| {
-            let mut workspace = Workspace::new(&m.network.sizes, 1);
+            let mut workspace = NetworkWorkspace::new(&m.network.sizes, 1);
             let said = m.say(&m.scale.inputs(columns, &[row]), &mut workspace);
             said.first().map_or_else(Vec::new, |s| self.mix.logits(s))
         };
@@ -206,7 +206,7 @@ impl Gate {
     /// By the published training's judge: integrated gradients of its network and the terms of its discriminant, each in its share.
     fn decided(&self, found: &Found<'_>, row: usize, judged: &Judged) -> Vec<Decided> {
         let (m, scale) = (&self.main, &self.main.scale);
-        let mut workspace = Workspace::new(&m.network.sizes, DESK_ROWS);
+        let mut workspace = NetworkWorkspace::new(&m.network.sizes, DESK_ROWS);
         let x = scale.inputs(&found.chosen, &[row]);
         let from: Vec<f32> = scale.median.iter().enumerate().map(|(j, v)| scale.input(j, *v)).collect();
         let wide = |x: &[f32]| x.iter().copied().map(f64::from).collect::<Vec<f64>>();
@@ -236,7 +236,7 @@ impl Gate {
         order.iter().take(SHOWN).map(tell).collect()
     }
 
-    fn tell(&self, table: &Table, found: &Found<'_>, row: usize, j: Judged, decided: Vec<Decided>) -> Verdict {
+    fn tell(&self, table: &Table, found: &Found<'_>, row: usize, j: Judged, decided: Vec<Decided>) -> GateVerdict {
         let mut why = if j.doubts.is_empty() {
             format!("{} with probability {:.4}", self.classes.names[j.class], j.probabilities[j.class])
         } else {
@@ -260,7 +260,7 @@ impl Gate {
         if !imputed.is_empty() {
             why += &format!("; missing, taken as the training median: {}", imputed.join(", "));
         }
-        Verdict {
+        GateVerdict {
             id: table.id(row).map(str::to_owned),
             line: table.line(row),
             class: self.classes.labels[j.class].clone(),

@@ -8,7 +8,7 @@ use super::GateError;
 use super::calibrate::{Calibration, Logits, calibrate, calibration_error, log_loss, probabilities};
 use super::conformal::top;
 use super::discriminant::{Discriminant, steadied};
-use super::network::{Network, Workspace};
+use super::network::{Network, NetworkWorkspace};
 use super::scale::{Scale, median};
 use super::table::Column;
 use serde::{Deserialize, Serialize};
@@ -65,7 +65,7 @@ impl Member {
     }
 
     /// What both say of each row of inputs.
-    pub(super) fn say(&self, inputs: &[f32], workspace: &mut Workspace) -> Vec<Said> {
+    pub(super) fn say(&self, inputs: &[f32], workspace: &mut NetworkWorkspace) -> Vec<Said> {
         let classes = self.network.sizes[self.network.layers()];
         let raw = self.network.logits(inputs, workspace);
         let both = |(z, x): (&[f64], &[f32])| {

@@ -36,7 +36,7 @@ mod table;
 mod train;
 mod verdict;
 
-pub use adam::{Epoch, Fitted, Rows, fit, judge};
+pub use adam::{Epoch, Fitted, Rows, fit, loss_and_accuracy};
 pub use attribution::{Decided, Direction, shares};
 pub use boost::{BoostSettings, importance};
 pub use calibrate::{Calibration, calibrate, calibration_error, log_loss, probabilities};
@@ -53,7 +53,7 @@ pub use evidence::{EVIDENCE, Evidence, Vote};
 pub use file::SCHEMA;
 pub use judge::Gate;
 pub use member::{Ensemble, Member};
-pub use network::{Network, Workspace, parameter_count, softmax};
+pub use network::{Network, NetworkWorkspace, parameter_count, softmax};
 pub use novelty::{Novelty, NoveltyScore};
 pub use prepare::Ranked;
 pub use report::{
@@ -65,4 +65,4 @@ pub use settings::{FitSettings, TrainSettings};
 pub use split::{Split, folds, hold_out, split};
 pub use table::{Column, Table};
 pub use train::{Trained, train};
-pub use verdict::{Doubt, PlantEvidence, Verdict};
+pub use verdict::{Doubt, GateVerdict, PlantEvidence};

@@ -80,7 +80,7 @@ impl Network {
     }
 
     /// Logits of `rows` rows of inputs.
-    pub fn logits(&self, inputs: &[f32], workspace: &mut Workspace) -> Vec<f64> {
+    pub fn logits(&self, inputs: &[f32], workspace: &mut NetworkWorkspace) -> Vec<f64> {
         let (d, k) = (self.sizes[0], self.sizes[self.layers()]);
         let mut out = Vec::with_capacity(inputs.len() / d * k);
         for x in inputs.chunks(d * workspace.batch) {
@@ -94,7 +94,7 @@ impl Network {
 
     /// Fills the workspace's activations from its inputs.
     #[inline(always)]
-    pub(super) fn forward(&self, rows: usize, workspace: &mut Workspace) {
+    pub(super) fn forward(&self, rows: usize, workspace: &mut NetworkWorkspace) {
         for l in 0..self.layers() {
             let (n, m) = (self.sizes[l], self.sizes[l + 1]);
             let at = self.offset(l);
@@ -146,7 +146,7 @@ fn accumulate<const N: usize>(live: &[(usize, f32)], w: &[f32], c: usize, y: &mu
 
 /// Room to compute in, made once for a network and a batch.
 #[derive(Clone, Debug)]
-pub struct Workspace {
+pub struct NetworkWorkspace {
     pub(super) batch: usize,
     /// Values of each layer, inputs first, one row after the other.
     pub(super) activations: Vec<Vec<f32>>,
@@ -155,12 +155,12 @@ pub struct Workspace {
     pub(super) live: Vec<(usize, f32)>,
 }
 
-impl Workspace {
+impl NetworkWorkspace {
     /// Room for `batch` rows.
-    pub fn new(sizes: &[usize], batch: usize) -> Workspace {
+    pub fn new(sizes: &[usize], batch: usize) -> NetworkWorkspace {
         let batch = batch.max(1);
         let widest = sizes.iter().copied().max().unwrap_or(0).max(batch);
         let room = || sizes.iter().map(|n| vec![0.0; n * batch]).collect::<Vec<Vec<f32>>>();
-        Workspace { batch, activations: room(), deltas: room(), live: vec![(0, 0.0); widest] }
+        NetworkWorkspace { batch, activations: room(), deltas: room(), live: vec![(0, 0.0); widest] }
     }
 }

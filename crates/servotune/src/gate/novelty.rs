@@ -8,6 +8,7 @@
 use super::packed::Packed64;
 use super::scale::median;
 use super::table::Column;
+use crate::numeric::statistics::rms_of;
 use nalgebra::{Cholesky, DMatrix};
 use serde::{Deserialize, Serialize};
 
@@ -89,8 +90,7 @@ impl Reference {
                     return ROBUST * v;
                 }
                 // Most rows are equal: the ordinary deviation of those that differ.
-                let n = rows.len().max(1) as f64;
-                (rows.iter().map(|&r| away(r) * away(r)).sum::<f64>() / n).sqrt()
+                rms_of(rows.iter().map(|&r| away(r)))
             };
             let present: Vec<usize> = rows.iter().copied().filter(|&r| !c.values[r].is_nan()).collect();
             let mut pooled = robust(median(present.iter().map(|&r| away(r))), present.clone());

@@ -9,7 +9,7 @@ use super::boost::importance;
 use super::clean::{Removed, clean};
 use super::conformal::top;
 use super::evidence::EVIDENCE;
-use super::network::Workspace;
+use super::network::NetworkWorkspace;
 use super::scale::{Scale, median};
 use super::settings::{FitSettings, TrainSettings};
 use super::table::{Column, Table};
@@ -135,7 +135,7 @@ pub(super) fn learn(
 /// How far a network's logits typically reach: the median lead of the first class over the second, on rows that chose its epoch. Networks
 /// of different folds differ in it by orders of magnitude; one temperature fits them all only in units of it.
 pub(super) fn reach(p: &Prepared<'_>, f: &Fitted, rows: &[usize], classes: usize) -> f64 {
-    let mut workspace = Workspace::new(&f.network.sizes, 16);
+    let mut workspace = NetworkWorkspace::new(&f.network.sizes, 16);
     let z = f.network.logits(&p.scale.inputs(&p.chosen, rows), &mut workspace);
     let lead = |z: &[f64]| {
         let best = top(z);

@@ -16,7 +16,7 @@ use super::evidence::Evidence;
 use super::job::Job;
 use super::judge::Gate;
 use super::member::Ensemble;
-use super::network::Workspace;
+use super::network::NetworkWorkspace;
 use super::prepare::{Prepared, Ranked};
 use super::split::Split;
 use serde::Serialize;
@@ -287,7 +287,7 @@ impl TrainReport {
         let n = truth.len().max(1) as f64;
         let share = |count: usize| count as f64 / n;
         let after: Vec<Vec<f64>> = judged.iter().map(|j| j.probabilities.clone()).collect();
-        let mut workspace = Workspace::new(&f.network.sizes, 16);
+        let mut workspace = NetworkWorkspace::new(&f.network.sizes, 16);
         let raw = f.network.logits(&p.scale.inputs(&p.chosen, &split.test), &mut workspace);
         let before: Vec<Vec<f64>> = raw.chunks(job.classes).map(|z| super::calibrate::probabilities(z, 1.0)).collect();
         let said: Vec<(usize, Action)> = judged.iter().map(|j| (j.class, j.action)).collect();

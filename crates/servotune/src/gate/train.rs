@@ -16,7 +16,7 @@ use super::evidence::Evidence;
 use super::job::Job;
 use super::judge::Gate;
 use super::member::{Ensemble, Member};
-use super::network::Workspace;
+use super::network::NetworkWorkspace;
 use super::novelty::{MOST_FEATURES, MOST_LOOKED_AT, Novelty};
 use super::parallel::each;
 use super::prepare::{PATIENCE, Prepared, prepare, reach};
@@ -85,7 +85,7 @@ pub fn train(table: &Table, settings: &TrainSettings) -> Result<Trained, GateErr
         // The discriminant may have learned from the training part only: the validation part is to judge it.
         let blind =
             Member::of(p.scale.clone(), fitted.network.clone(), unit, &p.chosen, &split.train, &known.class, k)?;
-        let mut workspace = Workspace::new(&fitted.network.sizes, settings.batch);
+        let mut workspace = NetworkWorkspace::new(&fitted.network.sizes, settings.batch);
         let said = blind.say(&p.scale.inputs(&p.chosen, &split.validate), &mut workspace);
         (Vec::new(), Vec::new(), split.validate.clone(), said)
     };

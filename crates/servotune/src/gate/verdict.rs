@@ -91,7 +91,7 @@ pub struct PlantEvidence {
 
 /// The verdict on one row.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Verdict {
+pub struct GateVerdict {
     /// The row's id, where the table has them.
     pub id: Option<String>,
     /// Its line in the file.

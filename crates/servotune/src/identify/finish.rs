@@ -5,7 +5,7 @@ use super::growth::{self, Joint, Stage, structured};
 use super::held_out;
 use super::ladder;
 use super::noise::local_noise;
-use super::result::{BodyEvidence, HeldOut, Identified, Work};
+use super::result::{BodyEvidence, FitWork, HeldOut, Identified};
 use super::shape::{BodyForm, Ranges, Shape};
 use super::spread::{Spread, correlation_inflation};
 use super::sweep::Sweep;
@@ -15,7 +15,7 @@ use crate::frf::{Frf, gathered};
 use crate::lti::FrequencyResponse;
 use crate::numeric::golden::Bound;
 use crate::numeric::levenberg::Workspace;
-use crate::numeric::statistics::median;
+use crate::numeric::statistics::{median, nearest_rank, rms};
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
@@ -39,7 +39,7 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
     let steps = ladder::build(&sweep, settings);
     let mut memory = Workspace::default();
     let starts = body_start::find(&sweep, settings, steps.as_ref(), ranges, &mut memory);
-    let work = Work { linear_fits: steps.as_ref().map_or(0, |l| l.fits), ..Work::default() };
+    let work = FitWork { linear_fits: steps.as_ref().map_or(0, |l| l.fits), ..FitWork::default() };
     let mut joint = Joint { sweep: &sweep, target: vec![], weight: levelled(&sweep), ranges, memory, work };
     let Climb { start, stages, last, .. } = Climb::best(&mut joint, starts, settings);
     joint.target = sweep.value.iter().map(|v| v * start.sign).collect();
@@ -69,8 +69,6 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
 
     let residual: Vec<Complex<f64>> = sweep.w.iter().zip(&sweep.value).map(|(&w, v)| plant.at(w) / v - 1.0).collect();
     let size: Vec<f64> = residual.iter().map(|r| r.norm()).collect();
-    let mut sorted = size.clone();
-    sorted.sort_by(f64::total_cmp);
     let mut rungs = steps.as_ref().map_or(vec![], |l| l.rungs.clone());
     rungs.push(ladder::rung("joint refinement", &sweep, &plant));
     let delay = x[shape.delay_at()];
@@ -88,8 +86,8 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
             Bound::Inside
         },
         at_bound: at_bound(&joint, shape, &x),
-        rms_relative_error: (size.iter().map(|e| e * e).sum::<f64>() / n as f64).sqrt(),
-        p95_relative_error: sorted[((0.95 * n as f64).ceil() as usize).clamp(1, n) - 1],
+        rms_relative_error: rms(&size),
+        p95_relative_error: nearest_rank(&size, 0.95),
         noise_relative_std: joint.weight.iter().map(|w| std::f64::consts::SQRT_2 / w).collect(),
         chi_square,
         correlation_inflation: inflation,

@@ -9,7 +9,7 @@ use super::noise::difference_noise;
 use super::prune::{weakest, without};
 use super::shape::{LogFit, LogProblem, Ranges, Shape};
 use super::sweep::Sweep;
-use super::{IdentifySettings, OrderChoice, Work};
+use super::{FitWork, IdentifySettings, OrderChoice};
 use crate::lti::Mode;
 use crate::numeric::least_squares::Qr;
 use crate::numeric::levenberg::{LevenbergOutcome, LevenbergSettings, Workspace, minimise};
@@ -34,7 +34,7 @@ pub(super) struct Joint<'a> {
     pub weight: Vec<f64>,
     pub ranges: Ranges,
     pub memory: Workspace,
-    pub work: Work,
+    pub work: FitWork,
 }
 
 impl Joint<'_> {

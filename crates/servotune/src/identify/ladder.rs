@@ -9,7 +9,6 @@ use super::sweep::Sweep;
 use super::{IdentifySettings, LadderRung};
 use crate::lti::{Body, FrequencyResponse, Plant};
 use crate::numeric::golden::{Bound, golden_section};
-use crate::units::Decibels;
 use nalgebra::Complex;
 
 /// What the paper's way found.
@@ -92,7 +91,7 @@ fn climb(sweep: &Sweep, settings: &IdentifySettings, body: Body, end: usize, fit
     rungs.push(rung("second-order standard form, delay", sweep, &plant));
 
     let ratio: Vec<Complex<f64>> = sweep.w.iter().zip(&sweep.value).map(|(&w, v)| v / plant.at(w)).collect();
-    let noise_db = Decibels::from_ratio(1.0 + difference_noise(&ratio)).0;
+    let noise_db = 20.0 * (1.0 + difference_noise(&ratio)).log10();
     plant.modes = groups::fit(&sweep.w, &ratio, end, settings, noise_db);
     // Monic pairs change the level at rest; this factor gives it back, and the search below starts from it.
     let level: f64 = plant.modes.iter().map(|m| (m.pole_rad_s / m.zero_rad_s).powi(2)).product();
@@ -101,14 +100,19 @@ fn climb(sweep: &Sweep, settings: &IdentifySettings, body: Body, end: usize, fit
 
     let model: Vec<Complex<f64>> = sweep.w.iter().map(|&w| plant.at(w)).collect();
     let with_gain = |db: f64| {
-        let k = Decibels(db).ratio();
+        let k = ratio_of(db);
         norm_error(model.iter().zip(&sweep.value).map(|(m, v)| 1.0 - k * m / v))
     };
     let (low, high) = settings.resonance_gain_db;
     let (gain_db, gain_bound) = widening(with_gain, low, high, (-20.0, 20.0), 1e-3, &mut fits);
-    plant.resonance_gain = level * Decibels(gain_db).ratio();
+    plant.resonance_gain = level * ratio_of(gain_db);
     rungs.push(rung("second-order standard form, delay, resonances, gain", sweep, &plant));
     Ladder { rungs, plant, delay_bound, gain_bound, fits }
+}
+
+/// The ratio of so many decibels.
+fn ratio_of(db: f64) -> f64 {
+    10f64.powf(db / 20.0)
 }
 
 /// The paper's way; `None` where no second-order body is stable.

@@ -8,7 +8,7 @@ use super::noise::local_noise;
 use super::shape::{LogFit, Ranges, Shape};
 use super::spread::{Spread, correlation_inflation};
 use super::sweep::Sweep;
-use super::{IdentifyError, IdentifySettings, Work, ZeroSide};
+use super::{FitWork, IdentifyError, IdentifySettings, ZeroSide};
 use crate::frf::{Frf, gathered};
 use crate::lti::{Body, FrequencyResponse, Plant};
 use crate::numeric::levenberg::Workspace;
@@ -80,7 +80,7 @@ pub fn identify_near(
         weight: weight.unwrap_or_else(|| vec![1.0; n]),
         ranges,
         memory: Workspace::default(),
-        work: Work::default(),
+        work: FitWork::default(),
     };
     joint.refine(shape, &mut x, STEPS, TOLERANCE);
     if !known {

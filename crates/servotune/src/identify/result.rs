@@ -50,7 +50,7 @@ pub struct HeldOut {
 
 /// Counts of work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Work {
+pub struct FitWork {
     /// Small linear fits and golden-section evaluations of the paper's way.
     pub linear_fits: usize,
     /// Places tried for a further pair.
@@ -105,7 +105,7 @@ pub struct Identified {
     /// Whether the joint fit met its tolerance.
     pub converged: bool,
     /// Counts of work.
-    pub work: Work,
+    pub work: FitWork,
     pub(super) spread: Spread,
 }
 

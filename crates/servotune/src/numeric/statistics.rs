@@ -1,4 +1,4 @@
-//! Plain statistics of samples, the only ones of the program. Of nothing, or of too little, they are NaN, a median none.
+//! Plain statistics of samples, the only ones of the program. Of nothing, or of too little, they are NaN, a median none, unless said otherwise.
 
 /// Mean.
 pub fn mean(x: &[f64]) -> f64 {
@@ -8,6 +8,12 @@ pub fn mean(x: &[f64]) -> f64 {
 /// Root mean square.
 pub fn rms(x: &[f64]) -> f64 {
     (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt()
+}
+
+/// Root mean square of values that come one by one, in several series or not; 0 of none.
+pub fn rms_of(x: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, n) = x.into_iter().fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+    (sum / f64::max(n, 1.0)).sqrt()
 }
 
 /// Central moment of order `order`, divided by n.
@@ -133,6 +139,7 @@ mod tests {
     #[test]
     fn of_nothing_there_is_no_number() {
         assert_eq!(median(&[]), None);
+        assert_eq!((rms_of([]), rms_of([3.0, -4.0, 5.0, 0.0])), (0.0, 12.5f64.sqrt()));
         for f in [mean, rms, deviation, sign_changes] {
             assert!(f(&[]).is_nan());
         }

@@ -7,7 +7,7 @@ use super::figures::{HIGH_BAND_HZ, LOW_BAND_HZ};
 use super::{Harmonic, Noise, PesError, Profile, Scene, WindowDft};
 use crate::controller::Controller;
 use crate::lti::{DiscretePlant, Plant, Section};
-use crate::numeric::statistics::quantile_of_draws;
+use crate::numeric::statistics::{deviation, quantile_of_draws};
 use serde::Serialize;
 
 /// A source of the PES.
@@ -138,11 +138,8 @@ impl Runner {
     fn spectrum(&self, window: &[f64]) -> ([f64; 3], Vec<f64>) {
         let mut amplitude = Vec::new();
         self.dft.amplitudes(window, &mut amplitude);
-        let n = window.len() as f64;
-        let mean = window.iter().sum::<f64>() / n;
-        let variance = window.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n;
         let norms = [LOW_BAND_HZ, HIGH_BAND_HZ].map(|band| self.dft.band(&amplitude, band));
-        ([norms[0], norms[1], variance.sqrt()], amplitude)
+        ([norms[0], norms[1], deviation(window)], amplitude)
     }
 
     fn harmonics(&self, amplitude: &[f64]) -> Vec<Harmonic> {

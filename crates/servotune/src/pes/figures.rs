@@ -1,6 +1,7 @@
 //! The figures of one PES: harmonics, bands, range and standard deviation of the window.
 
 use super::{Harmonic, Profile, WindowDft};
+use crate::numeric::statistics::{deviation, range};
 use serde::Serialize;
 
 /// The lower band of the DFT (Hz), eq. (42).
@@ -39,15 +40,11 @@ pub fn window_figures(window: &[f64], rate_hz: f64) -> PesFigures {
         dft.bins().iter().zip(&amplitude).map(|(&k, &amplitude)| Harmonic { k, hz: dft.hz(k), amplitude }).collect();
     // Without a bin there is no figure: a norm of nothing would be 0, the best of all.
     let band = |hz| dft.inside(hz).next().map(|_| dft.band(&amplitude, hz));
-    let n = window.len() as f64;
-    let mean = window.iter().sum::<f64>() / n;
-    let high = window.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let low = window.iter().copied().fold(f64::INFINITY, f64::min);
     PesFigures {
         harmonics,
         dft_low: band(LOW_BAND_HZ),
         dft_high: band(HIGH_BAND_HZ),
-        pes_range: high - low,
-        pes_std: (window.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt(),
+        pes_range: range(window),
+        pes_std: deviation(window),
     }
 }

@@ -38,7 +38,7 @@ pub use physical::{context, simulate_physical};
 pub use profile::{Noise, PesClock, Profile, ProfileError, Runout, Spiral};
 pub use quick::{Asked, Figure, QuickScene, QuickWork, Record};
 pub use reference::Reference;
-pub use simulation::{ClosedLoop, PesError, Scene, Workspace, simulate};
+pub use simulation::{ClosedLoop, PesError, Scene, WriteWorkspace, simulate};
 pub use spectral::{SpectralPes, SpectralWork};
 pub use spectral_parts::{BinParts, SpectralParts};
 pub use step::{StepScene, StepWork};

@@ -181,11 +181,6 @@ impl QuickScene {
         self.drawn.is_some()
     }
 
-    /// Samples of the window.
-    pub fn window_samples(&self) -> usize {
-        self.run.readings.len()
-    }
-
     /// Runs the records asked for, from rest; they lie in `work` then. Allocates nothing once `work` has been used.
     ///
     /// A NaN or an overflow in a record means an unstable loop; the caller judges stability by the margins.

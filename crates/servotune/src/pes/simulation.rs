@@ -49,7 +49,7 @@ pub(super) struct ServoSample {
 
 /// Buffers of one running simulation.
 #[derive(Clone, Debug)]
-pub struct Workspace {
+pub struct WriteWorkspace {
     state: PlantState,
     memory: Vec<[f64; 2]>,
     /// PES at the servo clock, from sample 0.
@@ -143,8 +143,8 @@ impl Scene {
     }
 
     /// Buffers for this scene and a chain of at most `sections` sections.
-    pub fn workspace(&self, plant: &DiscretePlant, sections: usize) -> Workspace {
-        Workspace {
+    pub fn workspace(&self, plant: &DiscretePlant, sections: usize) -> WriteWorkspace {
+        WriteWorkspace {
             state: PlantState::at_rest(plant),
             memory: vec![[0.0; 2]; sections],
             pes: vec![0.0; self.servo.len()],
@@ -154,7 +154,7 @@ impl Scene {
     }
 
     /// The window's PES in a workspace that has run.
-    pub fn window<'w>(&self, work: &'w Workspace) -> &'w [f64] {
+    pub fn window<'w>(&self, work: &'w WriteWorkspace) -> &'w [f64] {
         &work.pes[self.window[0]..self.window[1]]
     }
 
@@ -165,9 +165,9 @@ impl Scene {
         chain: &[Section],
         feedforward: Option<&Feedforward>,
         output_limit: Option<f64>,
-        work: &mut Workspace,
+        work: &mut WriteWorkspace,
     ) -> bool {
-        let Workspace { state, memory, pes, command, position } = work;
+        let WriteWorkspace { state, memory, pes, command, position } = work;
         state.reset();
         memory.resize(chain.len(), [0.0; 2]);
         memory.fill([0.0; 2]);
@@ -210,7 +210,7 @@ pub fn simulate(plant: &Plant, controller: &Controller, profile: &Profile) -> Re
     let mut work = scene.workspace(&sampled, sections.chain.len());
     let free =
         scene.run(&sampled, &sections.chain, controller.feedforward.as_ref(), controller.output_limit, &mut work);
-    let Workspace { pes, command, position, .. } = work;
+    let WriteWorkspace { pes, command, position, .. } = work;
     Ok(ClosedLoop {
         pes,
         command,

@@ -179,16 +179,6 @@ impl SpectralPes {
         &self.dft
     }
 
-    /// Whether the command's peak is asked for.
-    pub fn has_command(&self) -> bool {
-        self.command.is_some()
-    }
-
-    /// Whether two writes have the same lines, so that what holds on those of one holds on those of the other.
-    pub fn same_lines(&self, other: &SpectralPes) -> bool {
-        Arc::ptr_eq(&self.frame, &other.frame)
-    }
-
     /// The lines, with the plant on them.
     pub fn lines(&self) -> &SampledPlant {
         &self.lines

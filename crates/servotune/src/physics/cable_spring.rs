@@ -79,6 +79,10 @@ impl Parametric for CableSpring {
         &FACTS
     }
 
+    fn changes_with_amplitude() -> bool {
+        false
+    }
+
     fn acts_on_body() -> bool {
         true
     }

@@ -302,6 +302,11 @@ pub trait Parametric: Clone + PartialEq + std::fmt::Debug + Sized {
         false
     }
 
+    /// Whether what it adds to stiffness or damping is another at another amplitude; false of a plain spring.
+    fn changes_with_amplitude() -> bool {
+        Self::acts_on_body()
+    }
+
     /// Length over which a drag turns round (position_unit), where it is a spring before it slides.
     fn presliding_length(&self) -> Option<f64> {
         None

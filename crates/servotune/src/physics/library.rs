@@ -275,6 +275,7 @@ pub trait Effect: Sync {
     fn may_occur_several_times(&self) -> bool;
     fn is_hard_nonlinearity(&self) -> bool;
     fn acts_on_body(&self) -> bool;
+    fn changes_with_amplitude(&self) -> bool;
 }
 
 /// The effect whose laws are these.
@@ -349,6 +350,10 @@ where
 
     fn acts_on_body(&self) -> bool {
         L::acts_on_body()
+    }
+
+    fn changes_with_amplitude(&self) -> bool {
+        L::changes_with_amplitude()
     }
 }
 

@@ -5,7 +5,7 @@
 
 use super::judge::judge_loop;
 use super::judge::judged;
-use super::outcome::{AtBound, Infeasible, Reached, RelaxedLimit, Work};
+use super::outcome::{AtBound, Infeasible, Reached, RelaxedLimit, SearchWork};
 use super::polish::refine;
 use super::requirements::{Found, MET, Requirement};
 use super::{Judged, JudgedLimit, Judgement, Machine, Minimise, Side, Spec, TuneError, TuningProblem};
@@ -122,18 +122,18 @@ impl<'a> Ending<'a> {
         let mut best: Option<Settled> = None;
         let (mut x, mut work) = (x.to_vec(), problem.work());
         for _ in 0..=BACK_OFFS {
-            let proofs = judged(self.machines, &problem.parameters.controller(&x), self.spec)?;
-            let worst = proofs.iter().map(|p| p.judged.worst()).fold(f64::NEG_INFINITY, f64::max);
+            let judgements = judged(self.machines, &problem.parameters.controller(&x), self.spec)?;
+            let worst = judgements.iter().map(|p| p.judged.worst()).fold(f64::NEG_INFINITY, f64::max);
             if best.as_ref().is_none_or(|b| worst < b.worst) {
                 best = Some(Settled { x: x.clone(), objective: worst, worst, passes: worst <= MET });
             }
-            let limits = || proofs.iter().flat_map(|p| &p.judged.limits);
+            let limits = || judgements.iter().flat_map(|p| &p.judged.limits);
             let plain = limits().filter(|l| l.wanted.what.held_by_share()).map(|l| l.violation);
             let plain = plain.fold(f64::NEG_INFINITY, f64::max);
             if worst <= plain + ROOM_MISS || !worst.is_finite() || !plain.is_finite() {
                 break;
             }
-            for (p, inside) in proofs.iter().zip(&mut inside) {
+            for (p, inside) in judgements.iter().zip(&mut inside) {
                 for (l, inside) in p.judged.limits.iter().zip(inside) {
                     if !l.wanted.what.held_by_share() {
                         *inside += HALF_WAY * (l.violation - plain).max(0.0);
@@ -199,7 +199,8 @@ impl<'a> Ending<'a> {
         let share = after.iter().map(|p| p.judged.worst()).fold(0.0, f64::max);
         let objective = Reached { name: problem.minimise, value: f64::NAN, starts: 0, starts_at_best: 0 };
         let route = self.machines[0].route();
-        let work = Work { route, starts: 0, evaluations: 0, feasible_starts: 0, back_offs: 0, filter_searched: false };
+        let work =
+            SearchWork { route, starts: 0, evaluations: 0, feasible_starts: 0, back_offs: 0, filter_searched: false };
         Ok(Infeasible {
             controller: problem.parameters.controller(&x),
             before: None,

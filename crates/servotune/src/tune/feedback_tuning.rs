@@ -7,7 +7,7 @@ use super::found::{Effort, Found, Polished};
 use super::judge::{judge_loop, judged, lasting_objective};
 use super::loop_rows::FAR_CROSSING_OF_COMPROMISE;
 use super::neighbours::{BETTER, spread};
-use super::outcome::{Outcome, Reached, Tuned, Work};
+use super::outcome::{Outcome, Reached, SearchWork, Tuned};
 use super::polish::{Goal, polish};
 use super::score::UNSTABLE;
 use super::search::search;
@@ -196,8 +196,8 @@ impl UnderWay<'_> {
         Ok(Outcome::Infeasible(said))
     }
 
-    fn work(&self, found: &Found) -> Work {
-        Work {
+    fn work(&self, found: &Found) -> SearchWork {
+        SearchWork {
             route: self.job.machines[0].route(),
             starts: found.starts,
             evaluations: found.evaluations + self.ending.evaluations,

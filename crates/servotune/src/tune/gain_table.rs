@@ -164,8 +164,8 @@ impl Summary {
     }
 
     /// The figures of a judgement.
-    pub fn of(proof: &Judgement) -> Summary {
-        let (m, f) = (&proof.margins, &proof.judged.found);
+    pub fn of(judgement: &Judgement) -> Summary {
+        let (m, f) = (&judgement.margins, &judgement.judged.found);
         let rows = |c: &[Crossing]| c.iter().map(|c| CrossingRow { hz: c.hz, value: c.value }).collect();
         Summary {
             stable: m.stable,
@@ -248,8 +248,8 @@ impl GainTable {
         inputs: Vec<InputDigest>,
     ) -> Result<GainTable, GainTableError> {
         let mut table = GainTable::of(&tuning.outcome, seed, spec_sha256, inputs)?;
-        table.before = tuning.before.as_ref().map(|p| Summary::of(&p.proof()));
-        table.after = Summary::of(&tuning.after.proof());
+        table.before = tuning.before.as_ref().map(|p| Summary::of(&p.worst()));
+        table.after = Summary::of(&tuning.after.worst());
         table.provenance.route = Route::Physics;
         table.provenance.feasible = tuning.passes();
         table.provenance.physics = effects.iter().map(|e| (*e).to_owned()).collect();

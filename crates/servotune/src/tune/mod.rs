@@ -56,11 +56,11 @@ pub use limits::{HarmonicLimit, Limits, MarginLimits, MoveLimits};
 pub use linear::{CandidateSlopes, LimitSlope};
 pub use machine::{Machine, Route};
 pub use objective::{Disturbance, Minimise, Objective};
-pub use outcome::{AtBound, Infeasible, Outcome, Reached, RelaxedLimit, Tuned, Work};
+pub use outcome::{AtBound, Infeasible, Outcome, Reached, RelaxedLimit, SearchWork, Tuned};
 pub use parameters::{DERIVATIVE_FILTER, Parameter, Parameters};
 pub use pareto::{ParetoPoint, ParetoSettings, pareto};
 pub use physical::{
-    PhysicalProof, PhysicalTuning, TUNED_AMPLITUDES, equivalent_responses, judge_physical, tune_physical,
+    PhysicalJudgement, PhysicalTuning, TUNED_AMPLITUDES, equivalent_responses, judge_physical, tune_physical,
 };
 pub use problem::{TuningProblem, TuningWork, ranges};
 pub use requirements::{CurveFound, Found, Judged, JudgedLimit, MET, Requirement, Side, What};

@@ -34,7 +34,7 @@ pub struct Tuned {
     /// Ranges that were searched.
     pub ranges: Ranges,
     /// What it cost.
-    pub work: Work,
+    pub work: SearchWork,
 }
 
 /// No controller within the bounds was found that meets every limit.
@@ -60,7 +60,7 @@ pub struct Infeasible {
     /// Ranges that were searched.
     pub ranges: Ranges,
     /// What it cost.
-    pub work: Work,
+    pub work: SearchWork,
 }
 
 /// The objective of a result.
@@ -106,7 +106,7 @@ pub struct AtBound {
 
 /// What a tuning cost and by which way it went.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Work {
+pub struct SearchWork {
     /// Over a model or on the measured response.
     pub route: Route,
     /// Polishes of the search.
@@ -178,7 +178,7 @@ impl Outcome {
     }
 
     /// What it cost.
-    pub fn work(&self) -> &Work {
+    pub fn work(&self) -> &SearchWork {
         match self {
             Outcome::Tuned(t) | Outcome::TunedWithoutGuard(t) => &t.work,
             Outcome::Infeasible(i) => &i.work,

@@ -1,7 +1,7 @@
 //! A plant with physics as something to tune: one equivalent response for each amplitude, and a judgement with nothing left out.
 //!
 //! In: a plant's physics made ready, amplitudes. Out: responses for [`super::tune_jointly`], which meets the limits on the
-//! worst of them; and the proof of a controller: margins over the amplitude, the write simulated with every effect.
+//! worst of them; and the judgement of a controller: margins over the amplitude, the write simulated with every effect.
 
 use super::{
     Found, Judged, Judgement, Machine, Outcome, Requirement, Side, Spec, TuneError, TuneSettings, What, tune_jointly,
@@ -58,7 +58,7 @@ pub fn equivalent_responses(
 
 /// One controller on a plant with physics.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PhysicalProof {
+pub struct PhysicalJudgement {
     /// Margins over the amplitude.
     pub margins: DescribedMargins,
     /// Margins of the linear plant alone.
@@ -73,7 +73,7 @@ pub fn judge_physical(
     controller: &Controller,
     spec: &Spec,
     amplitudes: &Amplitudes,
-) -> Result<PhysicalProof, TuneError> {
+) -> Result<PhysicalJudgement, TuneError> {
     let sections = controller.sections()?;
     let sampled = DiscretePlant::of(&physics.scene.plant, controller.sample_time_s)?;
     let linear = margins(&ModelLoop::new(&sampled, &sections)?);
@@ -100,7 +100,7 @@ pub fn judge_physical(
         ..Found::default()
     };
     let judged = Judged::of(&Requirement::list(&spec.margins, &spec.limits), found);
-    Ok(PhysicalProof { margins: described, linear, judged })
+    Ok(PhysicalJudgement { margins: described, linear, judged })
 }
 
 /// Lowest and highest of the crossovers over the amplitudes (Hz).
@@ -116,9 +116,9 @@ fn beyond(spec: &Spec) -> Option<What> {
     })
 }
 
-impl PhysicalProof {
-    /// The same as a proof of one machine, for tables and pages.
-    pub fn proof(&self) -> Judgement {
+impl PhysicalJudgement {
+    /// The worst of it as the judgement of one machine, for tables and pages.
+    pub fn worst(&self) -> Judgement {
         Judgement { margins: self.margins.worst.clone(), judged: self.judged.clone() }
     }
 }
@@ -131,9 +131,9 @@ pub struct PhysicalTuning {
     /// Amplitudes that the search carried (position_unit).
     pub amplitudes: Vec<f64>,
     /// The start controller, judged with the physics; none without one.
-    pub before: Option<PhysicalProof>,
+    pub before: Option<PhysicalJudgement>,
     /// The tuned controller, judged with the physics.
-    pub after: PhysicalProof,
+    pub after: PhysicalJudgement,
     /// Searches, the first one included.
     pub rounds: usize,
 }

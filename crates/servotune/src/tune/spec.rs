@@ -21,7 +21,7 @@ pub struct Spec {
     pub sample_time_s: Option<f64>,
     /// Relative room that every limit keeps on the nominal machine.
     pub guard: f64,
-    /// Further room (share of the limit), in the order of [`super::Requirement::list`], that a proof has asked for; not in the file.
+    /// Further room (share of the limit), in the order of [`super::Requirement::list`], that a judgement has asked for; not in the file.
     pub further_room: Vec<f64>,
     /// What is made smallest.
     pub objective: Objective,

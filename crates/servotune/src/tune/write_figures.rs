@@ -11,6 +11,7 @@ use super::section_slope::{SECTION_STEP, SectionSlope};
 use crate::controller::Controller;
 use crate::feedback::{LoopOnGrid, ResponseCurve, SampledPlant, SectionGradients};
 use crate::lti::{DiscretePlant, Section};
+use crate::numeric::statistics::rms;
 use crate::pes::{
     self, Figure, NoisePower, NoisePowerWork, PesError, Profile, QuickScene, QuickWork, Record, Slopes, SpectralPes,
     SpectralWork, WindowDft,
@@ -193,7 +194,7 @@ impl ModelWrite {
         }
         if let Some(at) = asked.place(RecordFigure::CommandRms) {
             let u = b.work.command(Record::Drawn);
-            figures[at] = (u.iter().map(|u| u * u).sum::<f64>() / u.len() as f64).sqrt();
+            figures[at] = rms(u);
         }
     }
 

@@ -5,8 +5,8 @@
 //! Spec: `specs/certificate.md`.
 
 use super::{
-    BoxWatch, Certificate, Inputs, LEAST_DAMPING, Source, Stability, Uncertainty, Verdict, VerifyError, VerifySettings,
-    Word, certify_watched,
+    BoxWatch, Certificate, Inputs, LEAST_DAMPING, LimitVerdict, Source, Stability, Uncertainty, VerifyError,
+    VerifySettings, Word, certify_watched,
 };
 use crate::controller::Controller;
 use crate::frf::Sweep;
@@ -152,7 +152,7 @@ pub fn tune_assured(
 /// The table with fewer limits left open; of equals the earlier one, which gave away less of the objective.
 fn better(before: Option<Assured>, now: Assured) -> Assured {
     let open = |a: &Assured| match &a.certificate {
-        Ok(c) => c.cases.iter().flat_map(|c| &c.limits).filter(|l| l.verdict != Verdict::Proved).count(),
+        Ok(c) => c.cases.iter().flat_map(|c| &c.limits).filter(|l| l.verdict != LimitVerdict::Proved).count(),
         Err(_) => usize::MAX,
     };
     match before {
@@ -195,7 +195,7 @@ fn room(c: &Certificate, wanted: &[Requirement], guard: f64, room: &mut Vec<f64>
     let open = |s: Stability| c.sweep.is_some() && s != Stability::Stable;
     for case in c.cases.iter().filter(|case| !open(case.bounds.stability)) {
         for ((limit, w), room) in case.limits.iter().zip(wanted).zip(room.iter_mut()) {
-            if limit.verdict == Verdict::Proved {
+            if limit.verdict == LimitVerdict::Proved {
                 continue;
             }
             let lacks = match w.side {

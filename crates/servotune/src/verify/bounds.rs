@@ -45,7 +45,7 @@ pub struct ProvenCrossing {
 /// Proven figures of one loop, or of every loop of a set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Bounds {
+pub struct LoopBounds {
     /// Stability.
     pub stability: Stability,
     /// Closed-loop poles outside the unit circle of the nominal loop, where the count was closed.

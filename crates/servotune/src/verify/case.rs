@@ -2,7 +2,7 @@
 //!
 //! In: the table, the sections that the firmware holds, a plant or a sweep. Out: [`CaseProof`] with findings. Spec: `specs/certificate.md`.
 
-use super::bounds::{Bounded, Bounds, Stability};
+use super::bounds::{Bounded, LoopBounds, Stability};
 use super::case_proof::CaseProof;
 use super::prove::prove;
 use super::proven_limits::{Known, Magnitudes, proven_limits};
@@ -124,7 +124,7 @@ impl Job<'_> {
 
     /// Overshoot and settling of a step and of the move, and the command's rms under the disturbance, where limits ask for them: the last one of a box by the
     /// plant as it stands only, which bounds from below.
-    fn records(&self, plant: &Plant, bounds: &Bounds) -> ([Bounded; 2], [Bounded; 2], Bounded) {
+    fn records(&self, plant: &Plant, bounds: &LoopBounds) -> ([Bounded; 2], [Bounded; 2], Bounded) {
         let (c, limits) = (self.controller, &self.spec.limits);
         let members = Members {
             plant,

@@ -2,7 +2,7 @@
 //!
 //! In: bounds and limits. Out: verdicts, a row a limit. Spec: `specs/certificate.md`.
 
-use super::bounds::{Bounded, Bounds};
+use super::bounds::{Bounded, LoopBounds};
 use super::swept::SweepAgain;
 use super::write::WriteFigures;
 use super::write_box::WriteBox;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// What one requirement came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum LimitVerdict {
     /// The bounds lie on the good side of the limit.
     Proved,
     /// The bounds lie on the bad side.
@@ -35,7 +35,7 @@ pub struct ProvenLimit {
     /// What is proved.
     pub proven: Bounded,
     /// Whether that is enough.
-    pub verdict: Verdict,
+    pub verdict: LimitVerdict,
 }
 
 /// One machine.
@@ -45,7 +45,7 @@ pub struct CaseProof {
     /// SHA-256 of the plant's file.
     pub sha256: String,
     /// Margins.
-    pub bounds: Bounds,
+    pub bounds: LoopBounds,
     /// The write of the plant as it stands. A sweep alone tells too little of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub write: Option<WriteFigures>,

@@ -2,7 +2,7 @@
 
 use super::bounds::Stability;
 use super::case::Job;
-use super::case_proof::{CaseProof, Verdict};
+use super::case_proof::{CaseProof, LimitVerdict};
 use super::size::fits;
 use super::table::{self, Finding};
 use super::write_box::BoxWatch;
@@ -155,7 +155,7 @@ pub fn certify_watched(
     findings.extend(table::digests(&table, &spec_sha256, &machines));
     let all = cases
         .iter()
-        .all(|c| c.bounds.stability == Stability::Stable && c.limits.iter().all(|l| l.verdict == Verdict::Proved));
+        .all(|c| c.bounds.stability == Stability::Stable && c.limits.iter().all(|l| l.verdict == LimitVerdict::Proved));
     Ok(Certificate {
         schema: SCHEMA.into(),
         program: env!("CARGO_PKG_VERSION").into(),

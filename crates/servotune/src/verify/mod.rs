@@ -47,8 +47,8 @@ mod write_record;
 
 pub use crate::numeric::interval::Interval;
 pub use assured::{Assurance, Assured, Ground, Watched, tune_assured};
-pub use bounds::{Bounded, Bounds, ProvenCrossing, Stability};
-pub use case_proof::{CaseProof, ProvenLimit, Verdict};
+pub use bounds::{Bounded, LoopBounds, ProvenCrossing, Stability};
+pub use case_proof::{CaseProof, LimitVerdict, ProvenLimit};
 pub use certificate::{Certificate, Inputs, SCHEMA, Source, certify, certify_watched, choices, table_clock_s};
 pub use error::VerifyError;
 pub use settings::VerifySettings;
@@ -72,7 +72,7 @@ pub fn prove_loop(
     sample_time_s: f64,
     uncertainty: &Uncertainty,
     settings: &VerifySettings,
-) -> Result<Bounds, VerifyError> {
+) -> Result<LoopBounds, VerifyError> {
     prove::prove(&modelled(plant, sections, sample_time_s, uncertainty)?, settings)
 }
 
@@ -93,7 +93,7 @@ pub fn prove_sweep(
     uncertainty: &Uncertainty,
     away: f64,
     settings: &VerifySettings,
-) -> Result<(Bounds, Vec<SweepAgain>), VerifyError> {
+) -> Result<(LoopBounds, Vec<SweepAgain>), VerifyError> {
     let swept = taken(frf, sections, sample_time_s, least_damping, uncertainty)?;
     let bounds = prove::prove(&swept, settings)?;
     Ok((bounds, swept.again(away)))

@@ -3,7 +3,7 @@
 //! Depth first from rest to half the rate, so nothing is kept but the figures. Each cell's patch holds the whole of L over the cell:
 //! no sampled point decides anything.
 
-use super::bounds::{Bounded, Bounds, ProvenCrossing, Stability};
+use super::bounds::{Bounded, LoopBounds, ProvenCrossing, Stability};
 use super::clusters::Clusters;
 use super::model::{Enclosed, Start};
 use super::patch::{Patch, largest_turn, least_lag, least_turn};
@@ -62,7 +62,7 @@ struct Seen {
 }
 
 /// Proves what can be proved of a loop.
-pub(super) fn prove(l: &impl Enclosed, settings: &VerifySettings) -> Result<Bounds, VerifyError> {
+pub(super) fn prove(l: &impl Enclosed, settings: &VerifySettings) -> Result<LoopBounds, VerifyError> {
     let start = l.start()?;
     let end = l.end();
     let mut edges = vec![start.angle, end];
@@ -268,7 +268,7 @@ impl Tally {
         }
     }
 
-    fn bounds(mut self, l: &impl Enclosed, start: Start, cells: usize) -> Bounds {
+    fn bounds(mut self, l: &impl Enclosed, start: Start, cells: usize) -> LoopBounds {
         let t = l.sample_time_s();
         let hz = |angle: f64| angle / (TAU * t);
         let real =
@@ -306,7 +306,7 @@ impl Tally {
         let finite = |x: f64| x.is_finite().then_some(x);
         let modulus = &self.modulus;
         let at = Some(hz(modulus.at));
-        Bounds {
+        LoopBounds {
             stability,
             unstable_poles: (!self.open).then_some(unstable),
             encirclements: (!self.open).then_some(encirclements),

@@ -4,8 +4,8 @@
 //! proved. Spec: `specs/certificate.md`.
 
 use super::VerifySettings;
-use super::bounds::{Bounded, Bounds, ProvenCrossing, Stability};
-use super::case_proof::{ProvenLimit, Verdict};
+use super::bounds::{Bounded, LoopBounds, ProvenCrossing, Stability};
+use super::case_proof::{LimitVerdict, ProvenLimit};
 use super::curve::{bound_bandwidth, bound_curve};
 use super::model::Enclosed;
 use super::write::WriteFigures;
@@ -20,7 +20,7 @@ const MEMBERS: f64 = 10.0;
 const TOUCH: f64 = 1e-4;
 
 /// Where every gain crossing outside these ranges (Hz) may lie. One that only may be counts on the side where it would miss.
-fn every_crossing(b: &Bounds, stabilised: &[[f64; 2]]) -> Bounded {
+fn every_crossing(b: &LoopBounds, stabilised: &[[f64; 2]]) -> Bounded {
     let free = |c: &&ProvenCrossing| !stabilised.iter().any(|[from, to]| *from <= c.hz.low && c.hz.high <= *to);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for c in b.gain_crossings.iter().filter(free) {
@@ -31,7 +31,7 @@ fn every_crossing(b: &Bounds, stabilised: &[[f64; 2]]) -> Bounded {
 
 /// What is proved of one machine.
 pub(super) struct Known<'a> {
-    pub bounds: &'a Bounds,
+    pub bounds: &'a LoopBounds,
     /// Ratios to the spec's curves, and the bandwidth.
     pub magnitudes: &'a Magnitudes,
     /// Whether the machine is a model: of a sweep nothing is known beyond its ends.
@@ -121,9 +121,9 @@ pub(super) fn proven_limits(spec: &Spec, wanted: &[Requirement], known: &Known<'
             // A margin of an unstable loop is a number without a meaning.
             let stable = b.stability == Stability::Stable;
             let verdict = match (good && stable, bad || b.stability == Stability::Unstable) {
-                (true, _) => Verdict::Proved,
-                (_, true) => Verdict::Violated,
-                _ => Verdict::NotProved,
+                (true, _) => LimitVerdict::Proved,
+                (_, true) => LimitVerdict::Violated,
+                _ => LimitVerdict::NotProved,
             };
             let side = if r.side == Side::AtLeast { "at_least" } else { "at_most" };
             ProvenLimit {

@@ -1,6 +1,6 @@
 //! A gain table against itself: sections recomputed from the gains, stated figures against proven bounds, digests against files.
 
-use super::bounds::{Bounded, Bounds, ProvenCrossing, Stability};
+use super::bounds::{Bounded, LoopBounds, ProvenCrossing, Stability};
 use super::write::WriteFigures;
 use crate::controller::Controller;
 use crate::lti::Section;
@@ -100,7 +100,7 @@ pub(super) fn sections(c: &Controller, found: &[Section]) -> Vec<Finding> {
 }
 
 /// Figures of `[after]` that lie outside the proven bounds of one machine.
-pub(super) fn figures(s: &Summary, b: &Bounds, write: Option<&WriteFigures>) -> Vec<Finding> {
+pub(super) fn figures(s: &Summary, b: &LoopBounds, write: Option<&WriteFigures>) -> Vec<Finding> {
     let mut all = Vec::new();
     let mut check = |name: &str, stated: Option<f64>, proven: Bounded| {
         let inside = |x: f64| {

@@ -14,6 +14,7 @@ use crate::diagnose::noise::lines::Line;
 use crate::lti::{Body, DiscretePlant, LtiError, Plant, PlantState, step_chain};
 use crate::numeric::least_squares::{Qr, dot};
 use crate::numeric::random::Random;
+use crate::numeric::statistics::{median, rms_of};
 use crate::physics::{AnyLaw, Entry, Machine, Sample, Scene, Setting};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -366,8 +367,7 @@ pub fn errors(model: &SimulatedModel, runs: &[&Run], closed: Option<&Law>) -> Ve
 
 /// Root mean square over all samples of several series.
 pub fn rms(series: &[Vec<f64>]) -> f64 {
-    let (sum, n) = series.iter().flatten().fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
-    (sum / f64::max(n, 1.0)).sqrt()
+    rms_of(series.iter().flatten().copied())
 }
 
 /// The noise of one record as repeats show it: the spread of a series about its group's mean, the median over the groups; none
@@ -389,12 +389,5 @@ pub fn floor(series: &[Vec<f64>], runs: &[&Run]) -> Option<f64> {
         each.push((0..run.len()).map(spread).sum::<f64>() / (run.len() as f64 * (r - 1.0)));
     }
     each.retain(|v| v.is_finite());
-    each.sort_by(f64::total_cmp);
-    let middle = each.len() / 2;
-    let median = if each.len() % 2 == 1 {
-        each[middle]
-    } else {
-        0.5 * (each.get(middle)? + each.get(middle.wrapping_sub(1))?)
-    };
-    Some(median.sqrt())
+    median(&each).map(f64::sqrt)
 }

@@ -5,6 +5,7 @@
 use super::Truth;
 use crate::gate::features::{LogEntry, PesRecord};
 use crate::numeric::random::Random;
+use crate::numeric::statistics::rms_of;
 
 /// Numbers, which become features, and words, which do not.
 pub(super) struct Log {
@@ -36,7 +37,7 @@ pub(super) fn log(truth: &Truth, factor: f64, record: &PesRecord, random: &mut R
     put("base_temperature_c", temperature);
     put("base_temperature_f", 32.0 + 1.8 * temperature);
     put("motor_temperature_c", temperature + 6.0 + 0.15 * random.normal());
-    let rms = (record.pes.iter().map(|p| p * p).sum::<f64>() / record.pes.len().max(1) as f64).sqrt();
+    let rms = rms_of(record.pes.iter().copied());
     put("pes_rms_nm", (rms * 85.0 * 100.0).floor() / 100.0);
     // Unit by tester: the last one counts in milliseconds.
     let cycle_s = 48.0 + 2.0 * random.normal();

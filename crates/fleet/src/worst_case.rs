@@ -33,7 +33,7 @@ pub const UNSTABLE: f64 = 1e3;
 ///
 /// Margins are refined on the measured curve; the write is read off the spectrum, prepared once for the slot. Gains of another shape than
 /// the fleet's are judged by [`judge`], which prepares everything again.
-pub fn prove(ready: &mut Ready<'_>, controller: &Controller) -> Result<WorstCase, TuneError> {
+pub fn worst_case(ready: &mut Ready<'_>, controller: &Controller) -> Result<WorstCase, TuneError> {
     let spec = ready.spec;
     let sections = controller.sections()?;
     // What the bench knows of the write; none where it saw an unstable case, whose write means nothing.
@@ -82,13 +82,13 @@ fn measured(l: &MeasuredLoop<'_>, write: Found, wanted: &[Requirement]) -> Judge
 }
 
 /// The limit nearest to being missed: its violation, what it is, and where.
-fn nearest(proof: &Judgement, spec: &Spec) -> (f64, What, Option<f64>) {
-    let m = &proof.margins;
-    if proof.judged.found.unstable_poles != 0 || !m.stable {
+fn nearest(judgement: &Judgement, spec: &Spec) -> (f64, What, Option<f64>) {
+    let m = &judgement.margins;
+    if judgement.judged.found.unstable_poles != 0 || !m.stable {
         return (UNSTABLE, What::GainMargin, m.phase_crossover_hz);
     }
     let mut worst = (-UNSTABLE, What::PhaseMargin, None);
-    for l in &proof.judged.limits {
+    for l in &judgement.judged.limits {
         let violation = l.violation.clamp(-UNSTABLE, 0.5 * UNSTABLE);
         if violation > worst.0 {
             let at_hz = match l.wanted.what {
@@ -99,8 +99,8 @@ fn nearest(proof: &Judgement, spec: &Spec) -> (f64, What, Option<f64>) {
                     let [first, last] = p.pes.window;
                     k as f64 * p.pes.sample_rate_hz / (last - first) as f64
                 }),
-                What::Curve { index } => proof.judged.found.curves.get(index).map(|c| c.hz),
-                What::Bandwidth => proof.judged.found.bandwidth_hz,
+                What::Curve { index } => judgement.judged.found.curves.get(index).map(|c| c.hz),
+                What::Bandwidth => judgement.judged.found.bandwidth_hz,
                 _ => None,
             };
             worst = (violation, l.wanted.what, at_hz);
@@ -110,8 +110,8 @@ fn nearest(proof: &Judgement, spec: &Spec) -> (f64, What, Option<f64>) {
 }
 
 /// The figures; what is infinite becomes the largest number, which can be written.
-fn figures_of(proof: &Judgement) -> Summary {
-    let mut s = Summary::of(proof);
+fn figures_of(judgement: &Judgement) -> Summary {
+    let mut s = Summary::of(judgement);
     let values = [&mut s.max_sensitivity, &mut s.max_sensitivity_hz, &mut s.modulus_margin, &mut s.disk_margin];
     let figures = [&mut s.dft_low, &mut s.dft_high, &mut s.command_peak].into_iter().flatten();
     for value in values.into_iter().chain(figures) {
