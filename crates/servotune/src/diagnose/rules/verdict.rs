@@ -137,7 +137,7 @@ rules! {
         "what a law must say of held-out records before they can reject it",
         "its mean is then three standard deviations above nothing (40 against 2 times the root of 40)";
     LAW_SHORT: f64 = 0.25, "share",
-        "part of it that they fall short of",
+        "share that findings explain of what held-out records say of their law; below it they fall short",
         "judgement: where the law acts they answer with all of it",
         "1 of 96 right laws rejected on three opened sets, counted by hand (specs/decisions/mismatch.md)";
     LAW_FAR: f64 = 3.0, "standard deviations",
