@@ -109,7 +109,8 @@ fn run() -> Outcome<()> {
     let friction = || Setting::new(PivotFriction { sliding_length: 2.5, loading: Loading::Dahl }, vec![0.012]);
     // 8 % less torque at the ends of the travel.
     let rolloff = || Setting::new(TorqueFactorRolloff { shape: Shape::Parabola }, vec![0.0, 0.08, 0.0, 0.0]);
-    let grating = || Setting::new(EncoderCyclicError { period: 1.0, harmonics: Harmonics::First }, vec![0.02, 0.01, 0.0, 0.0]);
+    let grating =
+        || Setting::new(EncoderCyclicError { period: 1.0, harmonics: Harmonics::First }, vec![0.02, 0.01, 0.0, 0.0]);
     let machines: [(&str, Vec<Setting>, usize, &Records); 7] = [
         ("nothing missing", vec![], SAMPLES, SHORT_RECORDS),
         ("bearing that sticks", vec![friction()], SAMPLES, SHORT_RECORDS),

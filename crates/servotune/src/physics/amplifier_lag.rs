@@ -17,11 +17,12 @@ pub struct AmplifierLag {
     pub time_constant_s: f64,
 }
 
-const TIME_CONSTANT_S: Key = Key::new("time_constant_s", Unit::Second, "time constant")
+/// The keys of a first-order lag, of the reading too.
+pub(super) const TIME_CONSTANT_S: Key = Key::new("time_constant_s", Unit::Second, "time constant")
     .unless(&["bandwidth_hz"])
     .positive()
     .scan(Bound::At(0.1, Measure::Sample), Bound::At(20.0, Measure::Sample));
-const BANDWIDTH_HZ: Key = Key::new("bandwidth_hz", Unit::Hertz, "1/(2 pi time_constant_s)")
+pub(super) const BANDWIDTH_HZ: Key = Key::new("bandwidth_hz", Unit::Hertz, "1/(2 pi time_constant_s)")
     .unless(&["time_constant_s"])
     .positive()
     .prior(Prior::Words("made from the time constant"));

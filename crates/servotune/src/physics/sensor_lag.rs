@@ -2,9 +2,9 @@
 //!
 //! tau y' = x - y; over an interval where x runs straight with slope s: y = x - s tau + (y0 - x0 + s tau) exp(-t/tau).
 
+use super::amplifier_lag::{BANDWIDTH_HZ, TIME_CONSTANT_S};
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
-use super::key::{Bound, Key, Measure, Prior};
-use super::parameter::{Parameter, Unit};
+use super::parameter::Parameter;
 use super::sample::{Sample, Scene, logarithmic};
 use super::share::Share;
 use nalgebra::Complex;
@@ -16,15 +16,6 @@ pub struct SensorLag {
     /// Time constant (s), above 0.
     pub time_constant_s: f64,
 }
-
-const TIME_CONSTANT_S: Key = Key::new("time_constant_s", Unit::Second, "time constant")
-    .unless(&["bandwidth_hz"])
-    .positive()
-    .scan(Bound::At(0.1, Measure::Sample), Bound::At(20.0, Measure::Sample));
-const BANDWIDTH_HZ: Key = Key::new("bandwidth_hz", Unit::Hertz, "1/(2 pi time_constant_s)")
-    .unless(&["time_constant_s"])
-    .positive()
-    .prior(Prior::Words("made from the time constant"));
 
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
