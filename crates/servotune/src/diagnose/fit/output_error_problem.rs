@@ -354,7 +354,23 @@ pub(in crate::diagnose) fn descended(
     law: Option<&Law>,
     runs: &[(&Run, usize)],
 ) -> Option<Model> {
-    let mut problem = Problem::plain_error(data, model, law, runs);
+    descended_from(Problem::plain_error(data, model, law, runs))
+}
+
+/// The same in open loop with the laws alone moved.
+pub(in crate::diagnose) fn laws_descended(
+    data: &DiagnosisData,
+    model: &Model,
+    runs: &[(&Run, usize)],
+) -> Option<Model> {
+    let mut problem = Problem::plain_error(data, model, None, runs);
+    problem.free.free_parameters.clear();
+    descended_from(problem)
+}
+
+/// The model of a problem from where it stands.
+fn descended_from(mut problem: Problem) -> Option<Model> {
+    let (data, model) = (problem.data, problem.model);
     let mut x = problem.start();
     let before = size(&problem.settle(&x));
     if !before.is_finite() {

@@ -37,6 +37,9 @@ rules! {
     CLEARED_FAR: f64 = 3.0, "noise",
         "simulation error of the best linear plant over the sensor's noise from which a plant is cleared at all",
         "nearer to the noise the search starts well enough";
+    CLEARED_DONE: f64 = 1.1, "noise",
+        "simulation error with the law over the sensor's noise below which no other law and no curve is tried",
+        "nothing leaves less than the noise; what is left to win is a tenth of it";
     ONE_NUMBER: f64 = 250.0, "sum of squares",
         "fall by one number in the place of all others that is no chance",
         "16 standard deviations of one number: laws differ from machines by more than noise does";

@@ -10,13 +10,15 @@ use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::output_error_problem::{Problem, descended};
+use crate::diagnose::fit::output_error_problem::{Problem, descended, laws_descended};
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::fit::simulation::size;
 use crate::diagnose::free_form::estimation::Curved;
-use crate::diagnose::rules::{CLEARED_BETTER, CLEARED_BY_CURVE, CLEARED_FAR, CLEARED_FULLER, CLEARED_TELLS};
+use crate::diagnose::rules::{
+    CLEARED_BETTER, CLEARED_BY_CURVE, CLEARED_DONE, CLEARED_FAR, CLEARED_FULLER, CLEARED_TELLS,
+};
 use crate::lti::Plant;
-use crate::physics::{AnyLaw, Setting};
+use crate::physics::Setting;
 
 /// Laws that are tried by simulation, as they stand and fitted.
 const TRIED: usize = 16;
@@ -35,7 +37,9 @@ pub(in crate::diagnose) struct Cleared {
     pub law: Option<SelectedEffect>,
     /// Whether it was a curve without one.
     pub curve: bool,
-    /// What plant and law leave of each mean run in plain simulation (position_unit).
+    /// Whether the plant is the given one: a law beside it explains all.
+    given_stands: bool,
+    /// What plant and law leave of one record of each group in plain simulation (position_unit).
     pub left: Vec<Vec<f64>>,
 }
 
@@ -48,6 +52,9 @@ impl Cleared {
     /// The remark about it.
     pub fn says(&self) -> &'static str {
         match (&self.law, self.curve) {
+            (Some(_), _) if self.given_stands => {
+                "the search set out from the given plant with a law beside it: both leave no more than the noise"
+            }
             (Some(_), _) => {
                 "the search set out from a plant fitted together with a law: the given one conceals what acts"
             }
@@ -66,7 +73,7 @@ struct Tried<'a> {
     own: &'a DiagnosisData,
     /// The linear refit.
     linear: Model,
-    /// Mean runs, each with the number of records that it stands for.
+    /// One record of each group, not its mean: a law that sticks is shaken by each record's own noise, and the mean of repeats has less of it.
     whole: Vec<(&'a Run, usize)>,
 }
 
@@ -89,7 +96,7 @@ pub(in crate::diagnose) fn cleared(
         return None;
     }
     let (own, linear) = refit(data.clone(), iterations);
-    let whole: Vec<(&Run, usize)> = means.iter().zip(&own.stack.segments).map(|(m, s)| (m, s.runs.len())).collect();
+    let whole: Vec<(&Run, usize)> = own.stack.segments.iter().map(|s| (&own.runs[s.runs[0]], 1)).collect();
     let samples: f64 = whole.iter().map(|(r, n)| (r.len() * n) as f64).sum();
     let tried = Tried { own: &own, linear, whole };
     let mut given = tried.linear.clone();
@@ -103,6 +110,9 @@ pub(in crate::diagnose) fn cleared(
     say("a plant cleared of what bends it");
     laws.sort_by(|a, b| a.0.total_cmp(&b.0));
     laws.truncate(TRIED);
+    if let Some(stands) = tried.beside_given(&laws) {
+        return Some(Cleared { given_stands: true, ..tried.cleared(&stands) });
+    }
     let best = tried.of_curves(bent, tried.of_laws(&laws));
     best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least).map(|b| tried.cleared(&b))
 }
@@ -118,11 +128,17 @@ struct Fitted {
 }
 
 impl Tried<'_> {
-    /// What a model leaves in plain simulation, mean run after mean run, each over the sensor's noise in it.
+    /// What a model leaves in plain simulation, record after record, each over the sensor's noise.
     fn errors(&self, ground: &DiagnosisData, model: &Model) -> Vec<f64> {
         let mut problem = Problem::plain_error(ground, model, None, &self.whole);
         let x = problem.start();
         problem.settle(&x)
+    }
+
+    /// Whether a sum of squares is the noise: nothing else can leave clearly less.
+    fn done(&self, left: f64) -> bool {
+        let rows: usize = self.whole.iter().map(|(run, _)| run.len()).sum();
+        left < CLEARED_DONE * CLEARED_DONE * rows as f64
     }
 
     /// Its sum of squares.
@@ -142,7 +158,13 @@ impl Tried<'_> {
         };
         let left = self.whole.iter().map(own).collect();
         let law = best.model.chosen.first().filter(|_| !best.curve).cloned();
-        Cleared { plant: best.ground.form.plant(&best.model.refitted.p), law, curve: best.curve, left }
+        Cleared {
+            plant: best.ground.form.plant(&best.model.refitted.p),
+            law,
+            curve: best.curve,
+            given_stands: false,
+            left,
+        }
     }
 
     /// A plant with a law beside it, and the ground around it.
@@ -156,6 +178,32 @@ impl Tried<'_> {
 
     fn fitted(&self, ground: &DiagnosisData, model: &Model) -> Option<Model> {
         descended(ground, model, None, &self.whole)
+    }
+
+    /// The best law beside the plant as given, where both leave no more than the noise: then nothing bent that plant.
+    fn beside_given(&self, laws: &[(f64, Balanced)]) -> Option<Fitted> {
+        let simulated = |(_, b): &(f64, Balanced)| {
+            let (ground, model) = self.model(&self.own.form.given, Some(b.law.clone()?));
+            let left = self.left(&ground, &model);
+            left.is_finite().then_some((left, ground, model))
+        };
+        let mut tried: Vec<(f64, DiagnosisData, Model)> = laws.iter().filter_map(simulated).collect();
+        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut seen: Vec<&'static str> = Vec::new();
+        let mut best: Option<Fitted> = None;
+        for (_, ground, model) in tried {
+            let name = model.chosen[0].setting.facts().name;
+            if seen.contains(&name) || seen.len() == FITTED {
+                continue;
+            }
+            seen.push(name);
+            let Some(model) = laws_descended(&ground, &model, &self.whole) else { continue };
+            let left = self.left(&ground, &model);
+            if self.done(left) && best.as_ref().is_none_or(|b| left < b.left) {
+                best = Some(Fitted { left, ground, model, curve: false });
+            }
+        }
+        best.map(|b| self.fuller(b, |ground, model| laws_descended(ground, model, &self.whole)))
     }
 
     /// The best law of some balances, in its fuller form where that is clearly better.
@@ -172,30 +220,36 @@ impl Tried<'_> {
             let fitted = self.fitted(&ground, &model).unwrap_or(model);
             let left = self.left(&ground, &fitted).min(left);
             settled.push(Fitted { left, ground, model: fitted, curve: false });
+            if self.done(left) {
+                break;
+            }
         }
-        let mut best = settled.into_iter().min_by(|a, b| a.left.total_cmp(&b.left))?;
-        let fuller = |law: &SelectedEffect| {
-            let of = |full: AnyLaw| SelectedEffect {
-                setting: Setting::new(full, law.setting.strengths.clone()),
-                ..law.clone()
-            };
-            law.setting.law.fuller(&self.own.scene).into_iter().map(of).collect::<Vec<_>>()
-        };
+        let best = settled.into_iter().min_by(|a, b| a.left.total_cmp(&b.left))?;
+        Some(self.fuller(best, |ground, model| self.fitted(ground, model)))
+    }
+
+    /// The fuller form of a fitted law, where that is clearly better.
+    fn fuller(&self, mut best: Fitted, fit: impl Fn(&DiagnosisData, &Model) -> Option<Model>) -> Fitted {
         let plain = best.model.clone();
-        for full in plain.chosen.first().map(fuller).unwrap_or_default() {
-            let model = Model { chosen: vec![with_freedom(full, &self.own.scene)], ..plain.clone() };
-            let Some(fitted) = self.fitted(&best.ground, &model) else { continue };
+        let Some(law) = plain.chosen.first() else { return best };
+        for full in law.setting.law.fuller(&self.own.scene) {
+            let setting = Setting::new(full, law.setting.strengths.clone());
+            let chosen = vec![with_freedom(SelectedEffect { setting, ..law.clone() }, &self.own.scene)];
+            let Some(fitted) = fit(&best.ground, &Model { chosen, ..plain.clone() }) else { continue };
             let left = self.left(&best.ground, &fitted);
             if left < CLEARED_FULLER * best.left {
                 best = Fitted { left, model: fitted, ..best };
             }
         }
-        Some(best)
+        best
     }
 
     /// A curve without a name in the place of the best law, where it leaves far less.
     fn of_curves(&self, bent: Vec<Curved>, mut best: Option<Fitted>) -> Option<Fitted> {
         let most = best.as_ref().map_or(f64::INFINITY, |b| b.left);
+        if self.done(most) {
+            return best;
+        }
         for c in bent.into_iter().take(CURVES) {
             let law = c.shape.effect();
             let law = law.map(|setting| SelectedEffect { setting, continuous: Vec::new(), range: Vec::new(), step: 0 });
