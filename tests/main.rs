@@ -12,6 +12,7 @@ mod diagnose_coupling;
 mod diagnose_free_form;
 mod diagnose_logs;
 mod diagnose_offered;
+mod diagnose_repeats;
 mod diagnose_report;
 mod diagnose_rules;
 mod diagnose_sealed;
