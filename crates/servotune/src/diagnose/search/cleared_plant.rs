@@ -96,7 +96,9 @@ pub(in crate::diagnose) fn cleared(
         return None;
     }
     let (own, linear) = refit(data.clone(), iterations);
-    let whole: Vec<(&Run, usize)> = own.stack.segments.iter().map(|s| (&own.runs[s.runs[0]], 1)).collect();
+    let one = |r: &usize| (&own.runs[*r], 1);
+    let whole: Vec<(&Run, usize)> = own.stack.segments.iter().map(|s| one(&s.runs[0])).collect();
+    let every: Vec<(&Run, usize)> = own.stack.segments.iter().flat_map(|s| s.runs.iter().map(one)).collect();
     let samples: f64 = whole.iter().map(|(r, n)| (r.len() * n) as f64).sum();
     let tried = Tried { own: &own, linear, whole };
     let mut given = tried.linear.clone();
@@ -114,7 +116,10 @@ pub(in crate::diagnose) fn cleared(
         return Some(Cleared { given_stands: true, ..tried.cleared(&stands) });
     }
     let best = tried.of_curves(bent, tried.of_laws(&laws));
-    best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least).map(|b| tried.cleared(&b))
+    let best = best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least)?;
+    // One record of each group has told which law it is; its numbers come from every record.
+    let model = descended(&best.ground, &best.model, None, &every).unwrap_or(best.model);
+    Some(tried.cleared(&Fitted { model, ..best }))
 }
 
 /// A plant with what was fitted beside it.
