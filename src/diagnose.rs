@@ -159,7 +159,7 @@ pub(super) fn make(a: &DiagnoseArguments, screen: &mut Screen) -> Result<(Diagno
     let next = &diagnosis.next_experiment;
     // Without a rival there is nothing to separate.
     let gain = if next.expected_separation > 0.0 {
-        format!(" (expected separation {:.1})", next.expected_separation)
+        format!(" (expected separation {})", three(next.expected_separation))
     } else {
         String::new()
     };

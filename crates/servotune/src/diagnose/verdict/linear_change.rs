@@ -13,6 +13,7 @@ use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{FAMILY, LAGS_ALIKE, LINEAR_SIGMAS, LINEAR_SLACK, ONE_NUMBER};
 use crate::diagnose::search::selection::Selection;
+use crate::numeric::digits::said;
 use crate::physics::amplifier_lag::AmplifierLag;
 use crate::physics::sensor_lag::SensorLag;
 use crate::physics::{self, AnyLaw, Parameter, Setting, extra_delay, misalignment};
@@ -195,9 +196,13 @@ fn said_refit(facts: &Facts) -> String {
     let given = facts.given;
     let refitted = &facts.selection.last().refitted.plant;
     let [(b0, k0, c0), (b1, k1, c1)] = [given, refitted].map(|p| body_numbers(&p.body));
+    let change = |from: f64, to: f64| format!("{} -> {}", said(from, 4), said(to, 4));
     format!(
-        "linear refit: acceleration gain {b0:.6e} -> {b1:.6e}, stiffness {k0:.6e} -> {k1:.6e} 1/s^2, viscous rate {c0:.4} -> {c1:.4} 1/s, delay {:.3e} -> {:.3e} s",
-        given.delay_s, refitted.delay_s
+        "linear refit: acceleration gain {}, stiffness {} 1/s^2, viscous rate {} 1/s, delay {} s",
+        change(b0, b1),
+        change(k0, k1),
+        change(c0, c1),
+        change(given.delay_s, refitted.delay_s)
     )
 }
 
