@@ -42,8 +42,9 @@ fn need(key: &Key) -> String {
     let mut text = match key.need {
         Need::Always => "required".to_owned(),
         Need::Unless(others) => format!("required, or {}", of(others)),
+        Need::Where(words) => format!("required: {words}"),
         Need::Or(number) => format!("else {number}"),
-        Need::OrElse(words) => format!("else {words}"),
+        Need::OrElse(words) | Need::OrToml(words) => format!("else {words}"),
         Need::Reported => "reported".to_owned(),
     };
     if let Some(other) = key.beside {

@@ -50,6 +50,7 @@ mod performance_arguments;
 mod proof;
 mod response;
 mod schema;
+mod schema_page;
 mod screen;
 mod simulate;
 mod stamp;

@@ -1,54 +1,56 @@
-//! `servotune schema`: the keys of a file as a JSON schema, with which editors complete and check them.
+//! `servotune schema`: the keys of a file as a JSON schema, with which editors complete and check them, and all of them as a page.
 //!
-//! In: `specs/keys.md`, the one list of keys, embedded. Out: JSON Schema (draft 7). A test holds the list against the parsers.
+//! In: the lists of keys that stand beside the readers. Out: JSON Schema (draft 7), or the page that `specs/keys.md` carries. A test walks through
+//! every key and holds the lists against the readers.
 
 use super::start_arguments::{SchemaArguments, SchemaFile};
-use super::{Ending, Failure, Screen};
+use super::{Ending, Failure, Screen, schema_page};
 use serde_json::{Map, Value, json};
+use servotune::document::{End, FileKey, KeyFile, KeyTable, Kind, Need, Range};
+use servotune::{controller, lti, pes, recording, tune};
 
-const KEYS: &str = include_str!("../specs/keys.md");
+/// The lists of keys, in the order of the page.
+const FILES: [KeyFile; 7] = [
+    lti::PLANT_KEYS,
+    controller::CONTROLLER_KEYS,
+    tune::GAIN_TABLE_KEYS,
+    tune::SPEC_KEYS,
+    pes::PROFILE_KEYS,
+    recording::CASE_KEYS,
+    servotune_fleet::FLEET_KEYS,
+];
 
 pub(super) fn run(a: &SchemaArguments, screen: &mut Screen) -> Result<Ending, Failure> {
-    let schema = of(match a.file {
-        SchemaFile::Plant => "plant.toml",
-        SchemaFile::Controller => "controller.toml",
-        SchemaFile::Spec => "spec.toml",
-        SchemaFile::Profile => "profile.toml",
-        SchemaFile::Case => "case.toml",
-        SchemaFile::Fleet => "FLEET.toml",
+    let Some(file) = a.file else {
+        let all: Map<String, Value> = FILES.iter().map(|f| (f.name.to_owned(), of(f))).collect();
+        screen.result(&all, &schema_page::text(&FILES))?;
+        return Ok(Ending::Accepted);
+    };
+    let schema = of(match file {
+        SchemaFile::Plant => &lti::PLANT_KEYS,
+        SchemaFile::Controller => &controller::CONTROLLER_KEYS,
+        SchemaFile::Gains => &tune::GAIN_TABLE_KEYS,
+        SchemaFile::Spec => &tune::SPEC_KEYS,
+        SchemaFile::Profile => &pes::PROFILE_KEYS,
+        SchemaFile::Case => &recording::CASE_KEYS,
+        SchemaFile::Fleet => &servotune_fleet::FLEET_KEYS,
     });
     screen.result(&schema, &format!("{schema:#}\n"))?;
     Ok(Ending::Accepted)
 }
 
-/// The schema of a file by its heading in the list.
-fn of(file: &str) -> Value {
+fn of(file: &KeyFile) -> Value {
     let mut root = object();
     root["$schema"] = json!("http://json-schema.org/draft-07/schema#");
-    root["title"] = json!(file);
-    let mut inside = false;
-    let mut path: Vec<String> = Vec::new();
-    let mut many = false;
-    for line in KEYS.lines() {
-        if let Some(heading) = line.strip_prefix("## ") {
-            inside = heading == file;
-        } else if let Some(table) = line.strip_prefix("### ").filter(|_| inside) {
-            many = table.starts_with("[[");
-            let bare = table.trim_matches(['[', ']']);
-            path = if bare == "top" { Vec::new() } else { bare.split('.').map(str::to_owned).collect() };
-        } else if inside && line.starts_with("| `") {
-            // A stroke within a cell is escaped.
-            let line = line.replace("\\|", "\u{1}");
-            let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
-            if let [key, kind, unit, default, range, means] = cells[..] {
-                let key = key.trim_matches('`');
-                let table = table_at(&mut root, &path, many);
-                table["properties"][key] = described(kind, &words(unit, default, range, means));
-                if default == "required"
-                    && let Some(required) = table["required"].as_array_mut()
-                {
-                    required.push(json!(key));
-                }
+    root["title"] = json!(file.name);
+    for table in file.base.iter().flat_map(|b| b.tables).chain(file.tables) {
+        let at = table_at(&mut root, table);
+        for key in table.keys {
+            at["properties"][key.name] = described(key);
+            if key.need == Need::Always
+                && let Some(required) = at["required"].as_array_mut()
+            {
+                required.push(json!(key.name));
             }
         }
     }
@@ -59,53 +61,110 @@ fn object() -> Value {
     json!({ "type": "object", "properties": {}, "required": [], "additionalProperties": false })
 }
 
-/// The table at a path, made where it is not there yet; of a list of tables, the one that stands for all.
-fn table_at<'a>(root: &'a mut Value, path: &[String], many: bool) -> &'a mut Value {
+/// The object of a table, made in the place of the key that names it; of a list of tables, the one that stands for all.
+fn table_at<'a>(root: &'a mut Value, table: &KeyTable) -> &'a mut Value {
     let mut at = root;
-    for (i, name) in path.iter().enumerate() {
-        let entry = &mut at["properties"][name.as_str()];
-        let last = i + 1 == path.len();
-        let listed = last && many;
-        let made = |v: &Value| v.get("properties").is_some();
-        if !made(entry) && !entry.get("items").is_some_and(made) {
-            let about = entry.get("description").cloned();
-            *entry = if listed { json!({ "type": "array", "items": object() }) } else { object() };
-            if let (Some(about), Some(map)) = (about, entry.as_object_mut()) {
-                map.insert("description".into(), about);
-            }
-        }
-        at = if entry.get("items").is_some() { &mut entry["items"] } else { entry };
+    for name in table.heading.trim_matches(['[', ']']).split('.').filter(|p| !p.is_empty()) {
+        let entry = &mut at["properties"][name];
+        at = if entry["type"] == "array" { &mut entry["items"] } else { entry };
+    }
+    if let (Some(map), Value::Object(empty)) = (at.as_object_mut().filter(|m| !m.contains_key("properties")), object())
+    {
+        map.extend(empty);
     }
     at
 }
 
 /// Meaning, unit, range and default in a line.
-fn words(unit: &str, default: &str, range: &str, means: &str) -> String {
-    let part = |name: &str, word: &str| if word.is_empty() { String::new() } else { format!("; {name}{word}") };
-    let default = if default == "required" { "required".to_owned() } else { format!("default: {default}") };
-    format!("{means}{}{}; {default}", part("unit: ", unit), part("", range))
-        .trim_start_matches("; ")
-        .replace('\u{1}', "|")
+fn words(key: &FileKey) -> String {
+    let unit = if key.unit.is_empty() { String::new() } else { format!("unit: {}", key.unit) };
+    let default = match key.need {
+        Need::Always | Need::Unless(_) | Need::Where(_) => key.need.text(),
+        need => format!("default: {}", need.text()),
+    };
+    [key.means.to_owned(), unit, key.asked(), default]
+        .into_iter()
+        .filter(|s| !s.is_empty())
+        .collect::<Vec<_>>()
+        .join("; ")
 }
 
-fn described(kind: &str, about: &str) -> Value {
-    let of = |item: &str| json!({ "type": "array", "items": { "type": item } });
-    let mut value = match kind {
-        "number" => json!({ "type": "number" }),
-        "integer" => json!({ "type": "integer", "minimum": 0 }),
-        "text" | "path" => json!({ "type": "string" }),
-        "bool" => json!({ "type": "boolean" }),
-        "numbers" => of("number"),
-        "texts" => of("string"),
-        "range" => json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }),
-        "range of integers" => json!({ "type": "array", "items": { "type": "integer" }, "minItems": 2, "maxItems": 2 }),
-        "ranges" | "matrix" => json!({ "type": "array", "items": of("number") }),
-        "roots" | "vector" => json!({ "type": "array" }),
-        "table" => json!({ "type": "object" }),
-        "tables" => of("object"),
-        "any" => Value::Object(Map::new()),
-        words => json!({ "enum": words.split(", ").collect::<Vec<_>>() }),
-    };
-    value["description"] = json!(about);
+/// A number of a range, `kind` saying of which type.
+fn number(kind: &str, range: Range) -> Value {
+    let mut value = json!({ "type": kind });
+    // A whole number stands in a schema without a point.
+    let plain = |x: f64| if kind == "integer" { json!(x as i64) } else { json!(x) };
+    match range {
+        Range::Any => {}
+        Range::NotZero => value["not"] = json!({ "const": 0 }),
+        Range::Size(least, most) => {
+            (value["minimum"], value["maximum"]) = (json!(-most), json!(most));
+            if least > 0.0 {
+                value["not"] = json!({ "exclusiveMinimum": -least, "exclusiveMaximum": least });
+            }
+        }
+        Range::Between(low, high) => {
+            for (end, with, without) in [(low, "minimum", "exclusiveMinimum"), (high, "maximum", "exclusiveMaximum")] {
+                match end {
+                    End::Open => {}
+                    End::With(x) => value[with] = plain(x),
+                    End::Without(x) => value[without] = plain(x),
+                }
+            }
+        }
+    }
     value
+}
+
+fn list(items: Value) -> Value {
+    json!({ "type": "array", "items": items })
+}
+
+fn described(key: &FileKey) -> Value {
+    let plain = || number("number", key.range);
+    let two = |items: Value| json!({ "type": "array", "items": items, "minItems": 2, "maxItems": 2 });
+    let mut value = match key.kind {
+        Kind::Number => plain(),
+        Kind::Integer => number("integer", key.range),
+        Kind::Bool => json!({ "type": "boolean" }),
+        Kind::Text | Kind::Path => json!({ "type": "string" }),
+        Kind::Choice(words) => json!({ "enum": words }),
+        Kind::Numbers => list(plain()),
+        Kind::Texts => list(json!({ "type": "string" })),
+        Kind::Pair => two(plain()),
+        Kind::Pairs => list(two(plain())),
+        Kind::Integers => two(number("integer", key.range)),
+        Kind::NumberOrPair => json!({ "anyOf": [plain(), two(plain())] }),
+        Kind::Roots => list(json!({ "anyOf": [plain(), two(plain())] })),
+        Kind::Vector => list(json!({ "anyOf": [plain(), list(plain())] })),
+        Kind::Matrix => list(list(plain())),
+        Kind::NumberOrMatrix => json!({ "type": ["number", "array"] }),
+        Kind::Table => json!({ "type": "object" }),
+        Kind::Tables => list(json!({ "type": "object" })),
+    };
+    for (at_an_end, name, count) in
+        [(key.items[0] > 0, "minItems", key.items[0]), (key.items[1] < usize::MAX, "maxItems", key.items[1])]
+    {
+        if at_an_end {
+            value[name] = json!(count);
+        }
+    }
+    value["description"] = json!(words(key));
+    if let Some(default) = default(key) {
+        value["default"] = default;
+    }
+    value
+}
+
+/// The default, where it is a value.
+fn default(key: &FileKey) -> Option<Value> {
+    match key.need {
+        Need::Or(number) if key.kind == Kind::Integer => Some(json!(number as i64)),
+        Need::Or(number) => Some(json!(number)),
+        Need::OrToml(text) => {
+            let table: toml::Table = format!("x = {text}").parse().ok()?;
+            serde_json::to_value(&table["x"]).ok()
+        }
+        _ => None,
+    }
 }

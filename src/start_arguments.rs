@@ -77,12 +77,16 @@ pub(super) enum ShellWord {
 #[command(after_help = "Examples:
   servotune schema spec > spec.schema.json
   servotune schema plant > plant.schema.json
+  servotune schema --page
 
-The same list in words: specs/keys.md, which `servotune init` writes too.")]
+The page is specs/keys.md, which `servotune init` writes too.")]
 pub(super) struct SchemaArguments {
     /// Of which file
-    #[arg(value_enum, value_name = "FILE")]
-    pub file: SchemaFile,
+    #[arg(value_enum, value_name = "FILE", required_unless_present = "page")]
+    pub file: Option<SchemaFile>,
+    /// Every key of every file as a page (Markdown), with --json every schema
+    #[arg(long, conflicts_with = "file")]
+    pub page: bool,
 }
 
 /// A file with keys.
@@ -90,8 +94,10 @@ pub(super) struct SchemaArguments {
 pub(super) enum SchemaFile {
     /// plant.toml
     Plant,
-    /// controller.toml, and the keys of a gain table that a person sets
+    /// controller.toml
     Controller,
+    /// gains.toml
+    Gains,
     /// spec.toml
     Spec,
     /// profile.toml

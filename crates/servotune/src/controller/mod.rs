@@ -3,11 +3,13 @@
 //! In: gains with units (`controller.toml`). Out: [`crate::lti::Sections`], the chain that is simulated, judged and shipped.
 //! Convention: e = reference - position, negative feedback; discrete law in `specs/conventions.md`.
 
+mod controller_keys;
 mod filters;
 mod law;
 mod pid;
 mod settings;
 
+pub use controller_keys::CONTROLLER_KEYS;
 pub use filters::{Feedforward, Lowpass, Notch};
 pub use law::Law;
 pub use pid::Pid;

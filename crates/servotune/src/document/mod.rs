@@ -6,6 +6,7 @@
 
 mod bounded;
 mod digest;
+mod key;
 mod name;
 mod read;
 pub mod size_limits;
@@ -13,6 +14,7 @@ mod write;
 
 pub use bounded::{Bounded, OverLimit};
 pub use digest::sha256_hex;
+pub use key::{End, FileKey, KeyFile, KeyTable, Kind, Need, Range};
 pub use name::{A_NAME, LONGEST_NAME, NameError, check_name, printable};
 pub use read::{DocumentError, parse_toml, read_table, read_text, read_toml, way_on};
 pub use write::{FileSet, Temporary, below, check_target, clear_abandoned, write_text, write_whole};

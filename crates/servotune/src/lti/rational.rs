@@ -18,7 +18,7 @@ pub struct Rational {
 }
 
 /// Most poles taken.
-const MOST: usize = 60;
+pub(super) const MOST: usize = 60;
 
 impl Rational {
     /// The response at s = j w. Factors are taken in turn, one zero and one pole, so that no partial product leaves the range of f64.

@@ -3,10 +3,11 @@
 //! An effect is a law with a few strengths (linear) and numbers of its own (a sliding length, a period, a limit; [`Parametric`]). In motion
 //! the law gives columns; strengths times columns, summed, enter the loop at one place ([`Entry`]).
 
-use super::key::{Key, Need};
+use super::key::Key;
 use super::parameter::Parameter;
 use super::sample::{Sample, Scene};
 use super::share::Share;
+use crate::document::Need;
 use std::collections::BTreeMap;
 use thiserror::Error;
 

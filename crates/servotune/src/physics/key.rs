@@ -5,6 +5,7 @@
 
 use super::parameter::{Parameter, Unit};
 use super::sample::Scene;
+use crate::document::Need;
 
 /// One key of a law.
 #[derive(Clone, Copy, Debug)]
@@ -23,21 +24,6 @@ pub struct Key {
     pub takes: Takes,
     /// What the search takes it from.
     pub prior: Prior,
-}
-
-/// Whether a plant file gives a key.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Need {
-    /// It must.
-    Always,
-    /// It must, unless it gives one of these.
-    Unless(&'static [&'static str]),
-    /// It may; else the key is this number.
-    Or(f64),
-    /// It may; else the key is what the words say.
-    OrElse(&'static str),
-    /// It may, and that says nothing: reports make it from the other keys.
-    Reported,
 }
 
 /// Values that a plant file may give; all are finite.

@@ -61,11 +61,12 @@ pub mod torque_ripple;
 pub mod unexplained;
 pub mod unmodelled_resonance;
 
+pub use crate::document::Need;
 pub use cycle::{Cycle, Motion};
 pub use describing::describing;
 pub use effect::{COLUMNS, Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 pub use free_form::CurvePort;
-pub use key::{Bound, Key, Measure, Need, Prior, Takes};
+pub use key::{Bound, Key, Measure, Prior, Takes};
 pub use knots::Knots;
 pub use library::{AnyLaw, Effect, Setting, curves, data_facts, effect, facts, library};
 pub use machine::{Machine, Reading};

@@ -83,7 +83,7 @@ impl CaseFile {
 const FURTHER_INPUTS: &str =
     "up to 8 names of further columns of every record, each once, none of them a column of the contract";
 /// Most further inputs of a case.
-const MOST_INPUTS: usize = 8;
+pub(super) const MOST_INPUTS: usize = 8;
 /// Columns that have a meaning in every record.
 const CONTRACT: [&str; 8] =
     ["time_s", "reference", "excitation", "command", "position", "pes", "spindle_rad", "temperature_c"];

@@ -4,12 +4,14 @@
 //! Convention: one row a sample; a clock column must tick evenly. Spec: `specs/files.md`.
 
 mod case;
+mod case_keys;
 mod columns;
 mod error;
 mod packed;
 mod record;
 
 pub use case::{Case, NominalNoise, RecordEntry, Role};
+pub use case_keys::CASE_KEYS;
 pub use columns::{Columns, read_columns};
 pub use error::RecordingError;
 pub use packed::gzip;
