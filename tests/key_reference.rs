@@ -1,130 +1,93 @@
-//! `specs/keys.md` names the keys that the parsers take, all of them and no other; `servotune schema` gives them to editors.
+//! `specs/keys.md` and the schemas are made from the lists of keys; the lists have the keys that the parsers take, all of them and no other.
 #![allow(clippy::unwrap_used)]
 
-use crate::program_common::{folder, root, servotune};
+use crate::key_samples::{FILES, judge, samples};
+use crate::program_common::{root, servotune};
 use serde_json::Value;
-use servotune::controller::Controller;
-use servotune::lti::PlantFile;
-use servotune::pes::Profile;
-use servotune::recording::NominalNoise;
-use servotune::tune::Spec;
-use servotune_fleet::FleetFile;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use toml::Table;
 
-/// A table of the page: its file, its heading as TOML has it (empty at the top), its keys, each with its default.
-struct Listed {
-    file: String,
-    heading: String,
-    keys: Vec<(String, String)>,
-}
-
-fn listed() -> Vec<Listed> {
+#[test]
+fn the_page_is_what_the_program_prints() {
     let page = std::fs::read_to_string(root("specs/keys.md")).unwrap();
-    let (mut file, mut all) = (String::new(), Vec::new());
-    for line in page.lines() {
-        if let Some(name) = line.strip_prefix("## ") {
-            file = name.to_owned();
-        } else if let Some(heading) = line.strip_prefix("### ") {
-            let heading = if heading == "top" { String::new() } else { heading.to_owned() };
-            all.push(Listed { file: file.clone(), heading, keys: Vec::new() });
-        } else if line.starts_with("| `") {
-            let line = line.replace("\\|", "/");
-            let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
-            assert_eq!(cells.len(), 6, "{line}");
-            let row = (cells[0].trim_matches('`').to_owned(), cells[3].to_owned());
-            all.last_mut().unwrap().keys.push(row);
-        }
-    }
-    all
+    let ran = servotune(&["schema", "--page"]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert!(page == ran.out, "write the output of `servotune schema --page` to specs/keys.md");
 }
 
-/// What the parser of a file says to a text.
-fn refusal(file: &str, text: &str) -> String {
-    match file {
-        "plant.toml" => toml::from_str::<PlantFile>(text).unwrap_err().to_string(),
-        "controller.toml" => toml::from_str::<Controller>(text).unwrap_err().to_string(),
-        "profile.toml" => toml::from_str::<Profile>(text).unwrap_err().to_string(),
-        "FLEET.toml" => toml::from_str::<FleetFile>(text).unwrap_err().to_string(),
-        "spec.toml" => Spec::parse(text, None).unwrap_err().to_string(),
-        _ => {
-            // Tests run side by side: each has its folder.
-            let dir = folder(std::thread::current().name().unwrap_or("key_reference"));
-            std::fs::write(dir.join("case.toml"), text).unwrap();
-            NominalNoise::read(&dir).unwrap_err().to_string()
-        }
-    }
-}
-
+/// The parser's own list of what it knows, from its refusal of a key that is none.
 #[test]
-fn the_page_has_the_keys_of_the_parsers() {
-    let all = listed();
-    assert!(all.len() > 30, "{}", all.len());
-    for table in &all {
-        let said = refusal(&table.file, &format!("{}\nno_such_key = 1\n", table.heading));
-        let (_, known) =
-            said.split_once("expected").unwrap_or_else(|| panic!("{} {}: {said}", table.file, table.heading));
-        let known = known.split(";").next().unwrap();
-        let known: BTreeSet<&str> = known.split('`').skip(1).step_by(2).collect();
-        let written: BTreeSet<&str> = table.keys.iter().map(|(k, _)| k.as_str()).collect();
-        assert_eq!(written, known, "{} {}", table.file, table.heading);
-    }
-}
-
-/// A table without any of its keys is refused exactly where the page says that one is required, and by that key's name.
-#[test]
-fn required_keys_are_required_and_the_others_are_not() {
-    for table in listed() {
-        // The plant's own form and a fleet's own input are asked for by other words.
-        if table.heading.is_empty() || ["[plant]", "[input]"].contains(&table.heading.as_str()) {
-            continue;
+fn the_lists_have_the_keys_of_the_parsers() {
+    for file in FILES {
+        let mut tables: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for table in file.base.iter().flat_map(|b| b.tables).chain(file.tables) {
+            tables.entry(table.heading).or_default().extend(table.keys.iter().map(|k| k.name));
         }
-        let required: Vec<&str> = table.keys.iter().filter(|(_, d)| d == "required").map(|(k, _)| k.as_str()).collect();
-        let parent_first = format!("{}\n", table.heading);
-        let said = refusal(&table.file, &parent_first);
-        let missing = said.split_once("missing field `").map(|(_, s)| s.split('`').next().unwrap());
-        match missing {
-            Some(key) if table.keys.iter().any(|(k, _)| k == key) => {
-                assert!(required.contains(&key), "{} {}: `{key}` is required: {said}", table.file, table.heading);
-            }
-            _ => {
-                assert!(required.is_empty(), "{} {}: {required:?} are not asked for: {said}", table.file, table.heading)
-            }
+        for (heading, listed) in tables {
+            let text: Table = format!("{heading}\nno_such_key = 1\n").parse().unwrap();
+            let said = judge(file.name, &text).unwrap_err();
+            let (_, known) = said.split_once("expected").unwrap_or_else(|| panic!("{} {heading}: {said}", file.name));
+            let known = known.split(';').next().unwrap();
+            let known: BTreeSet<&str> = known.split('`').skip(1).step_by(2).collect();
+            assert_eq!(listed, known, "{} {heading}", file.name);
         }
     }
 }
 
 #[test]
 fn the_schema_has_every_key_and_takes_the_files_of_the_project() {
-    for (word, file, sample) in [
-        ("plant", "plant.toml", "specs/machines/healthy.toml"),
-        ("controller", "controller.toml", "specs/controllers/nominal.toml"),
-        ("spec", "spec.toml", "specs/limits/paper.toml"),
-        ("spec", "spec.toml", "examples/stage/spec.toml"),
-        ("profile", "profile.toml", "specs/profiles/spiral.toml"),
-        ("case", "case.toml", ""),
-        ("fleet", "FLEET.toml", ""),
-    ] {
+    let words = ["plant", "controller", "gains", "spec", "profile", "case", "fleet"];
+    let of_project = [
+        ("plant", "specs/machines/healthy.toml"),
+        ("controller", "specs/controllers/nominal.toml"),
+        ("spec", "specs/limits/paper.toml"),
+        ("spec", "examples/stage/spec.toml"),
+        ("profile", "specs/profiles/spiral.toml"),
+    ];
+    for (word, file) in words.into_iter().zip(FILES) {
         let ran = servotune(&["schema", word]);
         assert_eq!(ran.code, 0, "{}", ran.err);
         let schema: Value = serde_json::from_str(&ran.out).unwrap();
-        for table in listed().iter().filter(|t| t.file == file) {
+        assert_eq!(schema["title"], file.name);
+        for table in file.base.iter().flat_map(|b| b.tables).chain(file.tables) {
             let mut at = &schema;
             for part in table.heading.trim_matches(['[', ']']).split('.').filter(|p| !p.is_empty()) {
                 at = &at["properties"][part];
                 at = if at["items"].is_object() { &at["items"] } else { at };
             }
-            for (key, _) in &table.keys {
-                assert!(at["properties"][key]["description"].is_string(), "{word} {} {key}", table.heading);
+            for key in table.keys {
+                assert!(at["properties"][key.name]["description"].is_string(), "{word} {} {}", table.heading, key.name);
             }
             assert_eq!(at["additionalProperties"], false, "{word} {}", table.heading);
         }
-        if !sample.is_empty() {
-            let text = std::fs::read_to_string(root(sample)).unwrap();
-            let value: Value = serde_json::to_value(text.parse::<toml::Table>().unwrap()).unwrap();
-            let wrong = misfits(&schema, &value, "");
-            assert!(wrong.is_empty(), "{sample}: {wrong:?}");
+        let texts = of_project.iter().filter(|(w, _)| *w == word);
+        let files = texts.map(|(_, f)| std::fs::read_to_string(root(f)).unwrap().parse::<Table>().unwrap());
+        for table in files.chain(samples(file.name)) {
+            let wrong = misfits(&schema, &serde_json::to_value(&table).unwrap(), "");
+            assert!(wrong.is_empty(), "{word}: {wrong:?}");
         }
     }
+}
+
+/// Ends of a range stand in the schema as the reader holds them.
+#[test]
+fn the_schema_refuses_what_lies_beyond_a_range() {
+    let schema = |word: &str| -> Value { serde_json::from_str(&servotune(&["schema", word]).out).unwrap() };
+    let controller = schema("controller");
+    for (kp, sample_time_s, fits) in
+        [(0.3, 1e-4, true), (-1e30, 1e-4, true), (1.1e30, 1e-4, false), (0.3, 0.0, false), (0.3, -1.0, false)]
+    {
+        let file = serde_json::json!({ "sample_time_s": sample_time_s, "pid": { "kp": kp } });
+        assert_eq!(misfits(&controller, &file, "").is_empty(), fits, "{file}");
+    }
+    let spec = schema("spec");
+    assert_eq!(spec["properties"]["guard"]["default"], 0.02);
+    for (guard, fits) in [(0.0, true), (0.49, true), (0.5, false), (-0.1, false)] {
+        assert_eq!(misfits(&spec, &serde_json::json!({ "guard": guard }), "").is_empty(), fits, "{guard}");
+    }
+    let residue = &schema("plant")["properties"]["plant"]["properties"]["residue"];
+    let row = |gain: f64| serde_json::json!([{ "gain": gain }]);
+    assert!(misfits(residue, &row(-2.0), "").is_empty() && !misfits(residue, &row(0.0), "").is_empty());
 }
 
 /// What of the value the schema does not take; the part of JSON Schema that the schemas use.
@@ -149,6 +112,28 @@ fn misfits(schema: &Value, value: &Value, at: &str) -> Vec<String> {
         && !words.contains(value)
     {
         wrong.push(format!("{at}: {value} is none of {words:?}"));
+    }
+    if let Some(x) = value.as_f64() {
+        let end = |name: &str, good: &dyn Fn(f64) -> bool| schema[name].as_f64().is_none_or(good);
+        let within = end("minimum", &|e| x >= e) && end("maximum", &|e| x <= e);
+        let between = end("exclusiveMinimum", &|e| x > e) && end("exclusiveMaximum", &|e| x < e);
+        if !(within && between) || schema["const"].as_f64().is_some_and(|c| c != x) {
+            wrong.push(format!("{at}: {x} beyond its range"));
+        }
+    }
+    if schema["not"].is_object() && misfits(&schema["not"], value, at).is_empty() {
+        wrong.push(format!("{at}: {value} is shut out"));
+    }
+    if let Some(any) = schema["anyOf"].as_array()
+        && !any.iter().any(|s| misfits(s, value, at).is_empty())
+    {
+        wrong.push(format!("{at}: {value} is none of these"));
+    }
+    if let Some(all) = value.as_array() {
+        let count = |name: &str| schema[name].as_u64().map(|n| n as usize);
+        if count("minItems").is_some_and(|n| all.len() < n) || count("maxItems").is_some_and(|n| all.len() > n) {
+            wrong.push(format!("{at}: {} items", all.len()));
+        }
     }
     if let Some(map) = value.as_object() {
         for (key, inside) in map {

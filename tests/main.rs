@@ -47,6 +47,8 @@ mod general_plants;
 mod identify_noise;
 mod identify_truth;
 mod key_reference;
+mod key_samples;
+mod key_walk;
 mod library_tasks;
 mod lti_discretisation;
 mod messages;
