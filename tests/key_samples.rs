@@ -46,7 +46,7 @@ pub fn judge(file: &str, table: &Table) -> Result<String, String> {
             let dir = own_folder();
             let inputs: Vec<String> = (1..=9).map(|i| format!("x{i}")).collect();
             let mut record = format!("time_s,reference,command,position,{}\n", inputs.join(","));
-            for k in 0..20 {
+            for k in 0..64 {
                 record += &format!("{},0,0,{}{}\n", f64::from(k) * 1e-3, f64::from(k) * 0.1, ",0".repeat(9));
             }
             for name in ["one.csv", "two.csv"] {
@@ -61,13 +61,13 @@ pub fn judge(file: &str, table: &Table) -> Result<String, String> {
 
 /// Tests run side by side: each has its folder.
 fn own_folder() -> std::path::PathBuf {
-    folder(std::thread::current().name().unwrap_or("key_samples"))
+    folder(&std::thread::current().name().unwrap_or("key_samples").replace("::", "_"))
 }
 
 const PROFILE: &str = include_str!("../specs/profiles/spiral.toml");
 
 /// Valid files.
-const SAMPLES: [(&str, &str); 18] = [
+const SAMPLES: [(&str, &str); 20] = [
     (
         "plant.toml",
         "position_unit = 'um'\ncommand_unit = 'A'\n[plant]\ndc_gain = 75\nnatural_frequency_rad_s = 369\ndamping_ratio = 0.2\nresonance_gain = 1.2
@@ -81,8 +81,12 @@ const SAMPLES: [(&str, &str); 18] = [
     ),
     (
         "plant.toml",
-        "position_unit = 'um'\ncommand_unit = 'A'\n[plant]\ngain = 2.0\npoles_rad_s = [-3.0, -4.0]\nzeros_rad_s = [-2.0]\ndelay_s = 0
-         lag_hz = [900.0, 20.0]\nlead_hz = [50.0]",
+        "position_unit = 'um'\ncommand_unit = 'A'\n[plant]\nnatural_frequency_rad_s = 0\nacceleration_gain = 2.0\nviscous_rate_per_s = 1.0
+         delay_s = 0\nlag_hz = [900.0, 20.0]\nlead_hz = [50.0]",
+    ),
+    (
+        "plant.toml",
+        "position_unit = 'um'\ncommand_unit = 'A'\n[plant]\ngain = 2.0\npoles_rad_s = [-3.0, -4.0]\nzeros_rad_s = [-2.0]\ndelay_s = 0",
     ),
     (
         "plant.toml",
@@ -108,6 +112,7 @@ const SAMPLES: [(&str, &str); 18] = [
     ),
     ("controller.toml", CONTROLLER),
     ("gains.toml", GAINS),
+    ("spec.toml", "profile = 'profile.toml'\nobjective = { minimise = 'room' }"),
     (
         "spec.toml",
         "profile = 'profile.toml'\nsample_time_s = 1e-4\nguard = 0.1\nobjective = { minimise = 'dft', bands_hz = [[600, 1500], [1500, 3000]] }

@@ -6,15 +6,23 @@ use crate::key_samples::{FILES, judge, samples};
 use servotune::document::{End, FileKey, Kind, Need, Range};
 use toml::{Table, Value};
 
-/// Keys whose range depends on other keys: a value at one of its own limits may be refused for that. What lies beyond is refused all the same.
-const DEPENDS: [(&str, &str, &str); 7] = [
-    ("plant.toml", "natural_frequency_rad_s", "0 is another form"),
-    ("controller.toml", "frequency_hz", "no decay is left just above 0 Hz"),
-    ("controller.toml", "a1", "the poles depend on a2 too"),
-    ("spec.toml", "bands_hz", "a band must hold a bin of the window"),
-    ("spec.toml", "hz", "the points rise"),
-    ("profile.toml", "duration_s", "the window lies within the record"),
-    ("profile.toml", "sample_rate_hz", "the window lies within the record"),
+/// Keys whose range depends on other keys, so that a value within their own may be refused. What lies beyond is refused all the same.
+const DEPENDS: [(&str, &str); 15] = [
+    ("plant.toml [plant] natural_frequency_rad_s", "0 is another form"),
+    ("plant.toml [[plant.residue]] frequency_rad_s", "0 is the rigid body, which has no damping"),
+    ("plant.toml [[plant.residue]] frequency_hz", "0 is the rigid body, which has no damping"),
+    ("plant.toml [[plant.residue]] damping_ratio", "without damping the sum has no zeros that f64 can tell"),
+    ("controller.toml sample_time_s", "filters lie below half the sample rate"),
+    ("controller.toml [[lowpass]] frequency_hz", "next to 0 Hz the filter does not decay"),
+    ("controller.toml [[notch]] frequency_hz", "next to 0 Hz the filter does not decay"),
+    ("controller.toml [[biquad]] a1", "the poles depend on a2 too"),
+    ("spec.toml [objective] bands_hz", "a limited band holds a bin of the window"),
+    ("spec.toml [[limits.curve]] hz", "the points rise"),
+    ("spec.toml [limits.move] settling_s", "the record ends"),
+    ("profile.toml [spiral] duration_s", "the window lies within the record"),
+    ("profile.toml [pes] sample_rate_hz", "the window lies within the record"),
+    ("profile.toml [pes] window", "it holds a sample at least"),
+    ("FLEET.toml [tables] candidates", "at least `most`"),
 ];
 
 /// What readers call a key, or its table, in their refusals.
@@ -70,25 +78,34 @@ impl Place {
     }
 
     fn shown(&self) -> String {
-        format!("{} {} {}", self.file, self.heading, self.key.name)
+        let parts = [self.file, self.heading, self.key.name];
+        parts.into_iter().filter(|p| !p.is_empty()).collect::<Vec<_>>().join(" ")
     }
 
-    fn refused(&self, value: Value) {
-        let text = value.to_string();
-        let text = text.chars().take(80).collect::<String>();
-        let said = self.with(Some(value)).err().unwrap_or_else(|| panic!("{} takes {text}", self.shown()));
+    /// Nothing where a value is refused by the key's name, else what is wrong.
+    fn refused(&self, value: Value) -> Option<String> {
+        let text = shortly(&value);
+        match self.with(Some(value)) {
+            Ok(_) => Some(format!("{} takes {text}", self.shown())),
+            Err(said) => self.unnamed(&said).map(|said| format!("{said} ({text})")),
+        }
+    }
+
+    /// A refusal that does not say which key is meant.
+    fn unnamed(&self, said: &str) -> Option<String> {
         let named = names(self.key, self.heading).iter().any(|n| said.contains(n.as_str()));
-        assert!(named, "{} = {text}: not named: {said}", self.shown());
+        // The parser's own refusal has line and column.
+        let placed = said.contains("invalid value: integer");
+        (!named && !placed).then(|| format!("{} is not named: {said}", self.shown()))
     }
 
-    fn taken(&self, value: Value) {
-        let text = value.to_string().chars().take(80).collect::<String>();
-        let said = self.with(Some(value));
-        assert!(said.is_ok(), "{} = {text}: {}", self.shown(), said.unwrap_err());
+    fn taken(&self, value: Value) -> Option<String> {
+        let text = shortly(&value);
+        self.with(Some(value)).err().map(|said| format!("{} = {text}: {said}", self.shown()))
     }
 
     fn depends(&self) -> bool {
-        DEPENDS.iter().any(|(file, key, _)| *file == self.file && *key == self.key.name)
+        DEPENDS.iter().any(|(place, _)| *place == self.shown())
     }
 
     /// Numbers of gains.toml are the program's own: the reader makes `section` from the gains once more and asks for the type of the rest, which
@@ -152,26 +169,36 @@ fn holding(place: &Place, x: f64) -> Vec<Value> {
     }
 }
 
+/// Walks through every key; what is wrong anywhere is told at once.
+fn walk(look: impl Fn(&Place) -> Vec<String>) {
+    let wrong: Vec<String> = every().iter().flat_map(look).collect();
+    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+fn shortly(value: &Value) -> String {
+    value.to_string().chars().take(80).collect()
+}
+
 #[test]
 fn a_key_left_out_is_asked_for_by_name_or_is_its_default() {
-    for place in every() {
+    walk(|place| {
         let without = place.with(None);
+        let same = |default: Value| {
+            let set = place.with(Some(default));
+            let same = without.is_ok() && without == set;
+            (!same).then(|| format!("{}: left out {without:?}, set {set:?}", place.shown())).into_iter().collect()
+        };
         match place.key.need {
-            Need::Always | Need::Unless(_) | Need::Where(_) => {
-                let said = without.err().unwrap_or_else(|| panic!("{} is not asked for", place.shown()));
-                let named = names(place.key, place.heading).iter().any(|n| said.contains(n.as_str()));
-                assert!(named, "{}: not named: {said}", place.shown());
-            }
-            Need::Or(x) => assert_eq!(without, place.with(Some(number(place.key.kind, x))), "{}", place.shown()),
-            Need::OrToml(text) => {
-                let default = format!("x = {text}").parse::<Table>().unwrap()["x"].clone();
-                assert!(without.is_ok(), "{}: {without:?}", place.shown());
-                assert_eq!(without, place.with(Some(default)), "{}", place.shown());
-            }
-            Need::OrElse(_) => assert!(without.is_ok(), "{}: {without:?}", place.shown()),
-            Need::Reported => panic!("{}: no file has such a key", place.shown()),
+            Need::Always | Need::Unless(_) | Need::Where(_) => match &without {
+                Ok(_) => vec![format!("{} is not asked for", place.shown())],
+                Err(said) => place.unnamed(said).into_iter().collect(),
+            },
+            Need::Or(x) => same(number(place.key.kind, x)),
+            Need::OrToml(text) => same(format!("x = {text}").parse::<Table>().unwrap()["x"].clone()),
+            Need::OrElse(_) => without.err().into_iter().collect(),
+            Need::Reported => vec![format!("{}: no file has such a key", place.shown())],
         }
-    }
+    });
 }
 
 /// The nearest numbers on this side of an end and beyond it.
@@ -180,138 +207,164 @@ fn beside(kind: Kind, x: f64, up: bool) -> f64 {
     if up { x + step } else { x - step }
 }
 
-#[test]
-fn the_ends_of_a_range_are_those_of_the_reader() {
-    for place in every() {
-        if place.made_by_the_program() {
-            continue;
-        }
-        let kind = place.key.kind;
-        let (mut good, mut bad) = (Vec::new(), Vec::new());
-        match place.key.range {
-            _ if !kind.of_numbers() => {}
-            Range::Any => {}
-            Range::NotZero => bad.push(0.0),
-            Range::Size(least, most) => {
-                good.extend([most, -most, least, -least]);
-                bad.extend([beside(kind, most, true), beside(kind, -most, false)]);
-                if least > 0.0 {
-                    bad.extend([0.0, beside(kind, least, false), beside(kind, -least, true)]);
-                }
+/// Numbers that a range takes and numbers that it does not, next to its ends.
+fn ends(key: &FileKey) -> [Vec<f64>; 2] {
+    let (mut good, mut bad, kind) = (Vec::new(), Vec::new(), key.kind);
+    match key.range {
+        Range::Any => {}
+        Range::NotZero => bad.push(0.0),
+        Range::Size(least, most) => {
+            good.extend([most, -most, least, -least]);
+            bad.extend([beside(kind, most, true), beside(kind, -most, false)]);
+            if least > 0.0 {
+                bad.extend([0.0, beside(kind, least, false), beside(kind, -least, true)]);
             }
-            Range::Between(low, high) => {
-                for (end, up) in [(low, false), (high, true)] {
-                    match end {
-                        End::Open => {}
-                        End::With(x) => {
-                            good.push(x);
-                            bad.push(beside(kind, x, up));
-                        }
-                        End::Without(x) => {
-                            good.push(beside(kind, x, !up));
-                            bad.push(x);
-                        }
+        }
+        Range::Between(low, high) => {
+            for (end, up) in [(low, false), (high, true)] {
+                match end {
+                    End::Open => {}
+                    End::With(x) => {
+                        good.push(x);
+                        bad.push(beside(kind, x, up));
+                    }
+                    End::Without(x) => {
+                        good.push(beside(kind, x, !up));
+                        bad.push(x);
                     }
                 }
             }
         }
-        for x in bad {
-            holding(&place, x).into_iter().for_each(|v| place.refused(v));
+    }
+    [good, bad]
+}
+
+#[test]
+fn the_ends_of_a_range_are_those_of_the_reader() {
+    walk(|place| {
+        if !place.key.kind.of_numbers() || place.made_by_the_program() {
+            return vec![];
         }
-        for x in good.into_iter().filter(|_| !place.depends()) {
-            holding(&place, x).into_iter().for_each(|v| place.taken(v));
-        }
+        let [good, bad] = ends(place.key);
+        let refused = bad.into_iter().flat_map(|x| holding(place, x)).filter_map(|v| place.refused(v));
+        let good = good.into_iter().filter(|_| !place.depends());
+        refused.chain(good.flat_map(|x| holding(place, x)).filter_map(|v| place.taken(v))).collect()
+    });
+}
+
+/// Numbers far beyond, where the list names no end.
+fn far(key: &FileKey) -> &'static [f64] {
+    match key.range {
+        _ if key.kind != Kind::Number => &[],
+        Range::Any | Range::NotZero => &[1e200, -1e200],
+        Range::Between(_, End::Open) => &[1e200],
+        _ => &[],
     }
 }
 
-/// Where the list names no end, a number of any size is not refused by the key's own name.
 #[test]
 fn a_range_without_an_end_has_none() {
-    for place in every().iter().filter(|p| matches!(p.key.kind, Kind::Number) && !p.made_by_the_program()) {
-        let far: &[f64] = match place.key.range {
-            Range::Any | Range::NotZero => &[1e200, -1e200],
-            Range::Between(_, End::Open) => &[1e200],
-            _ => &[],
-        };
-        for x in far {
-            if let Err(said) = place.with(Some(Value::Float(*x))) {
-                let own = format!("{} = {x}", place.key.name);
-                assert!(!said.contains(&own) && place.key.also != "", "{}: {said}", place.shown());
-            }
+    walk(|place| {
+        if place.depends() || place.made_by_the_program() {
+            return vec![];
         }
+        let said = far(place.key).iter().filter_map(|x| place.with(Some(Value::Float(*x))).err());
+        // What else is asked may refuse it, in other words than those of a range.
+        let of_others = |said: &String| place.key.also != "" && !said.contains(&format!("{} = ", place.key.name));
+        said.filter(|s| !of_others(s)).map(|s| format!("{}: {s}", place.shown())).collect()
+    });
+}
+
+#[test]
+fn every_exception_is_a_key_and_is_needed() {
+    let all = every();
+    for (name, _) in DEPENDS {
+        let place = all.iter().find(|p| p.shown() == name).unwrap_or_else(|| panic!("{name} is no key"));
+        let [good, _] = ends(place.key);
+        let mut tried = good.iter().chain(far(place.key)).flat_map(|x| holding(place, *x));
+        assert!(tried.any(|v| place.taken(v).is_some()), "{name} takes its whole range");
     }
 }
 
 #[test]
 fn what_is_no_finite_number_is_refused_by_name() {
-    for place in every().iter().filter(|p| p.key.kind.of_numbers() && !p.made_by_the_program()) {
-        if matches!(place.key.kind, Kind::Integer | Kind::Integers) {
-            continue;
+    walk(|place| {
+        let whole = matches!(place.key.kind, Kind::Integer | Kind::Integers);
+        if !place.key.kind.of_numbers() || whole || place.made_by_the_program() {
+            return vec![];
         }
-        for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            holding(place, x).into_iter().for_each(|v| place.refused(v));
-        }
-    }
+        let wrong = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY].into_iter().flat_map(|x| holding(place, x));
+        wrong.filter_map(|v| place.refused(v)).collect()
+    });
 }
 
 #[test]
 fn a_value_of_another_type_is_refused() {
-    for place in every() {
-        let wrong = match place.key.kind {
+    walk(|place| {
+        let text = |t: &str| Value::String(t.into());
+        let other = match place.key.kind {
             kind if kind.of_text() || matches!(kind, Kind::Table | Kind::Texts | Kind::Bool) => Value::Integer(1),
-            _ => Value::String("text".into()),
+            _ => text("text"),
         };
-        assert!(place.with(Some(wrong)).is_err(), "{} takes another type", place.shown());
-        if place.key.kind == Kind::Integer {
-            assert!(place.with(Some(Value::Float(1.5))).is_err(), "{} takes a half", place.shown());
+        let mut wrong = vec![other];
+        if matches!(place.key.kind, Kind::Integer | Kind::Integers) {
+            wrong.extend(holding(place, 0.0).into_iter().map(|_| Value::Float(1.5)));
         }
+        let mut found = Vec::new();
         if let Kind::Choice(words) = place.key.kind {
-            words.iter().for_each(|w| place.taken(Value::String((*w).into())));
-            assert!(place.with(Some(Value::String("no_such_word".into()))).is_err(), "{}", place.shown());
+            wrong.push(text("no_such_word"));
+            found.extend(words.iter().filter_map(|w| place.taken(text(w))));
         }
-    }
+        let taken = wrong.into_iter().filter(|v| place.with(Some(v.clone())).is_ok());
+        found.extend(taken.map(|v| format!("{} takes {}", place.shown(), shortly(&v))));
+        found
+    });
 }
 
 #[test]
 fn a_list_has_as_many_as_it_may() {
-    for place in every() {
-        let many = |n: usize| match place.key.kind {
-            // Names differ; all else may repeat.
-            Kind::Texts => (1..=n).map(|i| Value::String(format!("x{i}"))).collect(),
-            Kind::Roots => (1..=n).map(|i| Value::Float(-(i as f64))).collect(),
-            Kind::Numbers => (1..=n).map(|i| Value::Float(i as f64)).collect(),
-            _ => vec![place.value().as_array().unwrap()[0].clone(); n],
+    walk(|place| {
+        let many = |n: usize| {
+            Value::Array(match place.key.kind {
+                // Names and points differ; all else may repeat.
+                Kind::Texts => (1..=n).map(|i| Value::String(format!("x{i}"))).collect(),
+                Kind::Roots => (1..=n).map(|i| Value::Float(-(i as f64))).collect(),
+                Kind::Numbers => (1..=n).map(|i| Value::Float(i as f64)).collect(),
+                _ => vec![place.value().as_array().unwrap()[0].clone(); n],
+            })
         };
         let [least, most] = place.key.items;
+        let mut found = Vec::new();
         if least > 0 {
-            place.refused(Value::Array(many(least - 1)));
+            found.extend(place.refused(many(least - 1)));
         }
         if most < usize::MAX {
-            place.taken(Value::Array(many(most)));
-            place.refused(Value::Array(many(most + 1)));
+            found.extend(place.taken(many(most)));
+            found.extend(place.refused(many(most + 1)));
         }
-    }
+        found
+    });
 }
 
-/// A range does not fall.
 #[test]
 fn a_range_that_falls_is_refused() {
-    for place in every() {
+    walk(|place| {
         let falling = Value::Array(vec![number(place.key.kind, 20.0), number(place.key.kind, 10.0)]);
-        match place.key.kind {
+        let refused = match place.key.kind {
             Kind::Pair | Kind::Integers | Kind::NumberOrPair => place.refused(falling),
             Kind::Pairs => place.refused(Value::Array(vec![falling])),
-            _ => {}
-        }
-    }
+            _ => None,
+        };
+        refused.into_iter().collect()
+    });
 }
 
 #[test]
 fn an_unknown_key_is_refused_by_its_name() {
-    for place in every() {
+    walk(|place| {
         let mut changed = place.sample.clone();
         Place::table(place.heading, &mut changed).unwrap().insert("no_such_key".into(), Value::Integer(1));
-        let said = judge(place.file, &changed).err().unwrap_or_else(|| panic!("{} takes any key", place.shown()));
-        assert!(said.contains("no_such_key"), "{}: {said}", place.shown());
-    }
+        let named = judge(place.file, &changed).is_err_and(|said| said.contains("no_such_key"));
+        (!named).then(|| format!("{} takes any key", place.shown())).into_iter().collect()
+    });
 }

@@ -49,7 +49,10 @@ const TEMPERATURE: &[Key] = &[
 const TABLES: &[Key] = &[
     Key::integer("pilots", "", "slots tuned in full first").or(32.0).at_least(1.0),
     Key::integer("scouts", "", "slots on which shared tables are grown").or(192.0).within(0.0, 4096.0),
-    Key::integer("candidates", "", "candidates for shared tables").or(20.0).within(1.0, MOST_CANDIDATES as f64),
+    Key::integer("candidates", "", "candidates for shared tables")
+        .or(20.0)
+        .within(1.0, MOST_CANDIDATES as f64)
+        .also("at least `most`"),
     Key::integer("most", "", "shared tables at most").or(12.0).at_least(1.0).also("at most `candidates`"),
     Key::number("coverage", "", "share of slots at which fewer tables are enough")
         .or(0.99)

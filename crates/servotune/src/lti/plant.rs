@@ -155,6 +155,42 @@ impl Body {
             _ => 0,
         }
     }
+
+    /// Refuses numbers that are no body; `modes` are the resonance pairs that multiply it.
+    pub(super) fn check(&self, modes: usize) -> Result<(), LtiError> {
+        match *self {
+            Body::Rational(ref r) => r.check(modes),
+            Body::SecondOrder { dc_gain, natural_frequency_rad_s, damping_ratio } => {
+                gain("plant.dc_gain", dc_gain)?;
+                root("plant.natural_frequency_rad_s".into(), natural_frequency_rad_s)?;
+                damping("plant.damping_ratio".into(), damping_ratio)
+            }
+            Body::FreeInertia { acceleration_gain, viscous_rate_per_s: rate } => {
+                gain("plant.acceleration_gain", acceleration_gain)?;
+                let good = (0.0..=PLANT_RAD_S[1]).contains(&rate);
+                range("plant.viscous_rate_per_s".into(), rate, good, "a finite number, at least 0 and at most 1e9")
+            }
+        }
+    }
+}
+
+/// Refuses a number out of its range by its key.
+fn range(key: String, found: f64, good: bool, expected: &'static str) -> Result<(), LtiError> {
+    if found.is_finite() && good { Ok(()) } else { Err(LtiError::Range { key, found, expected }) }
+}
+
+fn gain(key: &str, found: f64) -> Result<(), LtiError> {
+    let good = (VALUE[0]..=VALUE[1]).contains(&found.abs());
+    range(key.into(), found, good, "a number of a size from 1e-30 to 1e30, not 0")
+}
+
+fn root(key: String, found: f64) -> Result<(), LtiError> {
+    let good = (PLANT_RAD_S[0]..=PLANT_RAD_S[1]).contains(&found);
+    range(key, found, good, "a frequency above 0, from 1e-4 to 1e9 rad/s")
+}
+
+fn damping(key: String, found: f64) -> Result<(), LtiError> {
+    range(key, found, found > 0.0 && found <= DAMPING, "a finite number above 0, at most 1e4")
 }
 
 impl Plant {
@@ -219,33 +255,7 @@ impl Plant {
 
     /// Refuses numbers that are no plant; the key in the error is the one of the plant file. Only a rational body may be unstable.
     pub fn check(&self) -> Result<(), LtiError> {
-        let range = |key: String, found: f64, good: bool, expected: &'static str| {
-            if found.is_finite() && good { Ok(()) } else { Err(LtiError::Range { key, found, expected }) }
-        };
-        let gain = |key: &str, found: f64| {
-            let good = (VALUE[0]..=VALUE[1]).contains(&found.abs());
-            range(key.into(), found, good, "a number of a size from 1e-30 to 1e30, not 0")
-        };
-        let root = |key: String, found: f64| {
-            let good = (PLANT_RAD_S[0]..=PLANT_RAD_S[1]).contains(&found);
-            range(key, found, good, "a frequency above 0, from 1e-4 to 1e9 rad/s")
-        };
-        let damping = |key: String, found: f64| {
-            range(key, found, found > 0.0 && found <= DAMPING, "a finite number above 0, at most 1e4")
-        };
-        match self.body {
-            Body::Rational(ref r) => r.check(self.modes.len())?,
-            Body::SecondOrder { dc_gain, natural_frequency_rad_s, damping_ratio } => {
-                gain("plant.dc_gain", dc_gain)?;
-                root("plant.natural_frequency_rad_s".into(), natural_frequency_rad_s)?;
-                damping("plant.damping_ratio".into(), damping_ratio)?;
-            }
-            Body::FreeInertia { acceleration_gain, viscous_rate_per_s: rate } => {
-                gain("plant.acceleration_gain", acceleration_gain)?;
-                let good = (0.0..=PLANT_RAD_S[1]).contains(&rate);
-                range("plant.viscous_rate_per_s".into(), rate, good, "a finite number, at least 0 and at most 1e9")?;
-            }
-        }
+        self.body.check(self.modes.len())?;
         range("plant.delay_s".into(), self.delay_s, self.delay_s >= 0.0, "a finite number, at least 0")?;
         gain("plant.resonance_gain", self.resonance_gain)?;
         if self.modes.len() > PLANT_MODES {

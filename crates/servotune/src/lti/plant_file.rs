@@ -51,6 +51,8 @@ impl TryFrom<PlantFile> for Plant {
             }
         };
         let [leads, lags] = t.beside()?;
+        // By its own keys, before lags and leads make roots of it.
+        body.check(t.modes.len())?;
         let body = if leads.is_empty() && lags.is_empty() { body } else { filtered(&body, &leads, &lags) };
         let plant = Plant {
             position_unit: file.position_unit,

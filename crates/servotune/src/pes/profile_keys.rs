@@ -12,7 +12,7 @@ const SPIRAL: &[Key] = &[
     Key::number("velocity", "pos/s", "its sign is the direction").takes(Range::NotZero),
     Key::number("distance", "pos", "length of the move").above(0.0),
     Key::number("acceleration_time_s", "s", "to that speed, and the same to stop").above(0.0),
-    Key::number("start_s", "s", "the reference is 0 until then").or(0.0).at_least(0.0),
+    Key::number("start_s", "s", "the reference is 0 until then").or(0.0).at_least(0.0).also("before `duration_s`"),
     Key::number("duration_s", "s", "length of the record")
         .above(0.0)
         .also("beyond `start_s`, with at most 2 million servo samples"),
