@@ -112,7 +112,7 @@ const SAMPLES: [(&str, &str); 20] = [
     ),
     ("controller.toml", CONTROLLER),
     ("gains.toml", GAINS),
-    ("spec.toml", "profile = 'profile.toml'\nobjective = { minimise = 'room' }"),
+    ("spec.toml", "profile = 'profile.toml'\nobjective = { minimise = 'room' }\ndisturbance = { psd = 'density.csv' }"),
     (
         "spec.toml",
         "profile = 'profile.toml'\nsample_time_s = 1e-4\nguard = 0.1\nobjective = { minimise = 'dft', bands_hz = [[600, 1500], [1500, 3000]] }

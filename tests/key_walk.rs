@@ -7,7 +7,7 @@ use servotune::document::{End, FileKey, Kind, Need, Range};
 use toml::{Table, Value};
 
 /// Keys whose range depends on other keys, so that a value within their own may be refused. What lies beyond is refused all the same.
-const DEPENDS: [(&str, &str); 15] = [
+const DEPENDS: [(&str, &str); 14] = [
     ("plant.toml [plant] natural_frequency_rad_s", "0 is another form"),
     ("plant.toml [[plant.residue]] frequency_rad_s", "0 is the rigid body, which has no damping"),
     ("plant.toml [[plant.residue]] frequency_hz", "0 is the rigid body, which has no damping"),
@@ -17,7 +17,6 @@ const DEPENDS: [(&str, &str); 15] = [
     ("controller.toml [[notch]] frequency_hz", "next to 0 Hz the filter does not decay"),
     ("controller.toml [[biquad]] a1", "the poles depend on a2 too"),
     ("spec.toml [objective] bands_hz", "a limited band holds a bin of the window"),
-    ("spec.toml [[limits.curve]] hz", "the points rise"),
     ("spec.toml [limits.move] settling_s", "the record ends"),
     ("profile.toml [spiral] duration_s", "the window lies within the record"),
     ("profile.toml [pes] sample_rate_hz", "the window lies within the record"),
@@ -109,7 +108,7 @@ impl Place {
     }
 
     /// Numbers of gains.toml are the program's own: the reader makes `section` from the gains once more and asks for the type of the rest, which
-    /// may be infinite where a loop is unstable.
+    /// is infinite where a loop passes through -1.
     fn made_by_the_program(&self) -> bool {
         self.file == "gains.toml"
     }
