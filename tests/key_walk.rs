@@ -269,7 +269,7 @@ fn a_range_without_an_end_has_none() {
         }
         let said = far(place.key).iter().filter_map(|x| place.with(Some(Value::Float(*x))).err());
         // What else is asked may refuse it, in other words than those of a range.
-        let of_others = |said: &String| place.key.also != "" && !said.contains(&format!("{} = ", place.key.name));
+        let of_others = |said: &String| !place.key.also.is_empty() && !said.contains(&format!("{} = ", place.key.name));
         said.filter(|s| !of_others(s)).map(|s| format!("{}: {s}", place.shown())).collect()
     });
 }
