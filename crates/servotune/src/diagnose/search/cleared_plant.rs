@@ -7,6 +7,7 @@
 use super::curve_balance::curves;
 use super::torque_balance::{Balance, Balanced, recorded_means, smoothings, with_freedom};
 use crate::diagnose::data::run::Run;
+use crate::diagnose::data::stacked_records::Segment;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
 use crate::diagnose::fit::model::Model;
@@ -39,7 +40,7 @@ pub(in crate::diagnose) struct Cleared {
     pub curve: bool,
     /// Whether the plant is the given one: a law beside it explains all.
     given_stands: bool,
-    /// What plant and law leave of one record of each group in plain simulation (position_unit).
+    /// What plant and law leave of each run in plain simulation (position_unit).
     pub left: Vec<Vec<f64>>,
 }
 
@@ -69,11 +70,12 @@ impl Cleared {
 }
 
 /// What plants and laws are tried on.
+#[derive(Clone)]
 struct Tried<'a> {
     own: &'a DiagnosisData,
     /// The linear refit.
     linear: Model,
-    /// One record of each group, not its mean: a law that sticks is shaken by each record's own noise, and the mean of repeats has less of it.
+    /// Runs, each with the number of records that it stands for.
     whole: Vec<(&'a Run, usize)>,
 }
 
@@ -96,11 +98,16 @@ pub(in crate::diagnose) fn cleared(
         return None;
     }
     let (own, linear) = refit(data.clone(), iterations);
-    let one = |r: &usize| (&own.runs[*r], 1);
-    let whole: Vec<(&Run, usize)> = own.stack.segments.iter().map(|s| one(&s.runs[0])).collect();
-    let every: Vec<(&Run, usize)> = own.stack.segments.iter().flat_map(|s| s.runs.iter().map(one)).collect();
+    let segments = &own.stack.segments;
+    let whole: Vec<(&Run, usize)> = means.iter().zip(segments).map(|(m, s)| (m, s.runs.len())).collect();
     let samples: f64 = whole.iter().map(|(r, n)| (r.len() * n) as f64).sum();
+    let repeated = whole.iter().any(|(_, n)| *n > 1);
     let tried = Tried { own: &own, linear, whole };
+    // What sticks is shaken by each record's own noise, and the mean of repeats has less of it.
+    let records = |s: &Segment, most: usize| -> Vec<(&Run, usize)> {
+        s.runs.iter().take(most).map(|&r| (&own.runs[r], 1)).collect()
+    };
+    let firsts = Tried { whole: segments.iter().flat_map(|s| records(s, 1)).collect(), ..tried.clone() };
     let mut given = tried.linear.clone();
     given.refitted.p.fill(0.0);
     let least = [tried.left(&own, &tried.linear), tried.left(&own, &given)];
@@ -112,14 +119,17 @@ pub(in crate::diagnose) fn cleared(
     say("a plant cleared of what bends it");
     laws.sort_by(|a, b| a.0.total_cmp(&b.0));
     laws.truncate(TRIED);
-    if let Some(stands) = tried.beside_given(&laws) {
-        return Some(Cleared { given_stands: true, ..tried.cleared(&stands) });
+    if let Some(stands) = firsts.beside_given(&laws) {
+        return Some(Cleared { given_stands: true, ..firsts.cleared(&stands) });
     }
     let best = tried.of_curves(bent, tried.of_laws(&laws));
     let best = best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least)?;
-    // One record of each group has told which law it is; its numbers come from every record.
-    let model = descended(&best.ground, &best.model, None, &every).unwrap_or(best.model);
-    Some(tried.cleared(&Fitted { model, ..best }))
+    if !(repeated && best.drags()) {
+        return Some(tried.cleared(&best));
+    }
+    let every = Tried { whole: segments.iter().flat_map(|s| records(s, usize::MAX)).collect(), ..tried.clone() };
+    let model = every.fitted(&best.ground, &best.model).unwrap_or(best.model);
+    Some(every.cleared(&Fitted { model, ..best }))
 }
 
 /// A plant with what was fitted beside it.
@@ -132,8 +142,14 @@ struct Fitted {
     curve: bool,
 }
 
+impl Fitted {
+    fn drags(&self) -> bool {
+        !self.curve && self.model.chosen.iter().any(|c| c.effect().is_drag())
+    }
+}
+
 impl Tried<'_> {
-    /// What a model leaves in plain simulation, record after record, each over the sensor's noise.
+    /// What a model leaves in plain simulation, run after run, each over the sensor's noise in it.
     fn errors(&self, ground: &DiagnosisData, model: &Model) -> Vec<f64> {
         let mut problem = Problem::plain_error(ground, model, None, &self.whole);
         let x = problem.start();
