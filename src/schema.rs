@@ -3,13 +3,13 @@
 //! In: the lists of keys that stand beside the readers. Out: JSON Schema (draft 7), or the page that `specs/keys.md` carries. A test walks through
 //! every key and holds the lists against the readers.
 
-use super::start_arguments::{SchemaArguments, SchemaFile};
+use super::start_arguments::SchemaArguments;
 use super::{Ending, Failure, Screen, schema_page};
 use serde_json::{Map, Value, json};
 use servotune::document::{End, FileKey, KeyFile, KeyTable, Kind, Need, Range};
 use servotune::{controller, lti, pes, recording, tune};
 
-/// The lists of keys, in the order of the page.
+/// The lists of keys, in the order of the page and of `SchemaFile`.
 const FILES: [KeyFile; 7] = [
     lti::PLANT_KEYS,
     controller::CONTROLLER_KEYS,
@@ -26,15 +26,7 @@ pub(super) fn run(a: &SchemaArguments, screen: &mut Screen) -> Result<Ending, Fa
         screen.result(&all, &schema_page::text(&FILES))?;
         return Ok(Ending::Accepted);
     };
-    let schema = of(match file {
-        SchemaFile::Plant => &lti::PLANT_KEYS,
-        SchemaFile::Controller => &controller::CONTROLLER_KEYS,
-        SchemaFile::Gains => &tune::GAIN_TABLE_KEYS,
-        SchemaFile::Spec => &tune::SPEC_KEYS,
-        SchemaFile::Profile => &pes::PROFILE_KEYS,
-        SchemaFile::Case => &recording::CASE_KEYS,
-        SchemaFile::Fleet => &servotune_fleet::FLEET_KEYS,
-    });
+    let schema = of(&FILES[file as usize]);
     screen.result(&schema, &format!("{schema:#}\n"))?;
     Ok(Ending::Accepted)
 }

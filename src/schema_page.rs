@@ -7,6 +7,7 @@ use servotune::document::KeyFile;
 const HEAD: &str = "# Every key of every file
 
 Printed by `servotune schema --page` from the lists that stand beside the readers. A test walks through every key: left out, at each end of its range and beyond, of a wrong type.
+Keys whose range depends on others are named in `tests/key_walk.rs`; numbers of gains.toml are asked for their type alone.
 `servotune schema plant|controller|gains|spec|profile|case|fleet` prints the same as a JSON schema, with which editors complete and check keys.
 Editors with Taplo want `#:schema spec.schema.json` in the first line of the file.
 

@@ -54,7 +54,7 @@ impl Cleared {
     pub fn says(&self) -> &'static str {
         match (&self.law, self.curve) {
             (Some(_), _) if self.given_stands => {
-                "the search set out from the given plant with a law beside it: both leave no more than the noise"
+                "the search set out from the given plant with a law beside it: both leave at most a tenth more than the noise"
             }
             (Some(_), _) => {
                 "the search set out from a plant fitted together with a law: the given one conceals what acts"
@@ -103,11 +103,6 @@ pub(in crate::diagnose) fn cleared(
     let samples: f64 = whole.iter().map(|(r, n)| (r.len() * n) as f64).sum();
     let repeated = whole.iter().any(|(_, n)| *n > 1);
     let tried = Tried { own: &own, linear, whole };
-    // What sticks is shaken by each record's own noise, and the mean of repeats has less of it.
-    let records = |s: &Segment, most: usize| -> Vec<(&Run, usize)> {
-        s.runs.iter().take(most).map(|&r| (&own.runs[r], 1)).collect()
-    };
-    let firsts = Tried { whole: segments.iter().flat_map(|s| records(s, 1)).collect(), ..tried.clone() };
     let mut given = tried.linear.clone();
     given.refitted.p.fill(0.0);
     let least = [tried.left(&own, &tried.linear), tried.left(&own, &given)];
@@ -119,6 +114,12 @@ pub(in crate::diagnose) fn cleared(
     say("a plant cleared of what bends it");
     laws.sort_by(|a, b| a.0.total_cmp(&b.0));
     laws.truncate(TRIED);
+    // What sticks is shaken by each record's own noise, and the mean of repeats has less of it.
+    let on_records = |most: usize| {
+        let of = |s: &Segment| s.runs.iter().take(most).map(|&r| (&own.runs[r], 1)).collect::<Vec<_>>();
+        Tried { whole: segments.iter().flat_map(of).collect(), ..tried.clone() }
+    };
+    let firsts = on_records(1);
     if let Some(stands) = firsts.beside_given(&laws) {
         return Some(Cleared { given_stands: true, ..firsts.cleared(&stands) });
     }
@@ -127,7 +128,7 @@ pub(in crate::diagnose) fn cleared(
     if !(repeated && best.drags()) {
         return Some(tried.cleared(&best));
     }
-    let every = Tried { whole: segments.iter().flat_map(|s| records(s, usize::MAX)).collect(), ..tried.clone() };
+    let every = on_records(usize::MAX);
     let model = every.fitted(&best.ground, &best.model).unwrap_or(best.model);
     Some(every.cleared(&Fitted { model, ..best }))
 }
@@ -201,18 +202,19 @@ impl Tried<'_> {
         descended(ground, model, None, &self.whole)
     }
 
-    /// The best law beside the plant as given, where both leave no more than the noise: then nothing bent that plant.
+    /// The best law beside the plant as given, where both leave hardly more than the noise: then nothing bent that plant.
     fn beside_given(&self, laws: &[(f64, Balanced)]) -> Option<Fitted> {
+        let (ground, bare) = self.model(&self.own.form.given, None);
         let simulated = |(_, b): &(f64, Balanced)| {
-            let (ground, model) = self.model(&self.own.form.given, Some(b.law.clone()?));
+            let model = Model { chosen: vec![b.law.clone()?], ..bare.clone() };
             let left = self.left(&ground, &model);
-            left.is_finite().then_some((left, ground, model))
+            left.is_finite().then_some((left, model))
         };
-        let mut tried: Vec<(f64, DiagnosisData, Model)> = laws.iter().filter_map(simulated).collect();
+        let mut tried: Vec<(f64, Model)> = laws.iter().filter_map(simulated).collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut seen: Vec<&'static str> = Vec::new();
-        let mut best: Option<Fitted> = None;
-        for (_, ground, model) in tried {
+        let mut best: Option<(f64, Model)> = None;
+        for (_, model) in tried {
             let name = model.chosen[0].setting.facts().name;
             if seen.contains(&name) || seen.len() == FITTED {
                 continue;
@@ -220,11 +222,13 @@ impl Tried<'_> {
             seen.push(name);
             let Some(model) = laws_descended(&ground, &model, &self.whole) else { continue };
             let left = self.left(&ground, &model);
-            if self.done(left) && best.as_ref().is_none_or(|b| left < b.left) {
-                best = Some(Fitted { left, ground, model, curve: false });
+            if self.done(left) && best.as_ref().is_none_or(|b| left < b.0) {
+                best = Some((left, model));
             }
         }
-        best.map(|b| self.fuller(b, |ground, model| laws_descended(ground, model, &self.whole)))
+        let (left, model) = best?;
+        let plain = Fitted { left, ground, model, curve: false };
+        Some(self.fuller(plain, |ground, model| laws_descended(ground, model, &self.whole)))
     }
 
     /// The best law of some balances, in its fuller form where that is clearly better.
