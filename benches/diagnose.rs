@@ -106,7 +106,7 @@ fn peak_mib() -> f64 {
 fn run() -> Outcome<()> {
     let words: Vec<String> = std::env::args().collect();
     let out = words.iter().position(|w| w == "--out").and_then(|i| words.get(i + 1)).map(PathBuf::from);
-    let friction = || Setting::new(PivotFriction { sliding_length: 2.5, loading: Loading::Dahl }, vec![0.012]);
+    let friction = || Setting::new(PivotFriction::of(2.5, Loading::Dahl), vec![0.012]);
     // 8 % less torque at the ends of the travel.
     let rolloff = || Setting::new(TorqueFactorRolloff { shape: Shape::Parabola }, vec![0.0, 0.08, 0.0, 0.0]);
     let grating =

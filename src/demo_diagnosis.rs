@@ -49,7 +49,7 @@ fn write_case(folder: &Path, plant: &Plant, controller: &Controller) -> Result<(
     let mut case = "id = \"demo\"\nplant = \"plant.toml\"\ncontroller = \"controller.toml\"\n".to_owned();
     let t = controller.sample_time_s;
     let scene = scene(plant, t, RECORDS[5].2, SAMPLES, NOISE);
-    let bearing = PivotFriction { sliding_length: LENGTH, loading: Loading::Dahl };
+    let bearing = PivotFriction::of(LENGTH, Loading::Dahl);
     let friction = Setting::new(bearing, vec![LEVEL]);
     let mut draw = 0;
     for (name, rms, distance, repeats, held) in RECORDS {

@@ -72,7 +72,7 @@ fn dahl_loses_the_area_of_its_loop() {
     // zm = tanh(A/x_s), and one half-cycle takes F (2A - 2 x_s zm).
     let (f, x_s, a) = (0.03, 2.0, 3.0);
     let area = 2.0 * f * (2.0 * a - 2.0 * x_s * f64::tanh(a / x_s));
-    let n = df(PivotFriction { sliding_length: x_s, loading: Loading::Dahl }, f, a, TAU * 20.0);
+    let n = df(PivotFriction::of(x_s, Loading::Dahl), f, a, TAU * 20.0);
     // Only the fundamental does work on a sine.
     assert!((-n.im * PI * a * a / area - 1.0).abs() < 1e-5, "{n} {area}");
 }

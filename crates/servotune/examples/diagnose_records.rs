@@ -26,7 +26,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let controller: Controller = read_toml(&gains)?;
 
     let scene = scene(&plant, controller.sample_time_s, 15.0, SAMPLES, 3e-3);
-    let bearing = PivotFriction { sliding_length: 0.5, loading: Loading::Dahl };
+    let bearing = PivotFriction::of(0.5, Loading::Dahl);
     let friction = Setting::new(bearing, vec![0.02]);
     let mut records = Vec::new();
     // Excitation (V rms), length of the move (track), role.

@@ -4,11 +4,15 @@
 //! torque is what holds the arm: Dahl's law with a pre-sliding length near what the sensor resolves, never sgn(v). A film that
 //! shears instead of sticking lets the arm creep: the drag then turns round over a speed, not over a length, tanh(v/v_c). The
 //! viscous part belongs to the linear plant; a mean offset belongs to the torque offset.
+//!
+//! Bristles that are damped make it LuGre's law (Canudas de Wit, Olsson, Astrom, Lischinsky 1995): z + `bristle_time_s` dz/dt in the place of z,
+//! and a rise stands inside the bristles, dz/dx = (1 - sgn(dx) z/g)/length with g = 1 + rise exp(-(v/v_s)²): they stretch to g before they slip.
+//! While the arm sticks they damp what swings on them; once it slides dz/dt is 0, and nothing is left of it.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::key::{Bound, Key, Measure};
 use super::parameter::{Parameter, Unit};
-use super::pivot_friction::{SLID, dahl, shortest_loop};
+use super::pivot_friction::{BRISTLE_TIME_S, BRISTLE_TIMES, SLID, bristle_rate, bristle_time_of, dahl, shortest_loop};
 use super::sample::{Sample, Scene, logarithmic};
 
 /// Dry friction. Its strength is the level at speed.
@@ -18,6 +22,8 @@ pub struct CoulombFriction {
     pub turning: Turning,
     /// The rise at low speed, where there is one.
     pub stribeck: Option<Stribeck>,
+    /// Damping of the bristles over their stiffness (s), above 0, of what sticks; none without.
+    pub bristle_time_s: Option<f64>,
 }
 
 /// Over what a dry drag turns round.
@@ -75,9 +81,9 @@ pub static FACTS: Facts = Facts {
     columns: 1,
     fixed: false,
     per_record: false,
-    equation: "tau = -F (1 + rise exp(-(v/v_s)^2)) z, dz/dx = (1 - sgn(dx) z)/length (sgn(v) once sliding); of a film z = tanh(v/v_c)",
-    keys: &[LEVEL_COMMAND, SLIDING_LENGTH, CREEP_SPEED, STRIBECK_SPEED, STRIBECK_RISE],
-    source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, A Survey of Models, Analysis Tools and Compensation Methods for the Control of Machines with Friction, Automatica 30(7), 1994",
+    equation: "tau = -F (1 + rise exp(-(v/v_s)^2)) z, dz/dx = (1 - sgn(dx) z)/length (sgn(v) once sliding); of a film z = tanh(v/v_c); of damped bristles tau = -F (z + tau_b dz/dt), dz/dx = (1 - sgn(dx) z/g)/length, g = 1 + rise exp(-(v/v_s)^2)",
+    keys: &[LEVEL_COMMAND, SLIDING_LENGTH, CREEP_SPEED, STRIBECK_SPEED, STRIBECK_RISE, BRISTLE_TIME_S],
+    source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, A Survey of Models, Analysis Tools and Compensation Methods for the Control of Machines with Friction, Automatica 30(7), 1994; C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, A New Model for Control of Systems with Friction, IEEE Transactions on Automatic Control 40(3), 1995",
     says: "the arm drags with the same force at every speed, and the force turns round with the motion",
     confused_with: &["pivot_friction", "backlash", "dead_band", "torque_ripple"],
     experiment: "constant-velocity moves in both directions at six speeds over two decades",
@@ -86,6 +92,10 @@ pub static FACTS: Facts = Facts {
 
 /// Speeds over which a creeping drag turns round, over the highest: a slower one is dry, a faster one all but viscous.
 const CREEP: [f64; 2] = [1e-3, 0.3];
+
+/// Speeds (over the highest) and sizes of a rise within which a fuller form is fitted.
+const RISES_WITHIN: [f64; 2] = [1e-3, 0.5];
+const RISES: [f64; 2] = [0.01, 3.0];
 
 /// Lengths to a doubling.
 const OCTAVE: f64 = 1.34;
@@ -111,21 +121,54 @@ fn level(stribeck: Option<Stribeck>, v: f64) -> f64 {
     stribeck.map_or(1.0, |s| 1.0 + s.rise * (-(v / s.speed).powi(2)).exp())
 }
 
+/// The mean of z over a straight path that goes from one to the other, towards `most`: s - (s - z0) (1 - exp(-r))/r with r the path in lengths.
+fn mean(z: [f64; 2], dx: f64, length: f64, most: f64) -> f64 {
+    let (path, s) = (dx.abs() / length, dx.signum() * most);
+    match path {
+        p if p < 1e-6 => 0.5 * (z[0] + z[1]),
+        p if p > SLID => s - (s - z[0]) / p,
+        p => s + (s - z[0]) * (-p).exp_m1() / p,
+    }
+}
+
 impl Law for Slider {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
         let z = self.moved(from, to);
-        // The mean over a straight path: s - (s - z0) (1 - exp(-r))/r with r the path in lengths.
-        let (path, s) = ((to.x - from.x).abs() / self.length, (to.x - from.x).signum());
-        let mean = match path {
-            p if p < 1e-6 => 0.5 * (self.z + z),
-            p if p > SLID => s - (s - self.z) / p,
-            p => s + (s - self.z) * (-p).exp_m1() / p,
-        };
+        let mean = mean([self.z, z], to.x - from.x, self.length, 1.0);
         out[0] = -mean * level(self.stribeck, 0.5 * (from.v + to.v));
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
         self.z = self.moved(from, to);
+    }
+}
+
+/// What sticks on damped bristles: LuGre's law. `z` is the stretch of the bristles over that at which they slip at speed.
+struct Bristles {
+    length: f64,
+    time_s: f64,
+    stribeck: Option<Stribeck>,
+    z: f64,
+}
+
+impl Bristles {
+    /// The stretch after a step, and what they stretch to: the speed over the step is its mean.
+    fn moved(&self, from: &Sample, to: &Sample) -> [f64; 2] {
+        let most = level(self.stribeck, 0.5 * (from.v + to.v));
+        [most * dahl(self.z / most, to.x - from.x, most * self.length), most]
+    }
+}
+
+impl Law for Bristles {
+    fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
+        let [z, most] = self.moved(from, to);
+        let z = [self.z, z];
+        let mean = mean(z, to.x - from.x, most * self.length, most);
+        out[0] = -mean - self.time_s * bristle_rate(z, from, to);
+    }
+
+    fn commit(&mut self, from: &Sample, to: &Sample) {
+        self.z = self.moved(from, to)[0];
     }
 }
 
@@ -144,15 +187,20 @@ impl Law for Film {
     }
 }
 
+/// Shortest and longest length: up to that from which on pre-sliding friction is told by its loop.
+fn lengths(scene: &Scene) -> [f64; 2] {
+    [(1.5 * scene.noise).max(3e-6 * scene.travel), shortest_loop(scene)]
+}
+
 impl CoulombFriction {
     /// A drag that sticks over a length (position_unit), with a rise at low speed or without.
     pub fn sticking(sliding_length: f64, stribeck: Option<Stribeck>) -> CoulombFriction {
-        CoulombFriction { turning: Turning::Length { sliding_length }, stribeck }
+        CoulombFriction { turning: Turning::Length { sliding_length }, stribeck, bristle_time_s: None }
     }
 
     /// A drag that creeps over a speed (position_unit/s).
     pub fn creeping(speed: f64) -> CoulombFriction {
-        CoulombFriction { turning: Turning::Creep { speed }, stribeck: None }
+        CoulombFriction { turning: Turning::Creep { speed }, stribeck: None, bristle_time_s: None }
     }
 }
 
@@ -174,8 +222,7 @@ impl Parametric for CoulombFriction {
     }
 
     fn grid(scene: &Scene) -> Vec<CoulombFriction> {
-        // Up to the length from which on pre-sliding friction is told by its loop.
-        let (short, long) = ((1.5 * scene.noise).max(3e-6 * scene.travel), shortest_loop(scene));
+        let [short, long] = lengths(scene);
         let count = 1 + (OCTAVE * (long / short).log2()).ceil().max(4.0) as usize;
         let plain = |length| CoulombFriction::sticking(length, None);
         let mut all: Vec<CoulombFriction> = logarithmic(short, long, count).into_iter().map(plain).collect();
@@ -189,18 +236,30 @@ impl Parametric for CoulombFriction {
         all
     }
 
-    /// With Stribeck's rise.
-    fn fuller(&self, scene: &Scene) -> Vec<CoulombFriction> {
-        let plain = self.stribeck.is_none() && matches!(self.turning, Turning::Length { .. });
-        let speeds = if plain { logarithmic(0.01, 0.16, 3) } else { Vec::new() };
-        let rising = |share: f64| Some(Stribeck { speed: share * scene.speed, rise: 0.2 });
-        speeds.into_iter().map(|share| CoulombFriction { stribeck: rising(share), ..self.clone() }).collect()
+    /// With Stribeck's rise, with damped bristles; one after the other makes both.
+    fn fuller(&self, scene: &Scene) -> Vec<(CoulombFriction, Vec<[f64; 2]>)> {
+        if matches!(self.turning, Turning::Creep { .. }) {
+            return Vec::new();
+        }
+        let rising = |share: f64| {
+            let stribeck = Some(Stribeck { speed: share * scene.speed, rise: 0.2 });
+            CoulombFriction { stribeck, ..self.clone() }
+        };
+        let speeds = if self.stribeck.is_none() { logarithmic(0.01, 0.16, 3) } else { Vec::new() };
+        let mut all: Vec<CoulombFriction> = speeds.into_iter().map(rising).collect();
+        if self.bristle_time_s.is_none() {
+            all.push(CoulombFriction { bristle_time_s: Some(scene.sample_time_s), ..self.clone() });
+        }
+        let of = |range: [f64; 2], by: f64| range.map(|v| by * v);
+        let speeds = of(RISES_WITHIN, scene.speed);
+        let ranges = vec![lengths(scene), speeds, RISES, of(BRISTLE_TIMES, scene.sample_time_s)];
+        all.into_iter().map(|law| (law, ranges.clone())).collect()
     }
 
     fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
         let (Turning::Length { sliding_length: over } | Turning::Creep { speed: over }) = &mut self.turning;
         let (speed, rise) = self.stribeck.as_mut().map(|s| (&mut s.speed, &mut s.rise)).unzip();
-        vec![Some(over), speed, rise]
+        vec![Some(over), speed, rise, self.bristle_time_s.as_mut()]
     }
 
     fn class(&self) -> Vec<usize> {
@@ -210,7 +269,10 @@ impl Parametric for CoulombFriction {
     fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
         let stribeck = self.stribeck;
         match self.turning {
-            Turning::Length { sliding_length: length } => Box::new(Slider { length, stribeck, z: 0.0 }),
+            Turning::Length { sliding_length: length } => match self.bristle_time_s {
+                Some(time_s) => Box::new(Bristles { length, time_s, stribeck, z: 0.0 }),
+                None => Box::new(Slider { length, stribeck, z: 0.0 }),
+            },
             Turning::Creep { speed } => Box::new(Film { speed, stribeck }),
         }
     }
@@ -226,7 +288,8 @@ impl Parametric for CoulombFriction {
     fn stiffness(&self, strengths: &[f64]) -> f64 {
         // A creeping drag holds by its speed, and is no spring.
         let Turning::Length { sliding_length } = self.turning else { return 0.0 };
-        let rise = 1.0 + self.stribeck.map_or(0.0, |s| s.rise);
+        // A rise inside the bristles makes them stretch farther, not stiffer.
+        let rise = 1.0 + self.stribeck.filter(|_| self.bristle_time_s.is_none()).map_or(0.0, |s| s.rise);
         rise * strengths.first().copied().unwrap_or(0.0).abs() / sliding_length
     }
 
@@ -242,6 +305,7 @@ impl Parametric for CoulombFriction {
             all.push(STRIBECK_SPEED.at(speed));
             all.push(STRIBECK_RISE.at(rise));
         }
+        all.extend(self.bristle_time_s.map(|time| BRISTLE_TIME_S.at(time)));
         all
     }
 
@@ -264,7 +328,11 @@ impl Parametric for CoulombFriction {
         let rising = given
             .has(&STRIBECK_SPEED)
             .then(|| Ok(Stribeck { speed: given.need(&STRIBECK_SPEED)?, rise: given.need(&STRIBECK_RISE)? }));
-        let law = CoulombFriction { turning, stribeck: rising.transpose()? };
+        let bristle_time_s = bristle_time_of(given)?;
+        if let (Turning::Creep { .. }, Some(time)) = (turning, bristle_time_s) {
+            return Err(given.refused(&BRISTLE_TIME_S, time));
+        }
+        let law = CoulombFriction { turning, stribeck: rising.transpose()?, bristle_time_s };
         Ok((law, vec![given.need(&LEVEL_COMMAND)?]))
     }
 }

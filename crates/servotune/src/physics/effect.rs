@@ -329,8 +329,9 @@ pub trait Parametric: Clone + PartialEq + std::fmt::Debug + Sized {
         Vec::new()
     }
 
-    /// Fuller forms of it to be tried once it stands as it is: with what a plain form leaves out.
-    fn fuller(&self, _scene: &Scene) -> Vec<Self> {
+    /// Fuller forms of it to be tried once it stands as it is: with what a plain form leaves out, each with the least and the greatest of
+    /// every number between which a fit moves it.
+    fn fuller(&self, _scene: &Scene) -> Vec<(Self, Vec<[f64; 2]>)> {
         Vec::new()
     }
 

@@ -236,8 +236,8 @@ impl AnyLaw {
     }
 
     /// [`Parametric::fuller`].
-    pub fn fuller(&self, scene: &Scene) -> Vec<AnyLaw> {
-        each!(self, law => law.fuller(scene).into_iter().map(AnyLaw::from).collect())
+    pub fn fuller(&self, scene: &Scene) -> Vec<(AnyLaw, Vec<[f64; 2]>)> {
+        each!(self, law => law.fuller(scene).into_iter().map(|(law, ranges)| (law.into(), ranges)).collect())
     }
 
     /// [`Parametric::equivalent`].

@@ -7,9 +7,11 @@
 //! chooses: 0 is Dahl's law; above 0 it is Maxwell slip with the first loading z = 1 - (1 + m d/x_s)^(-1/m), m = shape/2 - 1
 //! (survival of a generalised Pareto law of yield lengths, Pickands 1975): 1 the parabola, 2 Dahl's 1 - exp(-d/x_s), towards 0 one
 //! spring that slips at once, above 2 elements that yield ever later.
+//! Bristles that are damped (LuGre: Canudas de Wit, Olsson, Astrom, Lischinsky 1995) add `bristle_time_s` dz/dt to z: it damps what swings
+//! on the bearing while it sticks and is gone once it slides.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure};
+use super::key::{Bound, Key, Measure, Prior, Takes};
 use super::parameter::{Parameter, Unit};
 use super::sample::{Sample, Scene, logarithmic};
 
@@ -20,6 +22,8 @@ pub struct PivotFriction {
     pub sliding_length: f64,
     /// The form of the first loading.
     pub loading: Loading,
+    /// Damping of the bristles over their stiffness (s), above 0; none without.
+    pub bristle_time_s: Option<f64>,
 }
 
 /// The first loading of a bearing.
@@ -39,6 +43,15 @@ const SLIDING_LENGTH: Key = Key::new("sliding_length", Unit::Position, "sliding 
     .scan(Bound::Greatest(&[(12.0, Measure::Noise), (2e-3, Measure::Travel)]), Bound::At(4.0, Measure::Travel));
 const LEVEL_COMMAND: Key = Key::new("level_command", Unit::Command, "drag once it slides, F");
 const SHAPE: Key = Key::new("shape", Unit::Ratio, "0: Dahl; above 0 a Maxwell-slip row with the first loading 1 - (1 + m d/x_s)^(-1/m), m = shape/2 - 1: 1 a parabola, 2 the curve of Dahl, towards 0 one spring that slips; the last fit moves it between 0.1 and 3.5").or(0.0).points(&[0.0, 1.0, 2.0]);
+/// Damping of the bristles, of every drag that sticks.
+pub(super) const BRISTLE_TIME_S: Key = Key::new(
+    "bristle_time_s",
+    Unit::Second,
+    "damping of the bristles over their stiffness: z + bristle_time dz/dt in the place of z; 0 for none",
+)
+.or(0.0)
+.takes(Takes::Law("a finite number of at least 0; a film that creeps has no bristles"))
+.prior(Prior::Words("in fuller forms, from one sample on"));
 
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
@@ -48,8 +61,8 @@ pub static FACTS: Facts = Facts {
     columns: 1,
     fixed: false,
     per_record: false,
-    equation: "tau = -F z, dz/dx = (1 - sgn(dx) z)/x_s (Dahl) or a row of Maxwell-slip elements up to 2 x_s",
-    keys: &[SLIDING_LENGTH, LEVEL_COMMAND, SHAPE],
+    equation: "tau = -F z, dz/dx = (1 - sgn(dx) z)/x_s (Dahl) or a row of Maxwell-slip elements up to 2 x_s; z + tau_b dz/dt of damped bristles",
+    keys: &[SLIDING_LENGTH, LEVEL_COMMAND, SHAPE, BRISTLE_TIME_S],
     source: "P. R. Dahl, A Solid Friction Model, Aerospace Corporation TOR-0158, 1968; F. Al-Bender, V. Lampaert, J. Swevers, The Generalized Maxwell-Slip Model, IEEE Transactions on Automatic Control 50(11), 2005; D. Abramovitch, F. Wang, G. Franklin, Disk Drive Pivot Nonlinearity Modeling, ACC 1994",
     says: "the arm behaves like a bearing that sticks: after each reversal it first acts as a spring, then slides at a constant drag",
     confused_with: &["coulomb_friction", "cable_spring", "nonlinear_spring", "linear_parameters"],
@@ -62,6 +75,7 @@ const ELEMENTS: usize = 16;
 
 struct Dahl {
     length: f64,
+    bristle_time_s: f64,
     z: f64,
 }
 
@@ -71,12 +85,30 @@ pub(super) fn dahl(z: f64, dx: f64, length: f64) -> f64 {
     if path > SLID { s } else { s - (s - z) * (-path).exp() }
 }
 
+/// Mean of dz/dt over a step (1/s): exact however z went. Along a cycle, where time stands still, the mean speed tells how long it took.
+pub(super) fn bristle_rate(z: [f64; 2], from: &Sample, to: &Sample) -> f64 {
+    let (t, dx) = (to.t - from.t, to.x - from.x);
+    if t > 0.0 {
+        (z[1] - z[0]) / t
+    } else if dx != 0.0 {
+        (z[1] - z[0]) * 0.5 * (from.v + to.v) / dx
+    } else {
+        0.0
+    }
+}
+
+/// What a bearing adds by its damped bristles to a column; the column to the last bit where they are not damped.
+fn damped(column: f64, bristle_time_s: f64, z: [f64; 2], from: &Sample, to: &Sample) -> f64 {
+    if bristle_time_s > 0.0 { column - bristle_time_s * bristle_rate(z, from, to) } else { column }
+}
+
 /// Path in lengths behind which nothing is left of the past in double precision.
 pub(super) const SLID: f64 = 45.0;
 
 impl Law for Dahl {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        out[0] = -0.5 * (self.z + dahl(self.z, to.x - from.x, self.length));
+        let z = dahl(self.z, to.x - from.x, self.length);
+        out[0] = damped(-0.5 * (self.z + z), self.bristle_time_s, [self.z, z], from, to);
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
@@ -93,10 +125,11 @@ struct MaxwellSlip {
     stiffness: [f64; ELEMENTS],
     /// Stretch of each spring (position_unit).
     stretch: [f64; ELEMENTS],
+    bristle_time_s: f64,
 }
 
 impl MaxwellSlip {
-    fn of(shape: f64, length: f64) -> MaxwellSlip {
+    fn of(shape: f64, length: f64, bristle_time_s: f64) -> MaxwellSlip {
         let tail = 0.5 * shape - 1.0;
         let curve = |d: f64| first_loading(d, tail);
         let end = loaded_to(ELASTIC, tail);
@@ -109,6 +142,7 @@ impl MaxwellSlip {
             yields: std::array::from_fn(|i| node(i + 1) * length),
             stiffness: std::array::from_fn(|i| slope(i + 1) - slope(i + 2)),
             stretch: [0.0; ELEMENTS],
+            bristle_time_s,
         }
     }
 
@@ -127,7 +161,8 @@ impl MaxwellSlip {
 
 impl Law for MaxwellSlip {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        out[0] = -0.5 * (self.level(&self.stretch) + self.level(&self.moved(to.x - from.x)));
+        let z = [self.level(&self.stretch), self.level(&self.moved(to.x - from.x))];
+        out[0] = damped(-0.5 * (z[0] + z[1]), self.bristle_time_s, z, from, to);
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
@@ -161,6 +196,18 @@ pub(crate) fn shortest_loop(scene: &Scene) -> f64 {
     (12.0 * scene.noise).max(2e-3 * scene.travel)
 }
 
+/// Times of bristles (samples) within which a fuller form is fitted.
+pub(super) const BRISTLE_TIMES: [f64; 2] = [0.02, 200.0];
+
+/// The damping that a file gives; none where it is 0 or left out.
+pub(super) fn bristle_time_of(given: &Given) -> Result<Option<f64>, PhysicsError> {
+    let time = given.or(&BRISTLE_TIME_S)?;
+    if time < 0.0 {
+        return Err(given.refused(&BRISTLE_TIME_S, time));
+    }
+    Ok(Some(time).filter(|t| *t > 0.0))
+}
+
 impl Loading {
     /// The loading that files name by this shape.
     fn of(shape: f64) -> Loading {
@@ -173,6 +220,13 @@ impl Loading {
             Loading::Dahl => 0.0,
             Loading::MaxwellSlip { shape } => shape,
         }
+    }
+}
+
+impl PivotFriction {
+    /// A bearing of this sliding length (position_unit) without damping of its bristles.
+    pub fn of(sliding_length: f64, loading: Loading) -> PivotFriction {
+        PivotFriction { sliding_length, loading, bristle_time_s: None }
     }
 }
 
@@ -192,7 +246,7 @@ impl Parametric for PivotFriction {
     fn grid(scene: &Scene) -> Vec<PivotFriction> {
         let lengths = logarithmic(shortest_loop(scene), 4.0 * scene.travel, 14);
         let loadings = [0.0, 1.0, 2.0].map(Loading::of);
-        let each = |sliding_length| loadings.map(|loading| PivotFriction { sliding_length, loading });
+        let each = |sliding_length| loadings.map(|loading| PivotFriction::of(sliding_length, loading));
         lengths.into_iter().flat_map(each).collect()
     }
 
@@ -201,7 +255,17 @@ impl Parametric for PivotFriction {
             Loading::Dahl => None,
             Loading::MaxwellSlip { shape } => Some(shape),
         };
-        vec![Some(&mut self.sliding_length), shape]
+        vec![Some(&mut self.sliding_length), shape, self.bristle_time_s.as_mut()]
+    }
+
+    /// With damped bristles.
+    fn fuller(&self, scene: &Scene) -> Vec<(PivotFriction, Vec<[f64; 2]>)> {
+        if self.bristle_time_s.is_some() {
+            return Vec::new();
+        }
+        let times = BRISTLE_TIMES.map(|samples| samples * scene.sample_time_s);
+        let ranges = vec![[shortest_loop(scene), 4.0 * scene.travel], SHAPES, times];
+        vec![(PivotFriction { bristle_time_s: Some(scene.sample_time_s), ..self.clone() }, ranges)]
     }
 
     fn presliding_length(&self) -> Option<f64> {
@@ -209,10 +273,11 @@ impl Parametric for PivotFriction {
     }
 
     fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+        let (length, bristle_time_s) = (self.sliding_length, self.bristle_time_s.unwrap_or(0.0));
         match self.loading {
-            Loading::Dahl => Box::new(Dahl { length: self.sliding_length, z: 0.0 }),
+            Loading::Dahl => Box::new(Dahl { length, bristle_time_s, z: 0.0 }),
             Loading::MaxwellSlip { shape } => {
-                Box::new(MaxwellSlip::of(shape.clamp(SHAPES[0], SHAPES[1]), self.sliding_length))
+                Box::new(MaxwellSlip::of(shape.clamp(SHAPES[0], SHAPES[1]), length, bristle_time_s))
             }
         }
     }
@@ -226,7 +291,13 @@ impl Parametric for PivotFriction {
     }
 
     fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![SLIDING_LENGTH.at(self.sliding_length), LEVEL_COMMAND.at(strengths[0]), SHAPE.at(self.loading.shape())]
+        let mut all = vec![
+            SLIDING_LENGTH.at(self.sliding_length),
+            LEVEL_COMMAND.at(strengths[0]),
+            SHAPE.at(self.loading.shape()),
+        ];
+        all.extend(self.bristle_time_s.map(|time| BRISTLE_TIME_S.at(time)));
+        all
     }
 
     fn measured_in_last_fit(&self) -> Vec<(usize, [f64; 2])> {
@@ -255,7 +326,8 @@ impl Parametric for PivotFriction {
 
     fn setting_of(given: &Given, _scene: &Scene) -> Result<(PivotFriction, Vec<f64>), PhysicsError> {
         let sliding_length = given.need(&SLIDING_LENGTH)?;
-        let law = PivotFriction { sliding_length, loading: Loading::of(given.or(&SHAPE)?) };
+        let loading = Loading::of(given.or(&SHAPE)?);
+        let law = PivotFriction { sliding_length, loading, bristle_time_s: bristle_time_of(given)? };
         Ok((law, vec![given.need(&LEVEL_COMMAND)?]))
     }
 }

@@ -213,7 +213,7 @@ mod tests {
         let data = DiagnosisData::new(&plant, runs, t, None).unwrap();
         let laws = || {
             vec![
-                chosen(PivotFriction { sliding_length: 2.5, loading: Loading::Dahl }, &[0.012]),
+                chosen(PivotFriction::of(2.5, Loading::Dahl), &[0.012]),
                 chosen(DeadBand { half_width: 0.01 }, &[1.0]),
                 chosen(OffsetDrift, &[1e-4, 2e-4]),
             ]

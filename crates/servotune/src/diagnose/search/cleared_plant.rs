@@ -5,7 +5,7 @@
 //! simulates far better than the best linear plant. It names nothing: the search begins anew from the plant alone.
 
 use super::curve_balance::curves;
-use super::torque_balance::{Balance, Balanced, recorded_means, smoothings, with_freedom};
+use super::torque_balance::{Balance, Balanced, recorded_means, smoothings};
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::Segment;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
@@ -28,6 +28,8 @@ const FITTED: usize = 3;
 /// whatever holds it, and its rows tell of no law. Both balances are tried.
 const SLIDES: [f64; 2] = [0.0, 6.0];
 
+/// Rounds in which a fuller form is tried, each with one thing more.
+const FULLER: usize = 2;
 /// Curves that are tried by simulation where no law clears the plant as well.
 const CURVES: usize = 2;
 
@@ -253,17 +255,24 @@ impl Tried<'_> {
         Some(self.fuller(best, |ground, model| self.fitted(ground, model)))
     }
 
-    /// The fuller form of a fitted law, where that is clearly better.
+    /// The fuller form of a fitted law, where that is clearly better: one thing more at a time, each best beside what stands already.
     fn fuller(&self, mut best: Fitted, fit: impl Fn(&DiagnosisData, &Model) -> Option<Model>) -> Fitted {
-        let plain = best.model.clone();
-        let Some(law) = plain.chosen.first() else { return best };
-        for full in law.setting.law.fuller(&self.own.scene) {
-            let setting = Setting::new(full, law.setting.strengths.clone());
-            let chosen = vec![with_freedom(SelectedEffect { setting, ..law.clone() }, &self.own.scene)];
-            let Some(fitted) = fit(&best.ground, &Model { chosen, ..plain.clone() }) else { continue };
-            let left = self.left(&best.ground, &fitted);
-            if left < CLEARED_FULLER * best.left {
-                best = Fitted { left, model: fitted, ..best };
+        for round in 0..FULLER {
+            let plain = best.model.clone();
+            let Some(law) = plain.chosen.first().filter(|_| round == 0 || !self.done(best.left)) else { break };
+            let mut better = false;
+            for (full, range) in law.setting.law.fuller(&self.own.scene) {
+                let continuous = full.numbers().iter().map(Option::is_some).collect();
+                let setting = Setting::new(full, law.setting.strengths.clone());
+                let chosen = vec![SelectedEffect { setting, continuous, range, ..law.clone() }];
+                let Some(fitted) = fit(&best.ground, &Model { chosen, ..plain.clone() }) else { continue };
+                let left = self.left(&best.ground, &fitted);
+                if left < CLEARED_FULLER * best.left {
+                    (best, better) = (Fitted { left, model: fitted, ..best }, true);
+                }
+            }
+            if !better {
+                break;
             }
         }
         best
