@@ -8,6 +8,7 @@ use super::free_form;
 use super::library::{Effect, Setting, curves, data_facts, effect, library};
 use super::sample::Scene;
 use super::share::Share;
+use crate::document::Need;
 use crate::lti::{Body, PhysicsEntry, Plant};
 
 /// What a plant file does not say of the machine and its motion.
@@ -128,10 +129,13 @@ fn setting(e: &'static dyn Effect, entry: &PhysicsEntry, scene: &Scene) -> Resul
         return Err(PhysicsError::Finite { effect: name, parameter: parameter.clone(), found: *found });
     }
     let setting = e.setting_of(&Given::new(name, &entry.parameters), scene)?;
-    // What an effect reports of a setting is what it understands.
+    // What an effect reports of a setting is what it understands, and a default says nothing.
     let known: Vec<&str> = setting.parameters(scene).iter().map(|p| p.name).collect();
-    match entry.parameters.keys().find(|k| !known.contains(&k.as_str())) {
-        Some(parameter) => {
+    let says =
+        |k: &str, v: f64| !e.facts().keys.iter().any(|key| key.name == k && matches!(key.need, Need::Or(d) if d == v));
+    let unknown = |(k, v): &(&String, &f64)| !known.contains(&k.as_str()) && says(k, **v);
+    match entry.parameters.iter().find(unknown) {
+        Some((parameter, _)) => {
             let (effect, parameter) = (name.to_owned(), parameter.clone());
             Err(PhysicsError::Parameter { effect, parameter, expected: known.join(", ") })
         }
