@@ -261,9 +261,9 @@ impl Tried<'_> {
 
     /// The fuller form of a fitted law, where that is clearly better: one thing more at a time, each best beside what stands already.
     fn fuller(&self, mut best: Fitted, fit: impl Fn(&DiagnosisData, &Model) -> Option<Model>) -> Fitted {
-        for round in 0..FULLER {
+        for _ in 0..FULLER {
             let plain = best.model.clone();
-            let Some(law) = plain.chosen.first().filter(|_| round == 0 || !self.done(best.left)) else { break };
+            let Some(law) = plain.chosen.first().filter(|_| !self.done(best.left)) else { break };
             let mut better = false;
             for (full, range) in law.setting.law.fuller(&self.own.scene) {
                 let continuous = full.numbers().iter().map(Option::is_some).collect();
