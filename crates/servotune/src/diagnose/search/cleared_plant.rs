@@ -130,12 +130,8 @@ pub(in crate::diagnose) fn cleared(
     if !(repeated && best.drags()) {
         return Some(tried.cleared(&best));
     }
-    // Means of repeats blur what sticks: on a record of each group a fuller form shows.
-    let settled = firsts.fitted(&best.ground, &best.model).unwrap_or_else(|| best.model.clone());
-    let plain = Fitted { left: firsts.left(&best.ground, &settled), model: settled, ..best };
-    let best = firsts.fuller(plain, |ground, model| firsts.fitted(ground, model));
     let every = on_records(usize::MAX);
-    let model = every.fitted(&best.ground, &best.model).unwrap_or_else(|| best.model.clone());
+    let model = every.fitted(&best.ground, &best.model).unwrap_or(best.model);
     Some(every.cleared(&Fitted { model, ..best }))
 }
 
