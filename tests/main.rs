@@ -9,6 +9,7 @@ mod command_line;
 mod diagnose_cases;
 mod diagnose_common;
 mod diagnose_coupling;
+mod diagnose_dead_time;
 mod diagnose_free_form;
 mod diagnose_logs;
 mod diagnose_offered;

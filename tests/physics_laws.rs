@@ -43,7 +43,10 @@ fn describing_functions_of_the_textbook() {
     let evenly: f64 = (0..2000).map(|i| saturates(r * (0.8 + 0.4 * (f64::from(i) + 0.5) / 2000.0))).sum();
     let soft = CurrentSaturation { limit: 0.3, knee: Some(0.2) };
     close(df(soft, 1.0, a, w), Complex::new(evenly / 2000.0 - 1.0, 0.0), 1e-6);
-    close(df(DeadBand { half_width: 0.3 }, 1.0, a, w), Complex::new(-clipped, 0.0), 1e-6);
+    close(df(DeadBand::dead(0.3), 1.0, a, w), Complex::new(-clipped, 0.0), 1e-6);
+    // Dead time: two gains about a break point, g inside and 1 outside.
+    let fades = DeadBand { half_width: 0.3, gain_inside: Some(0.35) };
+    close(df(fades, 1.0, a, w), Complex::new(-0.65 * clipped, 0.0), 1e-6);
     // Coulomb F with a pre-sliding length of 1e-5 A: 4F/(pi A) against the velocity; the length turns the phase by about sqrt.
     close(df(CoulombFriction::sticking(1e-5, None), 0.03, a, w), Complex::new(0.0, -4.0 * 0.03 / (PI * a)), 1e-2);
     // A drag that creeps, tanh(v/v_c): F/v_c of a slow motion, but for its square over four; a sign of a fast one.
