@@ -43,7 +43,7 @@ fn describing_functions_of_the_textbook() {
     let evenly: f64 = (0..2000).map(|i| saturates(r * (0.8 + 0.4 * (f64::from(i) + 0.5) / 2000.0))).sum();
     let soft = CurrentSaturation { limit: 0.3, knee: Some(0.2) };
     close(df(soft, 1.0, a, w), Complex::new(evenly / 2000.0 - 1.0, 0.0), 1e-6);
-    close(df(DeadBand::dead(0.3), 1.0, a, w), Complex::new(-clipped, 0.0), 1e-6);
+    close(df(DeadBand { half_width: 0.3, gain_inside: None }, 1.0, a, w), Complex::new(-clipped, 0.0), 1e-6);
     // Dead time: two gains about a break point, g inside and 1 outside.
     let fades = DeadBand { half_width: 0.3, gain_inside: Some(0.35) };
     close(df(fades, 1.0, a, w), Complex::new(-0.65 * clipped, 0.0), 1e-6);

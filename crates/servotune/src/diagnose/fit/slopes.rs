@@ -214,7 +214,7 @@ mod tests {
         let laws = || {
             vec![
                 chosen(PivotFriction::of(2.5, Loading::Dahl), &[0.012]),
-                chosen(DeadBand::dead(0.01), &[1.0]),
+                chosen(DeadBand { half_width: 0.01, gain_inside: None }, &[1.0]),
                 chosen(OffsetDrift, &[1e-4, 2e-4]),
             ]
         };
