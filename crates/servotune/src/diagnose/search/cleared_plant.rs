@@ -228,9 +228,7 @@ impl Tried<'_> {
                 best = Some((left, model));
             }
         }
-        let (left, model) = best?;
-        let plain = Fitted { left, ground, model, curve: false };
-        Some(self.fuller(plain, |ground, model| laws_descended(ground, model, &self.whole)))
+        best.map(|(left, model)| Fitted { left, ground, model, curve: false })
     }
 
     /// The best law of some balances, in its fuller form where that is clearly better.
@@ -252,11 +250,11 @@ impl Tried<'_> {
             }
         }
         let best = settled.into_iter().min_by(|a, b| a.left.total_cmp(&b.left))?;
-        Some(self.fuller(best, |ground, model| self.fitted(ground, model)))
+        Some(self.fuller(best))
     }
 
     /// The fuller form of a fitted law, where that is clearly better: one thing more at a time, each best beside what stands already.
-    fn fuller(&self, mut best: Fitted, fit: impl Fn(&DiagnosisData, &Model) -> Option<Model>) -> Fitted {
+    fn fuller(&self, mut best: Fitted) -> Fitted {
         for _ in 0..FULLER {
             let plain = best.model.clone();
             let Some(law) = plain.chosen.first().filter(|_| !self.done(best.left)) else { break };
@@ -265,7 +263,7 @@ impl Tried<'_> {
                 let continuous = full.numbers().iter().map(Option::is_some).collect();
                 let setting = Setting::new(full, law.setting.strengths.clone());
                 let chosen = vec![SelectedEffect { setting, continuous, range, ..law.clone() }];
-                let Some(fitted) = fit(&best.ground, &Model { chosen, ..plain.clone() }) else { continue };
+                let Some(fitted) = self.fitted(&best.ground, &Model { chosen, ..plain.clone() }) else { continue };
                 let left = self.left(&best.ground, &fitted);
                 if left < CLEARED_FULLER * best.left {
                     (best, better) = (Fitted { left, model: fitted, ..best }, true);
