@@ -104,7 +104,7 @@ fn a_delay_reads_the_past_and_a_lag_falls_behind() {
     let slope = |t: f64| 40.0 - 1.8e4 * t + 1.5e6 * t * t;
     let samples = along(60, |t| Sample { x: cubic(t), v: slope(t), ..Sample::default() });
     for n in [0.3, 1.0, 2.45, 16.0] {
-        let all = run(law(ExtraDelay { delay_s: n * T }).as_mut(), &samples);
+        let all = run(law(ExtraDelay::Constant { delay_s: n * T }).as_mut(), &samples);
         for (k, out) in all.iter().enumerate().skip(18) {
             let t = (k + 1) as f64 * T;
             // Hermite's cubic through a cubic is the cubic.
@@ -113,7 +113,7 @@ fn a_delay_reads_the_past_and_a_lag_falls_behind() {
     }
     let straight = along(60, |t| Sample { x: 100.0 * t, v: 100.0, ..Sample::default() });
     let late = 2.5 * T;
-    for late in [AnyLaw::from(SensorLag { time_constant_s: late }), ExtraDelay { delay_s: late }.into()] {
+    for late in [AnyLaw::from(SensorLag { time_constant_s: late }), ExtraDelay::Constant { delay_s: late }.into()] {
         let all = run(law(late.clone()).as_mut(), &straight);
         assert!(all.iter().all(|o| (o[0] + 250.0 * T).abs() < 1e-12), "{late:?}");
     }

@@ -4,7 +4,7 @@
 use crate::physics_common::{T, scene};
 use nalgebra::Complex;
 use servotune::physics::modal_damping::ModalDamping;
-use servotune::physics::mode_shift::{ModeForm, ModeShift};
+use servotune::physics::mode_shift::{ModeForm, ModeShift, ShiftGoes};
 use servotune::physics::{AnyLaw, Parametric, Sample, Scene};
 
 #[test]
@@ -24,7 +24,8 @@ fn a_mode_that_moves_rings_at_its_new_frequency() {
     let d = 1.0 + slope * x;
     let s = Complex::new(0.0, 7700.0);
     let share = |d: f64| residue / d / (s - pole * d) + residue.conj() / d / (s - pole.conj() * d);
-    let moving = |form| ModeShift { mode: 0, shift_per_position: slope, centre: 0.0, form };
+    let goes = ShiftGoes::ByPosition { shift_per_position: slope, centre: 0.0 };
+    let moving = |form| ModeShift { mode: 0, goes, form };
     let stage = |d: f64| quadratic(s, m.zero_rad_s * d, m.zero_damping_ratio) / quadratic(s, w0 * d, z);
     settles(&scene, moving(ModeForm::Modal), x, 60_000, s, share(d) - share(1.0));
     settles(&scene, moving(ModeForm::Stage), x, 60_000, s, body(s) * (stage(d) - stage(1.0)));

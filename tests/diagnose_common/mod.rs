@@ -123,6 +123,11 @@ pub fn diagnosed(truth: &Truth) -> Diagnosis {
 
 /// The diagnosis of these records.
 pub fn diagnosed_from(records: Vec<(RecordEntry, Record)>) -> Diagnosis {
+    diagnosed_with(&plant(), records)
+}
+
+/// The diagnosis of these records with a model of their machine.
+pub fn diagnosed_with(model: &Plant, records: Vec<(RecordEntry, Record)>) -> Diagnosis {
     let case = Case {
         id: "test".into(),
         plant: PathBuf::new(),
@@ -131,7 +136,7 @@ pub fn diagnosed_from(records: Vec<(RecordEntry, Record)>) -> Diagnosis {
         further_inputs: vec![],
         records,
     };
-    diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
+    diagnose(&case, model, None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
 }
 
 /// Two moves of three repeats, and one held out.

@@ -121,20 +121,19 @@ fn level(stribeck: Option<Stribeck>, v: f64) -> f64 {
     stribeck.map_or(1.0, |s| 1.0 + s.rise * (-(v / s.speed).powi(2)).exp())
 }
 
-/// The mean of z over a straight path that goes from one to the other, towards `most`: s - (s - z0) (1 - exp(-r))/r with r the path in lengths.
-fn mean(z: [f64; 2], dx: f64, length: f64, most: f64) -> f64 {
+/// The mean of z over a straight path that begins with it, towards `most`: s - (s - z0) (1 - exp(-r))/r with r the path in lengths.
+fn mean(z: f64, dx: f64, length: f64, most: f64) -> f64 {
     let (path, s) = (dx.abs() / length, dx.signum() * most);
     match path {
-        p if p < 1e-6 => 0.5 * (z[0] + z[1]),
-        p if p > SLID => s - (s - z[0]) / p,
-        p => s + (s - z[0]) * (-p).exp_m1() / p,
+        p if p < 1e-6 => z + 0.5 * p * (s - z),
+        p if p > SLID => s - (s - z) / p,
+        p => s + (s - z) * (-p).exp_m1() / p,
     }
 }
 
 impl Law for Slider {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        let z = self.moved(from, to);
-        let mean = mean([self.z, z], to.x - from.x, self.length, 1.0);
+        let mean = mean(self.z, to.x - from.x, self.length, 1.0);
         out[0] = -mean * level(self.stribeck, 0.5 * (from.v + to.v));
     }
 
@@ -162,9 +161,8 @@ impl Bristles {
 impl Law for Bristles {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
         let [z, most] = self.moved(from, to);
-        let z = [self.z, z];
-        let mean = mean(z, to.x - from.x, most * self.length, most);
-        out[0] = -mean - self.time_s * bristle_rate(z, from, to);
+        let mean = mean(self.z, to.x - from.x, most * self.length, most);
+        out[0] = -mean - self.time_s * bristle_rate([self.z, z], from, to);
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {

@@ -1,26 +1,54 @@
 //! The loop is later than the model says: computation, transport or interpolation time that was left out.
 //!
-//! m(t) = x(t - d). Between samples the trajectory is the cubic through positions and velocities (Hermite).
+//! m(t) = x(t - d(t)), d constant, or growing along the session, d = d0 + g t: a buffer that fills, two clocks that run apart. What is constant of
+//! a growing delay goes into the plant's own, so the search looks for the growth alone. Between samples the trajectory is the cubic through
+//! positions and velocities (Hermite).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
-use super::key::{Bound, Key, Measure, Takes};
+use super::key::{Bound, Key, Measure, Prior, Takes};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{Sample, Scene, logarithmic};
 use super::share::Share;
 
 /// The delay.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ExtraDelay {
-    /// Delay (s), above 0 and at most 16 samples.
-    pub delay_s: f64,
+pub enum ExtraDelay {
+    /// One that stays as it is.
+    Constant {
+        /// Delay (s), above 0 and at most 16 samples.
+        delay_s: f64,
+    },
+    /// One that grows, or falls, along the session. It stays between 0 and 16 samples.
+    Growing {
+        /// Delay at the start of the session (s); without one the least with which the session has none below 0.
+        start_s: Option<f64>,
+        /// Delay gained over the time (s/s).
+        growth: f64,
+    },
+}
+
+impl ExtraDelay {
+    /// Delay at the start of the session (s), and what it gains over the time (s/s).
+    fn course(&self, scene: &Scene) -> [f64; 2] {
+        match *self {
+            ExtraDelay::Constant { delay_s } => [delay_s, 0.0],
+            ExtraDelay::Growing { start_s, growth } => {
+                [start_s.unwrap_or_else(|| (-growth * scene.session_s).max(0.0)), growth]
+            }
+        }
+    }
 }
 
 /// Longest delay (samples).
 const LONGEST: usize = 16;
 
 const DELAY_S: Key = Key::new("delay_s", Unit::Second, "d")
-    .takes(Takes::Law("above 0 and at most 16 samples"))
+    .unless(&["delay_growth"])
+    .takes(Takes::Law("above 0 and at most 16 samples; beside delay_growth also 0"))
     .scan(Bound::At(0.1, Measure::Sample), Bound::At(6.0, Measure::Sample));
+const DELAY_GROWTH: Key = Key::new("delay_growth", Unit::Ratio, "g, of either sign, over the time of the session")
+    .unless(&["delay_s"])
+    .prior(Prior::Words("0.05 to 3 samples over the session"));
 
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
@@ -30,8 +58,8 @@ pub static FACTS: Facts = Facts {
     columns: 1,
     fixed: true,
     per_record: false,
-    equation: "m(t) = x(t - d)",
-    keys: &[DELAY_S],
+    equation: "m(t) = x(t - d), or d0 + g t in the place of d; d0 alone is `delay_s`",
+    keys: &[DELAY_S, DELAY_GROWTH],
     source: "K. J. Åström, B. Wittenmark, Computer-Controlled Systems, 3rd edition, 1997",
     says: "the machine answers later than the model says: some computing or transport time was left out",
     confused_with: &["misalignment", "amplifier_lag", "sensor_lag", "linear_parameters"],
@@ -40,8 +68,9 @@ pub static FACTS: Facts = Facts {
 };
 
 struct Late {
-    /// Delay (samples).
-    samples: f64,
+    /// Delay at the start of the session (samples), and what a sample gains.
+    start: f64,
+    growth: f64,
     step: f64,
     /// Position and velocity of the last samples, the newest at `newest`.
     past: [(f64, f64); LONGEST + 2],
@@ -63,8 +92,9 @@ impl Late {
 
 impl Law for Late {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        let back = self.samples.floor();
-        let late = self.samples - back;
+        let samples = (self.start + self.growth * to.session / self.step).clamp(0.0, LONGEST as f64);
+        let back = samples.floor();
+        let late = samples - back;
         let (x1, v1) = self.at(back as usize, from, to);
         let (x0, v0) = self.at(back as usize + 1, from, to);
         let s = 1.0 - late;
@@ -92,36 +122,64 @@ impl Parametric for ExtraDelay {
     }
 
     fn grid(scene: &Scene) -> Vec<ExtraDelay> {
-        [0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0]
-            .iter()
-            .map(|n| ExtraDelay { delay_s: n * scene.sample_time_s })
-            .collect()
+        let constant = [0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0];
+        let mut all: Vec<ExtraDelay> =
+            constant.iter().map(|n| ExtraDelay::Constant { delay_s: n * scene.sample_time_s }).collect();
+        for gained in logarithmic(0.05, 3.0, 4).into_iter().flat_map(|n| [n, -n]) {
+            let growth = gained * scene.sample_time_s / scene.session_s;
+            all.push(ExtraDelay::Growing { start_s: None, growth });
+        }
+        all
     }
 
     fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
-        vec![Some(&mut self.delay_s)]
+        match self {
+            ExtraDelay::Constant { delay_s } => vec![Some(delay_s), None],
+            ExtraDelay::Growing { growth, .. } => vec![None, Some(growth)],
+        }
+    }
+
+    fn choices(&self) -> Vec<usize> {
+        vec![self.member()]
+    }
+
+    /// Whether it grows.
+    fn member(&self) -> usize {
+        usize::from(matches!(self, ExtraDelay::Growing { .. }))
     }
 
     fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
         let step = scene.sample_time_s;
-        let samples = (self.delay_s / step).clamp(0.0, LONGEST as f64);
-        Box::new(Late { samples, step, past: [(0.0, 0.0); LONGEST + 2], newest: 0, started: false })
+        let [start, growth] = self.course(scene);
+        let past = [(0.0, 0.0); LONGEST + 2];
+        Box::new(Late { start: start / step, growth, step, past, newest: 0, started: false })
     }
 
-    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
-        vec![DELAY_S.at(self.delay_s)]
+    fn parameters(&self, _strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
+        let [start, growth] = self.course(scene);
+        let grows = self.member() > 0;
+        [DELAY_S.at(start)].into_iter().chain(grows.then(|| DELAY_GROWTH.at(growth))).collect()
     }
 
-    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
-        Share::Delay(self.delay_s)
+    /// Of one that grows the longest of the session: the loop has the least of its margin there.
+    fn response_share(&self, _strengths: &[f64], scene: &Scene, _w_rad_s: f64) -> Share {
+        let [start, growth] = self.course(scene);
+        Share::Delay((start + (growth * scene.session_s).max(0.0)).min(LONGEST as f64 * scene.sample_time_s))
     }
 
     fn setting_of(given: &Given, scene: &Scene) -> Result<(ExtraDelay, Vec<f64>), PhysicsError> {
         let longest = (LONGEST as f64 + 1e-9) * scene.sample_time_s;
-        let delay_s = given.need(&DELAY_S)?;
-        if !(delay_s > 0.0 && delay_s < longest) {
+        let growth = given.get(&DELAY_GROWTH)?;
+        let start_s = if growth.is_some() { given.get(&DELAY_S)? } else { Some(given.need(&DELAY_S)?) };
+        if let Some(delay_s) = start_s
+            && !(delay_s < longest && (delay_s > 0.0 || (delay_s == 0.0 && growth.is_some())))
+        {
             return Err(given.refused(&DELAY_S, delay_s));
         }
-        Ok((ExtraDelay { delay_s }, vec![1.0]))
+        let delay = match growth {
+            Some(growth) => ExtraDelay::Growing { start_s, growth },
+            None => ExtraDelay::Constant { delay_s: start_s.unwrap_or_default() },
+        };
+        Ok((delay, vec![1.0]))
     }
 }

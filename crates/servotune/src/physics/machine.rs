@@ -33,9 +33,12 @@ pub struct Machine {
     direct: DiscretePlant,
     pushed: PlantState,
     torqued: PlantState,
-    /// As they were when the last command was taken, for instants before the next sample; the torque's at every step.
+    /// As they were when the last command was taken, for instants before the next sample; the torque's at every step. Copied where they are
+    /// needed: for readings, and the command's between the steps of a sample.
     held: PlantState,
     held_torqued: Vec<PlantState>,
+    /// Whether positions between samples are read.
+    read: bool,
     /// Readings of the command's answer at the steps between two samples.
     steps_between: Vec<Intersample>,
     /// What the position effects add at the head at this sample.
@@ -66,8 +69,8 @@ pub struct Machine {
     arm: f64,
 }
 
-/// Most fixed-point rounds, and the share to which each must shrink the step for another to follow.
-const ROUNDS: usize = 12;
+/// Most rounds of two fixed-point steps, and the share to which the second must shrink the first for another round to follow.
+const ROUNDS: usize = 6;
 const SHRINKS: f64 = 0.3;
 /// Steps of the secant at most; every third halves the bracket.
 const SECANTS: usize = 90;
@@ -186,6 +189,7 @@ impl Machine {
             held: pushed.clone(),
             held_torqued: vec![torqued.clone(); steps],
             steps_between: (1..steps).map(|j| delayed.intersample(t * j as f64 / steps as f64)).collect(),
+            read: false,
             offset: 0.0,
             delayed,
             direct,
@@ -211,7 +215,8 @@ impl Machine {
     /// The position as the sensor gives it at this sample, without noise (position_unit).
     pub fn measure(&mut self, spindle_rad: f64, temperature: f64) -> f64 {
         let t = self.delayed.sample_time_s();
-        let x = self.origin + self.pushed.position() + self.torqued.position() + self.free_motions(self.k);
+        let torqued = if self.torque.is_empty() { 0.0 } else { self.torqued.position() };
+        let x = self.origin + self.pushed.position() + torqued + self.free_motions(self.k);
         self.x = [x, self.x[0], self.x[1]];
         // Second-order backward difference.
         let v = (3.0 * self.x[0] - 4.0 * self.x[1] + self.x[2]) / (2.0 * t);
@@ -234,8 +239,9 @@ impl Machine {
         self.offset
     }
 
-    /// How [`Machine::between`] reads the position `offset_s` after a sample, 0 <= offset < T.
-    pub fn reading(&self, offset_s: f64) -> Reading {
+    /// How [`Machine::between`] reads the position `offset_s` after a sample, 0 <= offset < T; from the next command on it can.
+    pub fn reading(&mut self, offset_s: f64) -> Reading {
+        self.read = true;
         let step_s = self.direct.sample_time_s();
         let step = ((offset_s / step_s) as usize).min(self.held_torqued.len() - 1);
         let torque = self.direct.intersample(offset_s - step as f64 * step_s);
@@ -263,13 +269,12 @@ impl Machine {
         let share = self.delayed.fractional_delay_s() / self.delayed.sample_time_s();
         self.now.i = share * self.history[0] + (1.0 - share) * self.history[1];
         self.pushed.command(acting - self.standing[0]);
-        self.held.clone_from(&self.pushed);
+        if self.read || !self.steps_between.is_empty() {
+            self.held.clone_from(&self.pushed);
+        }
         self.pushed.advance(&self.delayed);
-        if self.torque.is_empty() {
-            self.torqued.command(self.w - self.standing[1]);
-            self.held_torqued[0].clone_from(&self.torqued);
-            self.torqued.advance(&self.direct);
-        } else {
+        // Without a torque its part stays at rest.
+        if !self.torque.is_empty() {
             self.turn();
         }
         self.last = self.now;
@@ -291,7 +296,9 @@ impl Machine {
             let carried = self.origin + answer + before + share * (after - before);
             self.w = self.solve(&from, carried);
             self.torqued.command(self.w - self.standing[1]);
-            self.held_torqued[j].clone_from(&self.torqued);
+            if self.read {
+                self.held_torqued[j].clone_from(&self.torqued);
+            }
             self.torqued.advance(&self.direct);
             let to = self.ahead(&from, carried + self.torqued.position());
             let (one, other) = (from.scaled(self.arm), to.scaled(self.arm));
@@ -319,18 +326,24 @@ impl Machine {
             let to = self.ahead(from, free + self.reach * w).scaled(self.arm);
             self.torque.iter().map(|p| p.value(&one, &to)).sum::<f64>()
         };
-        let (mut w, mut moved) = (self.w, f64::INFINITY);
+        let near = |by: f64, w: f64| by.abs() <= 1e-9 * (w.abs() + (w - by).abs());
+        let mut w = self.w;
         for _ in 0..ROUNDS {
-            let next = law(w);
-            let by = (next - w).abs();
-            w = next;
-            if by <= 1e-9 * (next.abs() + (next - by).abs()) {
-                return w;
+            let first = law(w);
+            if near(first - w, first) {
+                return first;
             }
-            if by > SHRINKS * moved {
+            let second = law(first);
+            if near(second - first, second) {
+                return second;
+            }
+            // Aitken: steps that shrink by one ratio end where their sum does.
+            let ratio = (second - first) / (first - w);
+            w = second;
+            if ratio.abs() > SHRINKS {
                 break;
             }
-            moved = by;
+            w += (second - first) * ratio / (1.0 - ratio);
         }
         // w - law(w) rises with w for every law that resists motion: bracket its root and close in.
         let off = |w: f64| w - law(w);

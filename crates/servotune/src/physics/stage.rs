@@ -92,6 +92,13 @@ impl Stage {
         Swing::of(w, z, self.step).next(self.moved, [self.x, x])
     }
 
+    /// Amplitudes of the stage's own swing, as the position has it, at both ends of a step that leads to `moved`, what enters moving to `x`.
+    pub(super) fn amplitudes(&self, moved: [f64; 2], x: f64) -> [f64; 2] {
+        let rate = (x - self.x) / (self.step * self.w_rad_s);
+        let share = self.out[0].hypot(self.out[1]);
+        [(self.moved, self.x), (moved, x)].map(|(q, x)| share * (q[0] - x).hypot(q[1] - rate))
+    }
+
     /// The next sample under the command `i`; the law moves the pole, knowing the stage, what enters then and `by`, all else that it goes by.
     pub(super) fn next(&self, i: f64, by: f64, law: impl Fn(&Stage, f64) -> [f64; 2]) -> Next {
         let under = [i, by];

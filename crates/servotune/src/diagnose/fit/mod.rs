@@ -11,6 +11,7 @@ mod lagged_regression;
 pub(super) mod model;
 pub(super) mod output_error_fit;
 pub(super) mod output_error_problem;
+pub(super) mod plain_fit;
 pub(super) mod play_ground;
 mod quantisation;
 pub(super) mod regressors;

@@ -81,6 +81,14 @@ fn descended(data: &DiagnosisData, model: &Model) -> Option<Model> {
     let mut work = Workspace::default();
     let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
     let (mut cost, mut converged, mut best) = (before, false, x.clone());
+    if let Some(mut firsts) = problem.on_firsts() {
+        let mut near = x.clone();
+        minimise(&mut firsts, &mut near, &settings, &mut work);
+        let settled = size(&problem.settle(&near));
+        if settled < before {
+            (cost, x, best) = (settled, near.clone(), near);
+        }
+    }
     for _ in 0..AGAIN {
         converged = minimise(&mut problem, &mut x, &settings, &mut work).converged;
         // With the starts of where it ended, as the fit's own beginning was judged.

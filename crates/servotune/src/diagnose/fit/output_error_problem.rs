@@ -7,14 +7,13 @@ use super::corrected_model::corrected;
 use super::diagnosis_data::DiagnosisData;
 use super::model::Model;
 use super::selected_effect::SelectedEffect;
-use super::simulation::size;
 use super::simulation::{Begun, SimulatedModel, Started};
 use crate::controller::Law;
 use crate::diagnose::data::linear_form::FreeParameter;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::{NuisanceBasis, Segment};
 use crate::diagnose::noise::lines::Line;
-use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
+use crate::numeric::levenberg::{Limit, Residuals};
 use rayon::prelude::*;
 
 /// Rounds in which a start is found.
@@ -26,6 +25,7 @@ const STRENGTH_STEP: f64 = 2e-3;
 const NUMBER_STEP: f64 = 5e-3;
 
 /// What is moved: places in the linear parameters, then strengths and numbers by effect and place.
+#[derive(Clone)]
 pub(in crate::diagnose) struct Free {
     pub free_parameters: Vec<usize>,
     pub strengths: Vec<[usize; 2]>,
@@ -43,8 +43,8 @@ pub(in crate::diagnose) enum Error<'a> {
 
 /// A fit by simulation.
 pub(in crate::diagnose) struct Problem<'a> {
-    data: &'a DiagnosisData,
-    model: &'a Model,
+    pub data: &'a DiagnosisData,
+    pub model: &'a Model,
     error: Error<'a>,
     pub free: Free,
     /// Where each stretch of the error stands.
@@ -55,6 +55,7 @@ pub(in crate::diagnose) struct Problem<'a> {
 }
 
 /// One record of the fit.
+#[derive(Clone)]
 struct Record<'a> {
     run: &'a Run,
     segment: usize,
@@ -219,7 +220,12 @@ impl Residuals for Problem<'_> {
         self.settle(x);
         let this = &*self;
         let n = self.total();
-        // Both sides: the mean slope over a kink, not the slope on one side of it.
+        let of_mode = |i: usize| {
+            let place = this.free.free_parameters.get(i);
+            place.is_some_and(|&at| !is_of_body(this.data.form.free_parameters[at]))
+        };
+        let here = if (0..x.len()).any(of_mode) { this.error_at(x) } else { Vec::new() };
+        // Both sides: the mean slope over a kink, not the slope on one side of it. A mode's number moves no law past its kinks: one side does.
         j.par_chunks_exact_mut(n).enumerate().for_each(|(i, column)| {
             let step = this.step(i, x[i]);
             let moved = |by: f64| {
@@ -227,8 +233,11 @@ impl Residuals for Problem<'_> {
                 to[i] += by;
                 this.error_at(&to)
             };
-            let (up, down) = (moved(step), moved(-step));
-            column.iter_mut().zip(up.iter().zip(&down)).for_each(|(c, (a, b))| *c = (a - b) / (2.0 * step));
+            let up = moved(step);
+            let slope = |column: &mut [f64], down: &[f64], over: f64| {
+                column.iter_mut().zip(up.iter().zip(down)).for_each(|(c, (a, b))| *c = (a - b) / over);
+            };
+            if of_mode(i) { slope(column, &here, step) } else { slope(column, &moved(-step), 2.0 * step) }
         });
     }
 
@@ -248,11 +257,25 @@ impl Residuals for Problem<'_> {
 }
 
 impl<'a> Problem<'a> {
+    /// The same on the first repeat of every motion; none where nothing was repeated. Whoever has come down there has little way left on all.
+    pub fn on_firsts(&self) -> Option<Problem<'a>> {
+        let motion = |r: &Record| match self.error {
+            Error::Whitened => r.segment,
+            Error::Plain(_) => r.run.group,
+        };
+        let mut records: Vec<Record<'a>> = Vec::new();
+        for r in &self.records {
+            if !records.iter().any(|first| motion(first) == motion(r)) {
+                records.push(Record { share: 1.0, ..r.clone() });
+            }
+        }
+        let fewer = records.len() < self.records.len();
+        let (free, layout, local) = (self.free.clone(), self.layout.clone(), self.local.clone());
+        fewer.then_some(Problem { records, free, layout, local, ..*self })
+    }
+
     /// The whitened error in open loop; modes stay.
     pub fn whitened_error(data: &'a DiagnosisData, model: &'a Model) -> Problem<'a> {
-        let body = |k: &FreeParameter| {
-            matches!(k, FreeParameter::Gain | FreeParameter::Stiffness | FreeParameter::Viscous | FreeParameter::Delay)
-        };
         let segments = &data.stack.segments;
         let all = segments.iter().enumerate().flat_map(|(i, s)| s.runs.iter().map(move |&r| (i, r)));
         let record =
@@ -261,7 +284,7 @@ impl<'a> Problem<'a> {
             data,
             model,
             error: Error::Whitened,
-            free: Free::of(data, model, body),
+            free: Free::of(data, model, |k| is_of_body(*k)),
             layout: segments.clone(),
             local: data.fit(model.chosen.clone()).local_basis(),
             records: all.map(record).collect(),
@@ -291,6 +314,11 @@ impl<'a> Problem<'a> {
             records: runs.iter().enumerate().map(|(i, (run, _))| Record::of(data, model, run, i, 1.0)).collect(),
         }
     }
+}
+
+/// Whether a number is of body or delay, and not of a mode.
+pub(super) fn is_of_body(k: FreeParameter) -> bool {
+    matches!(k, FreeParameter::Gain | FreeParameter::Stiffness | FreeParameter::Viscous | FreeParameter::Delay)
 }
 
 impl<'a> Record<'a> {
@@ -341,49 +369,4 @@ pub(in crate::diagnose) fn places(free: &Free, model: &Model) -> Vec<usize> {
         .chain(free.strengths.iter().map(strength))
         .chain(free.numbers.iter().map(numbers))
         .collect()
-}
-
-/// Jacobians of a fit by the plain error, and the relative fall at which it ends.
-const ITERATIONS: usize = 15;
-const TOLERANCE: f64 = 1e-5;
-
-/// The model fitted by the plain error from where it stands, on these runs, each with the number of records that it stands for.
-pub(in crate::diagnose) fn descended(
-    data: &DiagnosisData,
-    model: &Model,
-    law: Option<&Law>,
-    runs: &[(&Run, usize)],
-) -> Option<Model> {
-    descended_from(Problem::plain_error(data, model, law, runs))
-}
-
-/// The same in open loop with the laws alone moved.
-pub(in crate::diagnose) fn laws_descended(
-    data: &DiagnosisData,
-    model: &Model,
-    runs: &[(&Run, usize)],
-) -> Option<Model> {
-    let mut problem = Problem::plain_error(data, model, None, runs);
-    problem.free.free_parameters.clear();
-    descended_from(problem)
-}
-
-/// The model of a problem from where it stands.
-fn descended_from(mut problem: Problem) -> Option<Model> {
-    let (data, model) = (problem.data, problem.model);
-    let mut x = problem.start();
-    let before = size(&problem.settle(&x));
-    if !before.is_finite() {
-        return None;
-    }
-    let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
-    minimise(&mut problem, &mut x, &settings, &mut Workspace::default());
-    let after = size(&problem.settle(&x));
-    let (p, chosen) = problem.unpack(&x);
-    let possible = after < before && chosen.iter().all(|c| c.setting.is_possible(&[]));
-    let mut moved = model.clone();
-    if possible {
-        (moved.refitted.plant, moved.refitted.p, moved.chosen) = (data.form.plant(&p), p, chosen);
-    }
-    Some(moved)
 }

@@ -28,9 +28,9 @@ rules! {
     CLEARED_BETTER: f64 = 0.5, "ratio",
         "simulation error with the law over that of the best linear plant below which its plant is taken",
         "a bent plant leaves several times the noise; half cannot be one more number's luck";
-    CLEARED_FULLER: f64 = 0.9, "ratio",
-        "the same of a fuller form of the law over that of the plain one, below which it is taken",
-        "judgement: a rise at rest must pay for its two numbers";
+    CLEARED_FULLER: f64 = 0.5, "ratio",
+        "squared simulation error of a fuller form of the law over that of the plain one, below which it is taken",
+        "judgement: what a drag leaves out leaves many times what it explains, and a fit that has not come down gains by any further number";
     CLEARED_BY_CURVE: f64 = 0.25, "ratio",
         "squared simulation error with a curve over that of the best law, below which the plant is cleared of the curve instead",
         "judgement: a curve has thirty numbers and no name; half the error is more than a law's form leaves";

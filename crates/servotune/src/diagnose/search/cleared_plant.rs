@@ -11,7 +11,8 @@ use crate::diagnose::data::stacked_records::Segment;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::output_error_problem::{Problem, descended, laws_descended};
+use crate::diagnose::fit::output_error_problem::Problem;
+use crate::diagnose::fit::plain_fit::{body_descended, descended, laws_descended};
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::fit::simulation::size;
 use crate::diagnose::free_form::estimation::Curved;
@@ -125,7 +126,7 @@ pub(in crate::diagnose) fn cleared(
     if let Some(stands) = firsts.beside_given(&laws) {
         return Some(Cleared { given_stands: true, ..firsts.cleared(&stands) });
     }
-    let best = tried.of_curves(bent, tried.of_laws(&laws));
+    let best = tried.of_curves(bent, tried.of_laws(&laws)).map(|best| tried.with_modes(best));
     let best = best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least)?;
     if !(repeated && best.drags()) {
         return Some(tried.cleared(&best));
@@ -201,7 +202,17 @@ impl Tried<'_> {
     }
 
     fn fitted(&self, ground: &DiagnosisData, model: &Model) -> Option<Model> {
-        descended(ground, model, None, &self.whole)
+        body_descended(ground, model, &self.whole)
+    }
+
+    /// The same with its modes fitted too, where something but the noise is left.
+    fn with_modes(&self, best: Fitted) -> Fitted {
+        if self.done(best.left) {
+            return best;
+        }
+        let Some(model) = descended(&best.ground, &best.model, None, &self.whole) else { return best };
+        let left = self.left(&best.ground, &model);
+        if left < best.left { Fitted { left, model, ..best } } else { best }
     }
 
     /// The best law beside the plant as given, where both leave hardly more than the noise: then nothing bent that plant.

@@ -9,7 +9,7 @@ use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, corrected};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::output_error_problem::descended;
+use crate::diagnose::fit::plain_fit::descended;
 use crate::diagnose::fit::simulation::{SimulatedModel, errors, floor, rms, size};
 use crate::diagnose::rules::{REFIT_BETTER, REFIT_FAR, SIMULATION_ALIKE, SIMULATION_SAMPLING};
 use crate::diagnose::search::selection::Selection;

@@ -1,0 +1,73 @@
+//! A model fitted by the plain error of its simulation, as it is reported: all of it, without the modes, or the laws alone.
+
+use super::diagnosis_data::DiagnosisData;
+use super::model::Model;
+use super::output_error_problem::{Problem, is_of_body};
+use super::simulation::size;
+use crate::controller::Law;
+use crate::diagnose::data::run::Run;
+use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
+
+/// Jacobians of a fit by the plain error, and the relative fall at which it ends.
+const ITERATIONS: usize = 15;
+const TOLERANCE: f64 = 1e-5;
+
+/// The model fitted by the plain error from where it stands, on these runs, each with the number of records that it stands for.
+pub(in crate::diagnose) fn descended(
+    data: &DiagnosisData,
+    model: &Model,
+    law: Option<&Law>,
+    runs: &[(&Run, usize)],
+) -> Option<Model> {
+    descended_from(Problem::plain_error(data, model, law, runs))
+}
+
+/// The same in open loop with the modes left as they are: they are most of the numbers, and tell little of the laws.
+pub(in crate::diagnose) fn body_descended(
+    data: &DiagnosisData,
+    model: &Model,
+    runs: &[(&Run, usize)],
+) -> Option<Model> {
+    let mut problem = Problem::plain_error(data, model, None, runs);
+    problem.free.free_parameters.retain(|&i| is_of_body(data.form.free_parameters[i]));
+    descended_from(problem)
+}
+
+/// The same in open loop with the laws alone moved.
+pub(in crate::diagnose) fn laws_descended(
+    data: &DiagnosisData,
+    model: &Model,
+    runs: &[(&Run, usize)],
+) -> Option<Model> {
+    let mut problem = Problem::plain_error(data, model, None, runs);
+    problem.free.free_parameters.clear();
+    descended_from(problem)
+}
+
+/// The model of a problem from where it stands.
+fn descended_from(mut problem: Problem) -> Option<Model> {
+    let (data, model) = (problem.data, problem.model);
+    let mut x = problem.start();
+    let before = size(&problem.settle(&x));
+    if !before.is_finite() {
+        return None;
+    }
+    let (settings, mut work) =
+        (LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE }, Workspace::default());
+    if let Some(mut firsts) = problem.on_firsts() {
+        let mut near = x.clone();
+        minimise(&mut firsts, &mut near, &settings, &mut work);
+        if size(&problem.settle(&near)) < before {
+            x = near;
+        }
+    }
+    minimise(&mut problem, &mut x, &settings, &mut work);
+    let after = size(&problem.settle(&x));
+    let (p, chosen) = problem.unpack(&x);
+    let possible = after < before && chosen.iter().all(|c| c.setting.is_possible(&[]));
+    let mut moved = model.clone();
+    if possible {
+        (moved.refitted.plant, moved.refitted.p, moved.chosen) = (data.form.plant(&p), p, chosen);
+    }
+    Some(moved)
+}
