@@ -18,12 +18,18 @@ use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
 
 /// Most Jacobians.
 const ITERATIONS: usize = 12;
-/// Relative fall of the sum of squares at which the fit ends.
-const TOLERANCE: f64 = 1e-6;
+/// Relative fall of the sum of squares at which the fit ends: near the noise, where a tenth of its variance counts, and far from it, sums of
+/// squares over samples from where it is far.
+const TOLERANCE: f64 = 3e-6;
+const ROUGH: f64 = 3e-5;
+const FAR: f64 = 2.0;
 /// Most fits one after the other, and the relative fall of the error by one for which another is made: starts that are found anew may
 /// open a way further down.
 const AGAIN: usize = 3;
 const FURTHER: f64 = 3e-4;
+const FURTHER_WHEN_FAR: f64 = 1e-2;
+/// A fit from elsewhere whose sum of squares stays above so many times that of the first is given up.
+const HOPELESS: f64 = 2.0;
 
 /// The whitened simulation error of a model, stacked, each segment's own directions taken out.
 pub(in crate::diagnose) fn simulation_error(data: &DiagnosisData, model: &Model) -> Vec<f64> {
@@ -56,18 +62,20 @@ pub(in crate::diagnose) fn simulated_with(
 /// Modes stay where the search left them, and along a noisy motion they may have taken what a drag owes. Where the fit does not come down
 /// to the noise, one from the linear parameters as given is made beside it: the better counts.
 pub(in crate::diagnose) fn simulated(data: &DiagnosisData, model: &Model) -> Option<Model> {
-    let found = descended(data, model);
-    if found.as_ref().unwrap_or(model).excess_sigma() < UNSETTLED {
+    let found = descended(data, model, f64::INFINITY);
+    let from_given = model.refitted.p.iter().all(|p| *p == 0.0);
+    if from_given || found.as_ref().unwrap_or(model).excess_sigma() < UNSETTLED {
         return found;
     }
     let mut given = model.clone();
     given.refitted.p.fill(0.0);
-    let other = descended(data, &given).filter(|o| o.cost < found.as_ref().map_or(model.cost, |f| f.cost));
+    let least = found.as_ref().map_or(model.cost, |f| f.cost);
+    let other = descended(data, &given, least).filter(|o| o.cost < least);
     other.or(found)
 }
 
-/// The fit by simulation from where a model stands.
-fn descended(data: &DiagnosisData, model: &Model) -> Option<Model> {
+/// The fit by simulation from where a model stands; none that stays far above `beside`.
+fn descended(data: &DiagnosisData, model: &Model, beside: f64) -> Option<Model> {
     if model.chosen.is_empty() {
         return None;
     }
@@ -79,21 +87,26 @@ fn descended(data: &DiagnosisData, model: &Model) -> Option<Model> {
         return None;
     }
     let mut work = Workspace::default();
-    let settings = LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE };
+    let far = |cost: f64| cost > FAR * data.stack.total as f64;
+    let settings =
+        |cost: f64| LevenbergSettings { iterations: ITERATIONS, tolerance: if far(cost) { ROUGH } else { TOLERANCE } };
     let (mut cost, mut converged, mut best) = (before, false, x.clone());
     if let Some(mut firsts) = problem.on_firsts() {
         let mut near = x.clone();
-        minimise(&mut firsts, &mut near, &settings, &mut work);
+        minimise(&mut firsts, &mut near, &settings(f64::INFINITY), &mut work);
         let settled = size(&problem.settle(&near));
         if settled < before {
             (cost, x, best) = (settled, near.clone(), near);
         }
     }
     for _ in 0..AGAIN {
-        converged = minimise(&mut problem, &mut x, &settings, &mut work).converged;
+        if cost < before && cost > HOPELESS * beside {
+            return None;
+        }
+        converged = minimise(&mut problem, &mut x, &settings(cost), &mut work).converged;
         // With the starts of where it ended, as the fit's own beginning was judged.
         let settled = size(&problem.settle(&x));
-        let further = settled < (1.0 - FURTHER) * cost;
+        let further = settled < (1.0 - if far(cost) { FURTHER_WHEN_FAR } else { FURTHER }) * cost;
         if settled < cost {
             (cost, best) = (settled, x.clone());
         }

@@ -8,9 +8,10 @@ use crate::controller::Law;
 use crate::diagnose::data::run::Run;
 use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
 
-/// Jacobians of a fit by the plain error, and the relative fall at which it ends.
+/// Jacobians of a fit by the plain error, and the relative fall at which it ends; at which one ends that tells laws apart.
 const ITERATIONS: usize = 15;
 const TOLERANCE: f64 = 1e-5;
+const ROUGH: f64 = 1e-3;
 
 /// The model fitted by the plain error from where it stands, on these runs, each with the number of records that it stands for.
 pub(in crate::diagnose) fn descended(
@@ -19,7 +20,7 @@ pub(in crate::diagnose) fn descended(
     law: Option<&Law>,
     runs: &[(&Run, usize)],
 ) -> Option<Model> {
-    descended_from(Problem::plain_error(data, model, law, runs))
+    descended_from(Problem::plain_error(data, model, law, runs), TOLERANCE)
 }
 
 /// The same in open loop with the modes left as they are: they are most of the numbers, and tell little of the laws.
@@ -30,7 +31,7 @@ pub(in crate::diagnose) fn body_descended(
 ) -> Option<Model> {
     let mut problem = Problem::plain_error(data, model, None, runs);
     problem.free.free_parameters.retain(|&i| is_of_body(data.form.free_parameters[i]));
-    descended_from(problem)
+    descended_from(problem, ROUGH)
 }
 
 /// The same in open loop with the laws alone moved.
@@ -41,19 +42,18 @@ pub(in crate::diagnose) fn laws_descended(
 ) -> Option<Model> {
     let mut problem = Problem::plain_error(data, model, None, runs);
     problem.free.free_parameters.clear();
-    descended_from(problem)
+    descended_from(problem, TOLERANCE)
 }
 
 /// The model of a problem from where it stands.
-fn descended_from(mut problem: Problem) -> Option<Model> {
+fn descended_from(mut problem: Problem, tolerance: f64) -> Option<Model> {
     let (data, model) = (problem.data, problem.model);
     let mut x = problem.start();
     let before = size(&problem.settle(&x));
     if !before.is_finite() {
         return None;
     }
-    let (settings, mut work) =
-        (LevenbergSettings { iterations: ITERATIONS, tolerance: TOLERANCE }, Workspace::default());
+    let (settings, mut work) = (LevenbergSettings { iterations: ITERATIONS, tolerance }, Workspace::default());
     if let Some(mut firsts) = problem.on_firsts() {
         let mut near = x.clone();
         minimise(&mut firsts, &mut near, &settings, &mut work);
