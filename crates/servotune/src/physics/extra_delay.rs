@@ -48,7 +48,7 @@ const DELAY_S: Key = Key::new("delay_s", Unit::Second, "d")
     .scan(Bound::At(0.1, Measure::Sample), Bound::At(6.0, Measure::Sample));
 const DELAY_GROWTH: Key = Key::new("delay_growth", Unit::Ratio, "g, of either sign, over the time of the session")
     .unless(&["delay_s"])
-    .prior(Prior::Words("0.05 to 3 samples over the session"));
+    .prior(Prior::Words("0.1 to 3 samples over the session"));
 
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
@@ -125,7 +125,7 @@ impl Parametric for ExtraDelay {
         let constant = [0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0];
         let mut all: Vec<ExtraDelay> =
             constant.iter().map(|n| ExtraDelay::Constant { delay_s: n * scene.sample_time_s }).collect();
-        for gained in logarithmic(0.05, 3.0, 4).into_iter().flat_map(|n| [n, -n]) {
+        for gained in logarithmic(0.1, 3.0, 4).into_iter().flat_map(|n| [n, -n]) {
             let growth = gained * scene.sample_time_s / scene.session_s;
             all.push(ExtraDelay::Growing { start_s: None, growth });
         }

@@ -43,7 +43,7 @@ pub(super) fn prune(data: &DiagnosisData, model: &mut Model, before: f64, iterat
 }
 
 /// Takes out what stands beside a drag only because the drag's column, made along a noisy motion, falls short of the drag: simulated,
-/// the model does without.
+/// the model does without. Where no drag is there, every law of a model that stands by simulation is asked.
 pub(super) fn spare(
     data: &DiagnosisData,
     model: &mut Model,
@@ -57,9 +57,11 @@ pub(super) fn spare(
     let most = model.chosen.iter().map(|c| gain_of(steps, c)).fold(0.0, f64::max);
     let small = |c: &SelectedEffect| gain_of(steps, c) < SMALL_BESIDE_DRAG * most;
     let price = (data.stack.total as f64).ln();
-    while model.chosen.len() > 1 && model.chosen.iter().any(drag) {
+    while model.chosen.len() > 1 {
         let mut without = Vec::new();
-        for at in (0..model.chosen.len()).filter(|&i| !drag(&model.chosen[i]) && small(&model.chosen[i])) {
+        let dragged = model.chosen.iter().any(drag);
+        let asked = |c: &SelectedEffect| !drag(c) && (!dragged || small(c));
+        for at in (0..model.chosen.len()).filter(|&i| asked(&model.chosen[i])) {
             let mut chosen = model.chosen.clone();
             chosen.remove(at);
             let less = fitted(data, chosen, &model.refitted.p, iterations);

@@ -271,7 +271,9 @@ impl Search<'_> {
         progress("fit by simulation");
         let mut simulated = simulated(&data, &model);
         if let Some(s) = &mut simulated {
-            spare(&data, &mut model, s, &mut rivals, &steps, baseline.cost, iterations);
+            if felt || model.chosen.iter().any(|c| c.effect().is_drag()) {
+                spare(&data, &mut model, s, &mut rivals, &steps, baseline.cost, iterations);
+            }
             by_simulation(&data, &mut model, s, &mut rivals, &steps);
         }
         let limit = settings.false_alarm.ln();
