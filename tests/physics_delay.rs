@@ -54,19 +54,20 @@ fn a_file_gives_either_number_or_both() {
 
 #[test]
 fn a_delay_that_grows_along_the_session_is_named_and_measured() {
-    // Over seven records the command comes 1.2 samples later: 120 of 84 000 microseconds a second.
-    let growth = 1.2 / (7.0 * N as f64);
+    // Over ten records the command comes 1.2 samples later; each excitation is played twice in a row.
+    let growth = 1.2 / (10.0 * N as f64);
     let mut records = Vec::new();
-    for (i, size) in [0.02, 0.06, 0.03, 0.05, 0.02, 0.06, 0.04].into_iter().enumerate() {
-        let u = excitation(size, 50 + i as u64);
+    for i in 0..10 {
+        let size = [0.02, 0.06, 0.03, 0.05, 0.04][i / 2];
+        let u = excitation(size, 50 + (i / 2) as u64);
         let begun = i as f64 * N as f64 * T;
         let acting = |t: f64| {
             let at = t - growth * (begun + t);
             if at < 0.0 { 0.0 } else { u[(at / T).floor() as usize] }
         };
-        let role = if i == 3 { Role::Holdout } else { Role::Fit };
+        let role = if i / 2 == 3 { Role::Holdout } else { Role::Fit };
         let y = respond_to(&GIVEN, &acting, 100 + i as u64);
-        records.push(record(&format!("r{i}.csv"), role, &format!("g{i}"), &u, y));
+        records.push(record(&format!("r{i}.csv"), role, &format!("g{}", i / 2), &u, y));
     }
     let d = diagnosed_from(records);
     assert_eq!((d.verdict, d.findings.len()), (Verdict::Named, 1), "{:?}", d.findings);

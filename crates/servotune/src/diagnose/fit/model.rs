@@ -24,17 +24,30 @@ pub struct Model {
     pub sigma: f64,
 }
 
+/// Standard errors within which a strength may be 0.
+const SILENT: f64 = 2.0;
+
 impl Model {
+    /// Standard errors of the strengths of every effect; none of one whose strength is 1 by definition.
+    fn strength_errors(&self) -> Vec<Vec<f64>> {
+        let mut from = self.refitted.p.len();
+        let of = |c: &SelectedEffect| {
+            let count = if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
+            from += count;
+            (from - count..from).map(|i| self.refitted.spread(i)).collect()
+        };
+        self.chosen.iter().map(of).collect()
+    }
+
     /// Whether a machine can be so in every one of its effects.
     pub(in crate::diagnose) fn possible(&self) -> bool {
-        let free_parameters = self.refitted.p.len();
-        let mut from = free_parameters;
-        self.chosen.iter().all(|c| {
-            let count = if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
-            let errors: Vec<f64> = (from..from + count).map(|i| self.refitted.spread(i)).collect();
-            from += count;
-            c.setting.is_possible(&errors)
-        })
+        self.chosen.iter().zip(self.strength_errors()).all(|(c, errors)| c.setting.is_possible(&errors))
+    }
+
+    /// Whether no strength of an effect stands out of its standard error.
+    pub(in crate::diagnose) fn is_silent(&self, at: usize) -> bool {
+        let errors = &self.strength_errors()[at];
+        !errors.is_empty() && self.chosen[at].setting.strengths.iter().zip(errors).all(|(s, e)| s.abs() < SILENT * e)
     }
 
     /// The error in excess of the noise, in units of the noise's variance.

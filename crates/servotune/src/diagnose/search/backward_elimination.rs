@@ -43,7 +43,9 @@ pub(super) fn prune(data: &DiagnosisData, model: &mut Model, before: f64, iterat
 }
 
 /// Takes out what stands beside a drag only because the drag's column, made along a noisy motion, falls short of the drag: simulated,
-/// the model does without. Where no drag is there, every law of a model that stands by simulation is asked.
+/// the model does without. Where no drag is there, every law of a model that stands by simulation is asked (`all`), and always one whose
+/// strengths have become nothing.
+#[allow(clippy::too_many_arguments, reason = "two models of one search and what it took them from")]
 pub(super) fn spare(
     data: &DiagnosisData,
     model: &mut Model,
@@ -52,6 +54,7 @@ pub(super) fn spare(
     steps: &[Step],
     before: f64,
     iterations: usize,
+    all: bool,
 ) {
     let drag = |c: &SelectedEffect| c.effect().is_drag();
     let most = model.chosen.iter().map(|c| gain_of(steps, c)).fold(0.0, f64::max);
@@ -60,8 +63,11 @@ pub(super) fn spare(
     while model.chosen.len() > 1 {
         let mut without = Vec::new();
         let dragged = model.chosen.iter().any(drag);
-        let asked = |c: &SelectedEffect| !drag(c) && (!dragged || small(c));
-        for at in (0..model.chosen.len()).filter(|&i| asked(&model.chosen[i])) {
+        let asked = |i: usize| {
+            let c = &model.chosen[i];
+            !drag(c) && (if dragged { small(c) } else { all } || by_simulation.is_silent(i))
+        };
+        for at in (0..model.chosen.len()).filter(|&i| asked(i)) {
             let mut chosen = model.chosen.clone();
             chosen.remove(at);
             let less = fitted(data, chosen, &model.refitted.p, iterations);

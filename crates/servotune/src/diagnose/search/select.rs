@@ -271,9 +271,7 @@ impl Search<'_> {
         progress("fit by simulation");
         let mut simulated = simulated(&data, &model);
         if let Some(s) = &mut simulated {
-            if felt || model.chosen.iter().any(|c| c.effect().is_drag()) {
-                spare(&data, &mut model, s, &mut rivals, &steps, baseline.cost, iterations);
-            }
+            spare(&data, &mut model, s, &mut rivals, &steps, baseline.cost, iterations, felt);
             by_simulation(&data, &mut model, s, &mut rivals, &steps);
         }
         let limit = settings.false_alarm.ln();
