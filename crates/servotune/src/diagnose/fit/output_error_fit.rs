@@ -18,10 +18,10 @@ use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
 
 /// Most Jacobians.
 const ITERATIONS: usize = 12;
-/// Relative fall of the sum of squares at which the fit ends: near the noise, where a tenth of its variance counts, and far from it, sums of
-/// squares over samples from where it is far.
+/// Relative fall of the sum of squares at which the fit ends: near the noise, where a tenth of its variance counts, and far from it.
 const TOLERANCE: f64 = 3e-6;
 const ROUGH: f64 = 3e-5;
+/// Sum of squares over samples from which a fit is far from the noise.
 const FAR: f64 = 2.0;
 /// Most fits one after the other, and the relative fall of the error by one for which another is made: starts that are found anew may
 /// open a way further down.
@@ -97,6 +97,8 @@ fn descended(data: &DiagnosisData, model: &Model, beside: f64) -> Option<Model> 
         let settled = size(&problem.settle(&near));
         if settled < before {
             (cost, x, best) = (settled, near.clone(), near);
+        } else {
+            problem.settle(&x);
         }
     }
     for _ in 0..AGAIN {

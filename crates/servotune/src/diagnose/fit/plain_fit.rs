@@ -59,6 +59,8 @@ fn descended_from(mut problem: Problem, tolerance: f64) -> Option<Model> {
         minimise(&mut firsts, &mut near, &settings, &mut work);
         if size(&problem.settle(&near)) < before {
             x = near;
+        } else {
+            problem.settle(&x);
         }
     }
     minimise(&mut problem, &mut x, &settings, &mut work);
