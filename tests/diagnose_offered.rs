@@ -76,7 +76,9 @@ fn what_is_offered_is_never_worse_than_what_was_given() {
     // The reading folds over, which no law of a body is like.
     let mut folded = records(&GIVEN);
     // One record of each move: every fit of the long way is made on these.
-    folded.retain(|(entry, r)| entry.role == Role::Holdout || r.file.to_string_lossy().contains('0'));
+    folded.retain(|(entry, r)| {
+        entry.role == servotune::recording::Role::Holdout || r.file.to_string_lossy().contains('0')
+    });
     folded.iter_mut().flat_map(|(_, r)| &mut r.position).for_each(|y| *y = y.abs());
     let d = of(folded, &plant(), NominalNoise::default());
     for f in [d.fit.fit, d.fit.holdout.unwrap()] {
