@@ -38,8 +38,7 @@ fn excerpt(run: &Run, at: usize, length: usize, sample_time_s: f64) -> Run {
     if run.len() <= length {
         return run.clone();
     }
-    let from_s = run.from_s + at as f64 * sample_time_s;
-    Run { from_s, began_s: run.began_s + at as f64 * sample_time_s, ..run.stretch(at, at + length) }
+    run.stretch(at, at + length, sample_time_s)
 }
 
 /// Where the first stretch of that length begins in which a run moves nearly as much as it ever does.

@@ -61,12 +61,12 @@ impl Run {
     }
 
     /// A part of the record, as one of its own; it does not begin at rest.
-    pub fn stretch(&self, from: usize, to: usize) -> Run {
+    pub fn stretch(&self, from: usize, to: usize, sample_time_s: f64) -> Run {
         let cut = |x: &[f64]| x[from..to].to_vec();
         let may = |x: &Option<Vec<f64>>| x.as_deref().map(cut);
         Run {
-            began_s: self.began_s,
-            from_s: self.from_s,
+            began_s: self.began_s + from as f64 * sample_time_s,
+            from_s: self.from_s + from as f64 * sample_time_s,
             reference: may(&self.reference),
             command: cut(&self.command),
             excitation: cut(&self.excitation),

@@ -28,6 +28,8 @@ const FAR: f64 = 2.0;
 const AGAIN: usize = 3;
 const FURTHER: f64 = 3e-4;
 const FURTHER_WHEN_FAR: f64 = 1e-2;
+/// Jacobians and tolerance of a fit that tells laws apart.
+const ROUGHLY: LevenbergSettings = LevenbergSettings { iterations: ITERATIONS, tolerance: 1e-3 };
 /// A fit from elsewhere whose sum of squares stays above so many times that of the first is given up.
 const HOPELESS: f64 = 2.0;
 
@@ -62,7 +64,7 @@ pub(in crate::diagnose) fn simulated_with(
 /// Modes stay where the search left them, and along a noisy motion they may have taken what a drag owes. Where the fit does not come down
 /// to the noise, one from the linear parameters as given is made beside it: the better counts.
 pub(in crate::diagnose) fn simulated(data: &DiagnosisData, model: &Model) -> Option<Model> {
-    let found = descended(data, model, f64::INFINITY);
+    let found = simulated_from(data, model, f64::INFINITY);
     let from_given = model.refitted.p.iter().all(|p| *p == 0.0);
     if from_given || found.as_ref().unwrap_or(model).excess_sigma() < UNSETTLED {
         return found;
@@ -70,12 +72,38 @@ pub(in crate::diagnose) fn simulated(data: &DiagnosisData, model: &Model) -> Opt
     let mut given = model.clone();
     given.refitted.p.fill(0.0);
     let least = found.as_ref().map_or(model.cost, |f| f.cost);
-    let other = descended(data, &given, least).filter(|o| o.cost < least);
+    let other = simulated_from(data, &given, least).filter(|o| o.cost < least);
     other.or(found)
 }
 
+/// The model fitted by simulation as far as it takes to tell laws apart: loosely, on the first repeat of every motion, from where it stands or from
+/// the linear parameters as given. Its sum of squares is of all repeats.
+pub(in crate::diagnose) fn roughly_simulated(data: &DiagnosisData, model: &Model) -> Option<Model> {
+    let mut given = model.clone();
+    given.refitted.p.fill(0.0);
+    let from = |start: &Model| {
+        let start = &with_late_numbers(start);
+        let mut problem = Problem::whitened_error(data, start);
+        let (mut x, mut work) = (problem.start(), Workspace::default());
+        if !size(&problem.settle(&x)).is_finite() {
+            return None;
+        }
+        match problem.on_firsts() {
+            Some(mut firsts) => minimise(&mut firsts, &mut x, &ROUGHLY, &mut work),
+            None => minimise(&mut problem, &mut x, &ROUGHLY, &mut work),
+        };
+        let cost = size(&problem.settle(&x));
+        let (p, chosen) = problem.unpack(&x);
+        let refitted = Refitted { plant: data.form.plant(&p), p, cost, ..start.refitted.clone() };
+        let made = Model { chosen, refitted, cost, ..start.clone() };
+        (cost.is_finite() && made.possible()).then_some(made)
+    };
+    let starts = if model.refitted.p == given.refitted.p { vec![model] } else { vec![model, &given] };
+    starts.into_iter().filter_map(from).min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
 /// The fit by simulation from where a model stands; none that stays far above `beside`.
-fn descended(data: &DiagnosisData, model: &Model, beside: f64) -> Option<Model> {
+pub(in crate::diagnose) fn simulated_from(data: &DiagnosisData, model: &Model, beside: f64) -> Option<Model> {
     if model.chosen.is_empty() {
         return None;
     }

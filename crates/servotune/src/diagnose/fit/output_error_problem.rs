@@ -216,9 +216,12 @@ impl Residuals for Problem<'_> {
         r.copy_from_slice(&self.error_at(x));
     }
 
+    /// Slopes are those of the first repeat of every motion: repeats differ by what the noise shakes, and how a number moves the motion differs
+    /// little by that. What the fit makes small is the error of all.
     fn jacobian(&mut self, x: &[f64], j: &mut [f64]) {
         self.settle(x);
-        let this = &*self;
+        let firsts = self.on_firsts();
+        let this = firsts.as_ref().unwrap_or(self);
         let n = self.total();
         let of_mode = |i: usize| {
             let place = this.free.free_parameters.get(i);
@@ -237,7 +240,12 @@ impl Residuals for Problem<'_> {
             let slope = |column: &mut [f64], down: &[f64], over: f64| {
                 column.iter_mut().zip(up.iter().zip(down)).for_each(|(c, (a, b))| *c = (a - b) / over);
             };
-            if of_mode(i) { slope(column, &here, step) } else { slope(column, &moved(-step), 2.0 * step) }
+            if of_mode(i) {
+                slope(column, &here, step)
+            } else {
+                slope(column, &moved(-step), 2.0 * step)
+            }
+            self.repeat(column);
         });
     }
 
@@ -257,15 +265,34 @@ impl Residuals for Problem<'_> {
 }
 
 impl<'a> Problem<'a> {
+    /// Whether two records are repeats of one motion.
+    fn alike(&self, a: &Record, b: &Record) -> bool {
+        match self.error {
+            Error::Whitened => a.segment == b.segment,
+            Error::Plain(_) => (a.run.group, a.run.len()) == (b.run.group, b.run.len()) && a.run.from_s == b.run.from_s,
+        }
+    }
+
+    /// Gives the stretches of further repeats what stands in that of the first; whitened, repeats share one stretch.
+    fn repeat(&self, column: &mut [f64]) {
+        for (i, r) in self.records.iter().enumerate() {
+            let first = self.records[..i].iter().find(|first| self.alike(first, r));
+            let Some([from, to]) = first.map(|first| [&self.layout[first.segment], &self.layout[r.segment]]) else {
+                continue;
+            };
+            if from.start != to.start {
+                let by = to.weight / from.weight;
+                column.copy_within(from.start..from.start + from.len, to.start);
+                column[to.start..to.start + to.len].iter_mut().for_each(|v| *v *= by);
+            }
+        }
+    }
+
     /// The same on the first repeat of every motion; none where nothing was repeated. Whoever has come down there has little way left on all.
     pub fn on_firsts(&self) -> Option<Problem<'a>> {
-        let motion = |r: &Record| match self.error {
-            Error::Whitened => r.segment,
-            Error::Plain(_) => r.run.group,
-        };
         let mut records: Vec<Record<'a>> = Vec::new();
         for r in &self.records {
-            if !records.iter().any(|first| motion(first) == motion(r)) {
+            if !records.iter().any(|first| self.alike(first, r)) {
                 records.push(Record { share: 1.0, ..r.clone() });
             }
         }

@@ -1,7 +1,7 @@
 //! The final model of a search, looked at again: effects that others made needless go, and rivals are tried in the place of each.
 
 use super::candidate::has_own_period;
-use super::rival::more;
+use super::rival::{ROUGH_TELLS, more};
 use super::rival_model::Rival;
 use super::selection::{Step, gain_of};
 use super::step_scan::scan_at;
@@ -9,7 +9,7 @@ use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::begun;
 use crate::diagnose::fit::fitted_model::{fitted, fitted_from_both};
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::output_error_fit::simulated;
+use crate::diagnose::fit::output_error_fit::{roughly_simulated, simulated};
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::rules::{
     OWN_OF_RECORD, RIVAL_BETTER, RIVAL_TRIED, RIVAL_TRIED_WITHOUT_REPEATS, SECOND_ADDS, SMALL_BESIDE_DRAG,
@@ -67,11 +67,14 @@ pub(super) fn spare(
             let c = &model.chosen[i];
             !drag(c) && (if dragged { small(c) } else { all } || by_simulation.is_silent(i))
         };
+        let c = |at: usize| &model.chosen[at];
         for at in (0..model.chosen.len()).filter(|&i| asked(i)) {
             let mut chosen = model.chosen.clone();
             chosen.remove(at);
             let less = fitted(data, chosen, &model.refitted.p, iterations);
-            if let Some(s) = simulated(data, &less) {
+            let dear = |m: &Model| m.cost - by_simulation.cost > ROUGH_TELLS * worth(c(at), price, before - m.cost);
+            let near = roughly_simulated(data, &less).filter(|m| !dear(m));
+            if let Some(s) = near.and_then(|_| simulated(data, &less)) {
                 without.push((at, less, s));
             }
         }

@@ -21,6 +21,8 @@ use crate::diagnose::rules::{
 };
 use crate::lti::Plant;
 use crate::physics::Setting;
+use std::cell::LazyCell;
+use std::ops::Deref;
 
 /// Laws that are tried by simulation, as they stand and fitted.
 const TRIED: usize = 16;
@@ -89,17 +91,6 @@ pub(in crate::diagnose) fn cleared(
     say: &mut dyn FnMut(&str),
 ) -> Option<Cleared> {
     let means = recorded_means(data);
-    let widths = smoothings(&means);
-    let balances = widths.iter().flat_map(|&w| SLIDES.map(|s| Balance::of(data, &means, w, s)));
-    let mut laws: Vec<(f64, Balanced)> = balances.flat_map(|b| b.laws()).collect();
-    let bent = curves(&widths.iter().map(|&w| Balance::of(data, &means, w, 0.0)).collect::<Vec<_>>());
-    let bent: Vec<Curved> = bent.into_iter().filter(|c| c.share < CLEARED_TELLS).collect();
-    let nothing_bends = bent.is_empty() && laws.iter().all(|(share, _)| *share >= CLEARED_TELLS);
-    let zero = vec![0.0; data.form.free_parameters.len()];
-    let near = data.fit(vec![]).cost(&zero) < CLEARED_FAR * CLEARED_FAR * data.stack.total as f64;
-    if laws.is_empty() || nothing_bends && near {
-        return None;
-    }
     let (own, linear) = refit(data.clone(), iterations);
     let segments = &own.stack.segments;
     let whole: Vec<(&Run, usize)> = means.iter().zip(segments).map(|(m, s)| (m, s.runs.len())).collect();
@@ -115,6 +106,21 @@ pub(in crate::diagnose) fn cleared(
         return None;
     }
     say("a plant cleared of what bends it");
+    let widths = smoothings(&means);
+    let balances = widths.iter().flat_map(|&w| SLIDES.map(|s| Balance::of(data, &means, w, s)));
+    let mut laws: Vec<(f64, Balanced)> = balances.flat_map(|b| b.laws()).collect();
+    if laws.is_empty() {
+        return None;
+    }
+    let bent = LazyCell::new(|| -> Vec<Curved> {
+        let all = curves(&widths.iter().map(|&w| Balance::of(data, &means, w, 0.0)).collect::<Vec<_>>());
+        all.into_iter().filter(|c| c.share < CLEARED_TELLS).collect()
+    });
+    let zero = vec![0.0; data.form.free_parameters.len()];
+    let near = data.fit(vec![]).cost(&zero) < CLEARED_FAR * CLEARED_FAR * data.stack.total as f64;
+    if near && laws.iter().all(|(share, _)| *share >= CLEARED_TELLS) && bent.is_empty() {
+        return None;
+    }
     laws.sort_by(|a, b| a.0.total_cmp(&b.0));
     laws.truncate(TRIED);
     // What sticks is shaken by each record's own noise, and the mean of repeats has less of it.
@@ -126,7 +132,7 @@ pub(in crate::diagnose) fn cleared(
     if let Some(stands) = firsts.beside_given(&laws) {
         return Some(Cleared { given_stands: true, ..firsts.cleared(&stands) });
     }
-    let best = tried.of_curves(bent, tried.of_laws(&laws)).map(|best| tried.with_modes(best));
+    let best = tried.of_curves(&bent, tried.of_laws(&laws)).map(|best| tried.with_modes(best));
     let best = best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least)?;
     if !(repeated && best.drags()) {
         return Some(tried.cleared(&best));
@@ -205,14 +211,14 @@ impl Tried<'_> {
         body_descended(ground, model, &self.whole)
     }
 
-    /// The same with its modes fitted too, where something but the noise is left.
+    /// The same with its modes fitted too, where that is clearly better: where further physics is missing, modes bend to stand in for it.
     fn with_modes(&self, best: Fitted) -> Fitted {
         if self.done(best.left) {
             return best;
         }
         let Some(model) = descended(&best.ground, &best.model, None, &self.whole) else { return best };
         let left = self.left(&best.ground, &model);
-        if left < best.left { Fitted { left, model, ..best } } else { best }
+        if left < CLEARED_FULLER * best.left { Fitted { left, model, ..best } } else { best }
     }
 
     /// The best law beside the plant as given, where both leave hardly more than the noise: then nothing bent that plant.
@@ -288,12 +294,12 @@ impl Tried<'_> {
     }
 
     /// A curve without a name in the place of the best law, where it leaves far less.
-    fn of_curves(&self, bent: Vec<Curved>, mut best: Option<Fitted>) -> Option<Fitted> {
+    fn of_curves(&self, bent: &impl Deref<Target = Vec<Curved>>, mut best: Option<Fitted>) -> Option<Fitted> {
         let most = best.as_ref().map_or(f64::INFINITY, |b| b.left);
         if self.done(most) {
             return best;
         }
-        for c in bent.into_iter().take(CURVES) {
+        for c in bent.iter().take(CURVES) {
             let law = c.shape.effect();
             let law = law.map(|setting| SelectedEffect { setting, continuous: Vec::new(), range: Vec::new(), step: 0 });
             let (ground, model) = self.model(&c.plant, law);

@@ -232,15 +232,20 @@ impl Balance<'_> {
         let knots = self.knots(port)?;
         let rows = self.rows(Some(port), &weights);
         let rough = knots.roughness();
-        let shares: Vec<f64> = match port.is_of_command() {
-            true => (0..DELAYS).map(|k| k as f64 / (DELAYS - 1) as f64).collect(),
-            false => vec![0.0],
+        let early = self.curve_columns(port, &knots, &weights, 0.0);
+        let tried: Vec<(f64, Vec<f64>, f64)> = if port.is_of_command() {
+            let late = self.curve_columns(port, &knots, &weights, 1.0);
+            let at = |share: f64| {
+                let between = |(a, b): (&f64, &f64)| (1.0 - share) * a + share * b;
+                let column = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(between).collect();
+                let columns: Vec<Vec<f64>> = early.iter().zip(&late).map(column).collect();
+                self.foretold(&rows, &columns, &rough).map(|(error, x)| (error, x, share))
+            };
+            (0..DELAYS).into_par_iter().filter_map(|k| at(k as f64 / (DELAYS - 1) as f64)).collect()
+        } else {
+            self.foretold(&rows, &early, &rough).map(|(error, x)| (error, x, 0.0)).into_iter().collect()
         };
-        let tried = shares.into_iter().filter_map(|share| {
-            let columns = self.curve_columns(port, &knots, &weights, share);
-            self.foretold(&rows, &columns, &rough).map(|(error, x)| (error, x, share))
-        });
-        let (error, x, share) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (error, x, share) = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
         self.made(port, knots, &x, share, rows.plant.len(), error / linear)
     }
 

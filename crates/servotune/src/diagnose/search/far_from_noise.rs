@@ -5,13 +5,17 @@ use super::residual_screen::in_simulation;
 use super::selection::Step;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::output_error_fit::simulated;
+use crate::diagnose::fit::output_error_fit::{roughly_simulated, simulated, simulated_from};
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::rules::FAR_FROM_NOISE;
 use crate::physics::Effect;
 
 /// Laws of a step that are fitted by simulation then: each takes as long as the last fit of all.
 const SIMULATED: usize = 1;
+/// Laws that are fitted in full beside a model that stands by simulation, and times the least excess from which one that was fitted loosely
+/// is given up.
+const IN_FULL: usize = 2;
+const HOPELESS: f64 = 2.0;
 
 /// Whether no law of a step comes near the noise.
 pub(super) fn deep(step: &Step) -> bool {
@@ -46,8 +50,32 @@ pub(super) fn felt_scan(data: &DiagnosisData, library: &[&'static dyn Effect], m
     Step { before: model.evidence, candidates, tried: Vec::new(), taken: None }
 }
 
+/// Models with one law more, by the place of that law in a scan: each is fitted loosely, and those that leave least are fitted in full.
+pub(super) fn felt_trials(
+    data: &DiagnosisData,
+    model: &Model,
+    all: Vec<(usize, Vec<SelectedEffect>)>,
+    say: &mut dyn FnMut(&SelectedEffect),
+) -> Vec<(usize, Model)> {
+    let mut rough: Vec<(usize, Model)> = Vec::new();
+    for (i, chosen) in all {
+        chosen.last().into_iter().for_each(&mut *say);
+        rough.extend(roughly_simulated(data, &with(model, chosen)).map(|m| (i, m)));
+    }
+    rough.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+    let Some(least) = rough.first().map(|(_, m)| m.excess().max(m.sigma)) else { return Vec::new() };
+    rough.retain(|(_, m)| m.excess() < HOPELESS * least);
+    rough.truncate(IN_FULL);
+    rough.into_iter().filter_map(|(i, m)| Some((i, in_full(data, model, &m)?))).collect()
+}
+
 /// A model with one law more, all of it fitted by simulation; none where nothing is won.
-pub(super) fn felt_trial(data: &DiagnosisData, model: &Model, chosen: Vec<SelectedEffect>) -> Option<Model> {
+fn felt_trial(data: &DiagnosisData, model: &Model, chosen: Vec<SelectedEffect>) -> Option<Model> {
+    in_full(data, model, &with(model, chosen))
+}
+
+/// A model with other laws, still to be fitted.
+fn with(model: &Model, chosen: Vec<SelectedEffect>) -> Model {
     let numbers = |c: &[SelectedEffect]| -> usize {
         let strengths = |c: &SelectedEffect| if c.setting.facts().fixed { 0 } else { c.setting.strengths.len() };
         c.iter().map(|c| strengths(c) + c.continuous.iter().filter(|c| **c).count()).sum()
@@ -58,7 +86,12 @@ pub(super) fn felt_trial(data: &DiagnosisData, model: &Model, chosen: Vec<Select
     start.refitted.directions = vec![vec![0.0; count]];
     start.freedom -= (numbers(&chosen) - numbers(&model.chosen)) as f64;
     start.chosen = chosen;
-    let s = simulated(data, &start).filter(|s| s.cost < model.cost && s.possible())?;
+    start
+}
+
+/// A model fitted by simulation from a start; none where nothing is won.
+fn in_full(data: &DiagnosisData, model: &Model, start: &Model) -> Option<Model> {
+    let s = simulated_from(data, start, f64::INFINITY).filter(|s| s.cost < model.cost && s.possible())?;
     let evidence = model.evidence + s.cost - model.cost;
     Some(Model { evidence, ..s })
 }

@@ -8,7 +8,7 @@ use super::selection::{Step, gain_of};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::begun;
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::output_error_fit::simulated;
+use crate::diagnose::fit::output_error_fit::{roughly_simulated, simulated};
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::rules::{OWN_OF_RECORD, RIVAL_BETTER, RIVAL_DOUBT, SIMULATION_NO_JUDGE, USUAL_LAW};
 
@@ -22,6 +22,9 @@ pub(in crate::diagnose) fn more(data: &DiagnosisData, law: &SelectedEffect, than
     };
     of(law) - of(than)
 }
+
+/// Times what counts by which a model that was fitted loosely must be worse than another for it not to be fitted in full.
+pub(super) const ROUGH_TELLS: f64 = 2.0;
 
 /// Costs of the rivals of one family by simulation; one that is better there takes the place.
 pub(in crate::diagnose) fn by_simulation(
@@ -40,6 +43,11 @@ pub(in crate::diagnose) fn by_simulation(
         let mut best: Option<(f64, usize, Model)> = None;
         for (i, r) in rivals[at].iter_mut().enumerate() {
             if r.cost - model.cost >= width {
+                continue;
+            }
+            let Some(rough) = roughly_simulated(data, &r.model) else { continue };
+            r.cost = model.cost + (rough.cost - by_simulation.cost);
+            if rough.cost - by_simulation.cost > ROUGH_TELLS * width {
                 continue;
             }
             let Some(s) = simulated(data, &r.model) else { continue };

@@ -8,7 +8,7 @@ use super::bootstrap::bootstrap;
 use super::bootstrap_chance::Bootstrap;
 use super::candidate::{Candidate, has_own_period};
 use super::drift_test::follows_motion;
-use super::far_from_noise::{by_simulation_first, deep, felt_scan, felt_trial, foretold};
+use super::far_from_noise::{by_simulation_first, deep, felt_scan, felt_trials, foretold};
 use super::residual_screen::leftover;
 use super::rival::by_simulation;
 use super::select_settings::SelectSettings;
@@ -20,6 +20,7 @@ use crate::diagnose::fit::fitted_model::begun;
 use crate::diagnose::fit::fitted_model::{fitted, fitted_from_both, refit, settled, taken_by_last};
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_fit::simulated;
+use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{
     BESIDE_DRAG, DOWN_TO_NOISE, FORM_OF_SIMULATED, FOURTH_ADDS, LINEAR_FURTHER, LINEAR_OF_GAIN, OWN_OF_RECORD,
@@ -136,16 +137,19 @@ impl Search<'_> {
     /// Refits the model with each candidate that is worth it.
     fn try_each(&self, step: &mut Step, progress: &mut dyn FnMut(&str)) {
         let Search { data, settings, model, felt, .. } = self;
-        let worth = Shortlist { data, laws: self.library.len(), settings, model, felt: *felt };
-        for i in worth.of(step) {
-            let c = &step.candidates[i];
-            progress(&format!("refit with {}", c.setting.facts().name));
-            let mut chosen = model.chosen.clone();
-            chosen.push(c.chosen(self.steps.len()));
-            if *felt {
-                step.tried.extend(felt_trial(data, model, chosen).map(|m| (i, m)));
-                continue;
-            }
+        let worth = Shortlist { data, laws: self.library.len(), settings, model, felt: *felt }.of(step);
+        let with = |i: usize| {
+            let own = step.candidates[i].chosen(self.steps.len());
+            (i, model.chosen.iter().cloned().chain([own]).collect::<Vec<_>>())
+        };
+        let all: Vec<_> = worth.into_iter().map(with).collect();
+        let mut say = |c: &SelectedEffect| progress(&format!("refit with {}", c.setting.facts().name));
+        if *felt {
+            step.tried = felt_trials(data, model, all, &mut say);
+            return;
+        }
+        for (i, chosen) in all {
+            chosen.last().into_iter().for_each(&mut say);
             let mut tried = fitted_from_both(data, &chosen, &model.refitted.p, settings.iterations);
             if !data.noise_known {
                 tried = settled(data, tried, settings.iterations);

@@ -124,5 +124,5 @@ pub(in crate::diagnose) fn strongest(data: &DiagnosisData, library: &[&'static d
     possible.map(|c| c.log_p_value(library.len())).fold(0.0, f64::min)
 }
 
-/// Laws that are tried beside a model that stands by simulation: each takes as long as the last fit of all.
-pub(super) const FELT: usize = 2;
+/// Laws that are tried beside a model that stands by simulation.
+const FELT: usize = 5;

@@ -29,8 +29,8 @@ pub(super) fn scan_at(
 pub(in crate::diagnose) fn scan(data: &DiagnosisData, library: &[&'static dyn Effect], model: &Model) -> Step {
     let mut candidates = scan_at(data, library, model, &model.refitted.p);
     // A law without a strength of its own (a lag, a limit), or a vibration that a known mode has moved to stand in for, is not straight
-    // in the linear parameters: it is looked for around the given plant too.
-    if model.chosen.is_empty() && model.excess_sigma() > REFIT_HIDES {
+    // in the linear parameters: it is looked for around the given plant too, unless that one was cleared of a law, which is the hidden one.
+    if model.chosen.is_empty() && data.foretold.is_none() && model.excess_sigma() > REFIT_HIDES {
         // Where the refit is far from the noise, any law may have bent it.
         let far = model.excess_sigma() > FAR_FROM_NOISE;
         let crooked = |e: &&'static dyn Effect| far || e.facts().fixed || e.facts().port == Port::Structure;

@@ -11,7 +11,7 @@ use crate::diagnose::fit::simulation::Simulation;
 use crate::diagnose::rules::{
     Answer, BELOW_NOISE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, Consulted, DECISIVE_LEFT, DECISIVE_RIVAL,
     DECISIVE_SHARE, HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_FAR, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LAW_SHORT,
-    LEFTOVER, MIXTURE_LAWS, NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, asked,
+    LEFTOVER, MIXTURE_LAWS, MIXTURE_LEFT, NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, asked,
 };
 use crate::diagnose::search::residual_effect::ResidualEffect;
 use crate::diagnose::search::selection::Selection;
@@ -144,7 +144,15 @@ fn said_rejected(c: &Confirmation) -> String {
 
 fn mixture(l: &Laws) -> Answer {
     let laws = l.model.chosen.len() as f64;
-    Answer::from(l.facts.data.noise_known) & asked!(laws, MIXTURE_LAWS: l.facts.selection.mixture())
+    Answer::from(l.facts.data.noise_known) & asked!(laws, MIXTURE_LAWS: l.facts.selection.mixture()) & stand_in(l)
+}
+
+/// Whether several laws may only stand in for one: those that bring records which were held out down to the noise do not.
+fn stand_in(l: &Laws) -> Answer {
+    l.facts.whitened.map_or(true.into(), |[refit, after]| {
+        let left = (after - 1.0) / (refit - 1.0);
+        asked!(left, MIXTURE_LEFT: !(refit > 1.0 && left < MIXTURE_LEFT))
+    })
 }
 
 fn said_mixture(model: &Model) -> String {
@@ -185,7 +193,8 @@ fn decisive(l: &Laws) -> Answer {
 fn too_many(l: &Laws) -> Answer {
     let laws = l.model.chosen.len();
     let two = Answer::from(laws > 1) & !l.clean.clone() & asked!(l.explained, < NAMED_SHARE_OF_SEVERAL);
-    Answer::from(l.beside.is_some()) & (Answer::from(laws > 2) | two)
+    let many = Answer::from(laws > 2) & stand_in(l);
+    Answer::from(l.beside.is_some()) & (many | two)
 }
 
 /// Where all noise is the encoder's rounding, it is no draw of chance, and what fits it takes nothing of other records.

@@ -103,7 +103,7 @@ impl<'a> Reporting<'a> {
     /// Root mean square over the fit records, each simulated by a model that was fitted without it, beside that of the given plant.
     fn left_out(&self, model: &Model, given: &Offer) -> Option<[f64; 2]> {
         let whole: Vec<(&Run, usize)> = self.material(model);
-        let cut: Vec<(Run, usize)> = stretches(&whole);
+        let cut: Vec<(Run, usize)> = stretches(&whole, self.data.scene.sample_time_s);
         let (mut own, mut plain, mut count) = (0.0, 0.0, 0.0);
         for fold in 0..2 {
             let part = |keep: usize| -> Vec<(&Run, usize)> {
@@ -137,7 +137,7 @@ impl<'a> Reporting<'a> {
 }
 
 /// The runs, cut where there are few of them.
-fn stretches(runs: &[(&Run, usize)]) -> Vec<(Run, usize)> {
+fn stretches(runs: &[(&Run, usize)], sample_time_s: f64) -> Vec<(Run, usize)> {
     let pieces = STRETCHES.div_ceil(runs.len().max(1));
     let mut all = Vec::new();
     for (run, count) in runs {
@@ -145,7 +145,7 @@ fn stretches(runs: &[(&Run, usize)]) -> Vec<(Run, usize)> {
         let mut from = 0;
         while from < run.len() {
             let to = if run.len() - from < 2 * length { run.len() } else { from + length };
-            all.push((run.stretch(from, to), *count));
+            all.push((run.stretch(from, to, sample_time_s), *count));
             from = to;
         }
     }
