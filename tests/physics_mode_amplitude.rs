@@ -123,7 +123,6 @@ fn the_simulation_goes_with_duffings_equation() {
         curve: None,
     });
     let found = simulated(&with, &u);
-    eprintln!("{} {} {}", off(&truth, &linear), off(&truth, &found), rms(&linear));
     assert!(off(&truth, &found) < 0.1 * off(&truth, &linear), "{} {}", off(&truth, &found), off(&truth, &linear));
 }
 
