@@ -1,6 +1,7 @@
 //! Time and memory of a whole diagnosis: 20 records of 6000 samples, three of 100 000, ten of 100 000; the whole library, no bootstrap.
 //!
-//! `cargo bench --bench diagnose [-- --out FOLDER]` prints the table; with `--out` it is also written to `FOLDER/speed.md`. Machines: the
+//! `cargo bench --bench diagnose [-- --out FOLDER] [--row N --keep FOLDER]` prints the table; with `--out` it is also written to
+//! `FOLDER/speed.md`. `--row` makes one row only, and `--keep` writes its case and leaves it there. Machines: the
 //! paper's tunable one with nothing missing and with one, two or three effects. Records are made by `twin::recording` and written to files
 //! before the clock starts; reading them counts. Memory is the peak of this process since the case was begun, where the system tells it.
 #![allow(clippy::print_stdout)]
@@ -105,7 +106,10 @@ fn peak_mib() -> f64 {
 
 fn run() -> Outcome<()> {
     let words: Vec<String> = std::env::args().collect();
-    let out = words.iter().position(|w| w == "--out").and_then(|i| words.get(i + 1)).map(PathBuf::from);
+    let option = |name: &str| words.iter().position(|w| w == name).and_then(|i| words.get(i + 1));
+    let out = option("--out").map(PathBuf::from);
+    let only: Option<usize> = option("--row").map(|n| n.parse()).transpose()?;
+    let keep = option("--keep").map(PathBuf::from);
     let friction = || Setting::new(PivotFriction::of(2.5, Loading::Dahl), vec![0.012]);
     // 8 % less torque at the ends of the travel.
     let rolloff = || Setting::new(TorqueFactorRolloff { shape: Shape::Parabola }, vec![0.0, 0.08, 0.0, 0.0]);
@@ -123,8 +127,12 @@ fn run() -> Outcome<()> {
     let mut page = String::from(
         "| machine | records | samples of each | verdict | findings | wall (s) | processor (s) | memory (MiB) |\n|---|---|---|---|---|---|---|---|\n",
     );
-    for (name, effects, samples, records) in machines {
-        let folder = std::env::temp_dir().join(format!("servotune-speed-{}", std::process::id()));
+    for (row, (name, effects, samples, records)) in machines.into_iter().enumerate() {
+        if only.is_some_and(|n| n != row + 1) {
+            continue;
+        }
+        let own = std::env::temp_dir().join(format!("servotune-speed-{}", std::process::id()));
+        let folder = keep.clone().unwrap_or(own);
         write_case(&folder, &effects, samples, records)?;
         forget_peak();
         let (clock, cpu) = (Instant::now(), cpu_s());
@@ -148,7 +156,9 @@ fn run() -> Outcome<()> {
         );
         println!("{row}");
         writeln!(page, "{row}")?;
-        std::fs::remove_dir_all(&folder)?;
+        if keep.is_none() {
+            std::fs::remove_dir_all(&folder)?;
+        }
     }
     if let Some(out) = out {
         let cores = std::thread::available_parallelism().map_or(0, usize::from);
