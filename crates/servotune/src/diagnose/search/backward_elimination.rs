@@ -67,12 +67,13 @@ pub(super) fn spare(
             let c = &model.chosen[i];
             !drag(c) && (if dragged { small(c) } else { all } || by_simulation.is_silent(i))
         };
-        let c = |at: usize| &model.chosen[at];
         for at in (0..model.chosen.len()).filter(|&i| asked(i)) {
             let mut chosen = model.chosen.clone();
             chosen.remove(at);
             let less = fitted(data, chosen, &model.refitted.p, iterations);
-            let dear = |m: &Model| m.cost - by_simulation.cost > ROUGH_TELLS * worth(c(at), price, before - m.cost);
+            let dear = |m: &Model| {
+                m.cost - by_simulation.cost > ROUGH_TELLS * worth(&model.chosen[at], price, before - m.cost)
+            };
             let near = roughly_simulated(data, &less).filter(|m| !dear(m));
             if let Some(s) = near.and_then(|_| simulated(data, &less)) {
                 without.push((at, less, s));
