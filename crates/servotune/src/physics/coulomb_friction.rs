@@ -110,12 +110,6 @@ struct Slider {
     z: f64,
 }
 
-impl Slider {
-    fn moved(&self, from: &Sample, to: &Sample) -> f64 {
-        dahl(self.z, to.x - from.x, self.length)
-    }
-}
-
 /// Drag at a speed over its level at high speed.
 fn level(stribeck: Option<Stribeck>, v: f64) -> f64 {
     stribeck.map_or(1.0, |s| 1.0 + s.rise * (-(v / s.speed).powi(2)).exp())
@@ -138,7 +132,11 @@ impl Law for Slider {
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
-        self.z = self.moved(from, to);
+        self.went(to.x - from.x);
+    }
+
+    fn went(&mut self, way: f64) {
+        self.z = dahl(self.z, way, self.length);
     }
 }
 
@@ -167,6 +165,10 @@ impl Law for Bristles {
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
         self.z = self.moved(from, to)[0];
+    }
+
+    fn went(&mut self, way: f64) {
+        self.z = dahl(self.z, way, self.length);
     }
 }
 

@@ -364,4 +364,13 @@ pub trait Law: Send {
 
     /// Takes the step for good.
     fn commit(&mut self, _from: &Sample, _to: &Sample) {}
+
+    /// Goes a way without a turn, before the record begins (position_unit): for what remembers ways and not time.
+    fn went(&mut self, _way: f64) {}
+
+    /// Goes along all turns before a record to where it begins, scaled from the recorded position to the arm's.
+    fn led(&mut self, turned: &[f64], begins: f64, scale: f64) {
+        let next = turned.iter().skip(1).chain([&begins]);
+        turned.iter().zip(next).for_each(|(from, to)| self.went(scale * (to - from)));
+    }
 }

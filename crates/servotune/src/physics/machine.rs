@@ -155,6 +155,13 @@ impl Machine {
         self
     }
 
+    /// The same machine, its laws led along the turns before it began to where it begins.
+    pub fn led_by(mut self, turned: &[f64]) -> Machine {
+        let (begins, scale) = (self.x[0], self.arm);
+        self.torque.iter_mut().for_each(|p| p.law.led(turned, begins, scale));
+        self
+    }
+
     /// The free motion at a sample.
     fn free_motions(&self, k: usize) -> f64 {
         self.free.get(k).copied().unwrap_or(0.0)

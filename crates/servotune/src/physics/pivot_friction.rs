@@ -112,7 +112,11 @@ impl Law for Dahl {
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
-        self.z = dahl(self.z, to.x - from.x, self.length);
+        self.went(to.x - from.x);
+    }
+
+    fn went(&mut self, way: f64) {
+        self.z = dahl(self.z, way, self.length);
     }
 }
 
@@ -166,7 +170,11 @@ impl Law for MaxwellSlip {
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
-        self.stretch = self.moved(to.x - from.x);
+        self.went(to.x - from.x);
+    }
+
+    fn went(&mut self, way: f64) {
+        self.stretch = self.moved(way);
     }
 }
 

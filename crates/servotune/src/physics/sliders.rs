@@ -55,6 +55,10 @@ impl Law for Loading {
     }
 
     fn commit(&mut self, from: &Sample, to: &Sample) {
-        self.sliders.go(to.x - from.x);
+        self.went(to.x - from.x);
+    }
+
+    fn went(&mut self, way: f64) {
+        self.sliders.go(way);
     }
 }

@@ -9,3 +9,4 @@ pub(super) mod run;
 pub(super) mod slip;
 pub(super) mod stacked_records;
 pub(super) mod time_shift;
+pub(super) mod turning_points;

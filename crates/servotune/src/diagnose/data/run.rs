@@ -1,5 +1,6 @@
 //! A record made ready: what acted on the plant, what it answered, and whose repeat it is.
 
+use super::turning_points::{newest, turning_points};
 use crate::diagnose::rules::LAP_DIGITS;
 use crate::numeric::statistics::mean;
 use crate::recording::{Case, Record, Role};
@@ -15,6 +16,8 @@ pub struct Run {
     pub began_s: f64,
     /// When it begins in the record that it is an excerpt of (s).
     pub from_s: f64,
+    /// Positions at which it turned round before then, oldest first, from where the record began; none where it begins with its record.
+    pub turned: Vec<f64>,
     /// Index of its repeat group; each record without one is a group of its own.
     pub group: usize,
     /// Reference (position_unit), where recorded.
@@ -64,7 +67,9 @@ impl Run {
     pub fn stretch(&self, from: usize, to: usize, sample_time_s: f64) -> Run {
         let cut = |x: &[f64]| x[from..to].to_vec();
         let may = |x: &Option<Vec<f64>>| x.as_deref().map(cut);
+        let before = turning_points(&self.position[..from]);
         Run {
+            turned: newest([&self.turned[..], &before].concat()),
             began_s: self.began_s + from as f64 * sample_time_s,
             from_s: self.from_s + from as f64 * sample_time_s,
             reference: may(&self.reference),
@@ -190,6 +195,7 @@ pub fn runs(case: &Case, controlled: bool) -> Vec<Run> {
                 role: entry.role,
                 began_s,
                 from_s: 0.0,
+                turned: Vec::new(),
                 group,
                 rested: still(reference.unwrap_or_default()) >= AT_REST.min(record.position.len()),
                 shocked: false,

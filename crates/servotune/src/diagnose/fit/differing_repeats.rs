@@ -28,7 +28,7 @@ impl Difference {
         let free = |n: usize| free_motions(&data.form.given.body, t, n).to_vec();
         for (s, motion) in data.stack.segments.iter().zip(&data.trajectories).filter(|(s, _)| s.runs.len() > 1) {
             let answer = |(&run, own): (&usize, &Vec<Sample>)| {
-                let column = columns_along(law, &data.scene, own).swap_remove(0);
+                let column = columns_along(law, &data.scene, own, &motion.turned).swap_remove(0);
                 let mut y = vec![0.0; s.len];
                 sampled.delayed.add_response(&column, &mut y);
                 (run, y)

@@ -134,8 +134,7 @@ impl Problem<'_, '_> {
 /// Recorded position less the linear answer to the recorded command alone: repeats differ by noise, and of what drives them by this.
 pub fn linear_error(sampled: &Sampled, nominal: &NominalModel, run: &Run) -> Vec<f64> {
     let plain = NominalModel { spring: 0.0, damper: 0.0, ..nominal.clone() };
-    let still = Trajectory { samples: Vec::new(), unexplained: Vec::new(), repeats: Vec::new() };
-    simulation_error(sampled, &plain, &[], run, &still, 0)
+    simulation_error(sampled, &plain, &[], run, &Trajectory::default(), 0)
 }
 
 /// Recorded position less the nominal's answer to the recorded command, with changes of the body and all effects driven by

@@ -83,20 +83,25 @@ pub(super) fn entering(
 pub fn raw_columns(law: &AnyLaw, scene: &Scene, trajectory: &Trajectory) -> Vec<Vec<f64>> {
     let samples = &trajectory.samples;
     if !law.effect().is_hard_nonlinearity() || trajectory.repeats.is_empty() {
-        return columns_along(law, scene, samples);
+        return columns_along(law, scene, samples, &trajectory.turned);
     }
     let share = 1.0 / trajectory.repeats.len() as f64;
     let mut mean = vec![vec![0.0; samples.len()]; law.facts().columns];
     for own in &trajectory.repeats {
-        for (mean, column) in mean.iter_mut().zip(columns_along(law, scene, own)) {
+        for (mean, column) in mean.iter_mut().zip(columns_along(law, scene, own, &trajectory.turned)) {
             mean.iter_mut().zip(&column).for_each(|(m, c)| *m += share * c);
         }
     }
     mean
 }
 
-/// The columns of an effect along a motion.
-pub(in crate::diagnose) fn columns_along(law: &AnyLaw, scene: &Scene, samples: &[Sample]) -> Vec<Vec<f64>> {
+/// The columns of an effect along a motion that turned there before.
+pub(in crate::diagnose) fn columns_along(
+    law: &AnyLaw,
+    scene: &Scene,
+    samples: &[Sample],
+    turned: &[f64],
+) -> Vec<Vec<f64>> {
     let facts = law.facts();
     let n = samples.len();
     let mut moving = law.in_motion(scene);
@@ -104,6 +109,9 @@ pub(in crate::diagnose) fn columns_along(law: &AnyLaw, scene: &Scene, samples: &
     let mut value = [0.0; COLUMNS];
     let by = if facts.entry == Entry::Torque { scene.arm_over_record() } else { 1.0 };
     let ahead = usize::from(facts.entry == Entry::Torque);
+    if let Some(first) = samples.first() {
+        moving.led(turned, first.x, by);
+    }
     for k in 0..n {
         // A torque's column belongs to the interval that starts at the sample, the others' to the sample itself.
         let (from, to): (&Sample, &Sample) = if ahead == 1 {

@@ -59,7 +59,7 @@ struct Answer {
 fn answer(data: &DiagnosisData, sampled: &Sampled, n: usize, width_s: f64) -> Option<Answer> {
     let t = data.scene.sample_time_s;
     let samples = (0..n).map(|k| Sample { t: k as f64 * t, ..Sample::default() }).collect();
-    let motion = Trajectory { samples, unexplained: Vec::new(), repeats: Vec::new() };
+    let motion = Trajectory { samples, ..Trajectory::default() };
     let raw = raw_columns(&Shock { time_s: 0.0, width_s }.into(), &data.scene, &motion);
     let mut y = vec![0.0; n];
     sampled.direct.add_response(&raw[0], &mut y);

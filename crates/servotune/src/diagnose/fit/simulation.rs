@@ -91,7 +91,7 @@ impl<'a> SimulatedModel<'a> {
                 ..Sample::default()
             })
             .collect();
-        let motion = Trajectory { samples, unexplained: Vec::new(), repeats: Vec::new() };
+        let motion = Trajectory { samples, ..Trajectory::default() };
         for law in &self.own {
             for column in raw_columns(law, self.scene, &motion) {
                 let mut y = vec![0.0; column.len()];
@@ -311,7 +311,7 @@ fn simulate(
     if let Some(torque) = constant_torque {
         machine = machine.held_by(torque, model.gain_at_rest());
     }
-    let mut machine = machine.carried_by(free);
+    let mut machine = machine.carried_by(free).led_by(&run.turned);
     let t = model.scene.sample_time_s;
     let spindle = model.scene.spindle_hz.unwrap_or(0.0) * TAU;
     // The controller hears what further inputs move, too.

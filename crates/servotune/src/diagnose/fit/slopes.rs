@@ -157,6 +157,7 @@ mod tests {
         let (command, excitation) = (column(2), column(1));
         Run {
             from_s: 0.0,
+            turned: vec![],
             name: format!("r{seed}"),
             role: Role::Fit,
             began_s: 0.0,

@@ -12,7 +12,7 @@ use crate::physics::Sample;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 /// A smoothed record.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
     /// Motion at every sample.
     pub samples: Vec<Sample>,
@@ -20,6 +20,8 @@ pub struct Trajectory {
     pub unexplained: Vec<f64>,
     /// Motion of each of the repeats behind it; empty where it is of one record.
     pub repeats: Vec<Vec<Sample>>,
+    /// Where it turned round before the first sample, oldest first.
+    pub turned: Vec<f64>,
 }
 
 /// The mean command that acts on the arm from each sample to the next; `before` stood before the first.
@@ -183,7 +185,8 @@ impl Smoother {
                 temperature: run.temperature.as_ref().map_or(0.0, |c| c[k]),
             })
             .collect();
-        Trajectory { samples, unexplained: after.iter().map(|z| z[2]).collect(), repeats: Vec::new() }
+        let unexplained = after.iter().map(|z| z[2]).collect();
+        Trajectory { samples, unexplained, repeats: Vec::new(), turned: run.turned.clone() }
     }
 }
 

@@ -30,24 +30,7 @@ pub(in crate::diagnose) struct Stretches {
 
 /// Samples `from` to `to` of a run, as a run that begins in full motion.
 fn piece(run: &Run, from: usize, to: usize, sample_time_s: f64) -> Run {
-    let cut = |x: &Vec<f64>| x[from..to].to_vec();
-    Run {
-        began_s: run.began_s + from as f64 * sample_time_s,
-        reference: run.reference.as_ref().map(cut),
-        command: cut(&run.command),
-        excitation: cut(&run.excitation),
-        input: cut(&run.input),
-        position: cut(&run.position),
-        before: run.input[from],
-        origin: run.position[from],
-        rested: false,
-        pes: None,
-        spindle_rad: run.spindle_rad.as_ref().map(cut),
-        temperature: run.temperature.as_ref().map(cut),
-        further: run.further.iter().map(cut).collect(),
-        coupled: if run.coupled.is_empty() { Vec::new() } else { cut(&run.coupled) },
-        ..run.clone()
-    }
+    Run { rested: false, ..run.stretch(from, to, sample_time_s) }
 }
 
 impl Stretches {

@@ -46,7 +46,7 @@ rules! {
         "share of all gains from which one law leads the mixture",
         "judgement";
     MIXTURE_LEFT: f64 = 0.01, "share",
-        "what laws may leave on hold-out records of the linear refit's error above the noise and be no mixture",
+        "what laws may leave on hold-out records of the linear refit's error above the noise and be no mixture, where that share of it is above HELD_OUT_CLEAR",
         "judgement: a bearing, a torque factor and a grating together leave 0.005 in the bench of short records";
     CONFOUNDED: f64 = 0.9995, "share",
         "part of a law that the linear parameters can imitate above which it is not considered",

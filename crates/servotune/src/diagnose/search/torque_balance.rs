@@ -203,7 +203,7 @@ impl<'a> Balance<'a> {
         let mut from = 0;
         for (r, (part, run)) in self.parts.iter().zip(self.means).enumerate() {
             let to = from + part.rows.len();
-            let raw = law.map_or(Vec::new(), |l| columns_along(l, scene, &part.samples));
+            let raw = law.map_or(Vec::new(), |l| columns_along(l, scene, &part.samples, &run.turned));
             let mut u = run.input.clone();
             let enters = facts.map(|f| (f.entry, f.fixed));
             if let Some((Entry::Command, true)) = enters {

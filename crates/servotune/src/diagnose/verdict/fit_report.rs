@@ -24,12 +24,18 @@ pub(in crate::diagnose) fn fit_report(
     let given = Offer::of(given);
     // What further inputs move is an error of the given model, and a linear part of the other two.
     let recorded: Vec<&Run> = reporting.recorded.iter().collect();
-    let three = |closed: Option<&Law>| {
-        let [refit, fixed] = [&reported.refitted, &reported.fixed].map(|offer| reporting.errors(offer, &every, closed));
-        [reporting.errors(&given, &recorded, closed), refit, fixed]
+    let two = |closed: Option<&Law>| {
+        [reporting.errors(&given, &recorded, closed), reporting.errors(&reported.refitted, &every, closed)]
     };
-    let open = three(None);
-    let chosen = if closed.is_some() { three(closed) } else { open.clone() };
+    let [before, refit] = two(closed);
+    let chosen = [before, refit, reported.left.clone()];
+    let open = match closed {
+        Some(_) => {
+            let [before, refit] = two(None);
+            [before, refit, reporting.errors(&reported.fixed, &every, None)]
+        }
+        None => chosen.clone(),
+    };
     (figures_of(data, &every, [&open, &chosen], closed.is_some()), chosen, open)
 }
 

@@ -10,8 +10,8 @@ use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::simulation::Simulation;
 use crate::diagnose::rules::{
     Answer, BELOW_NOISE, CLEAN, CLEAN_EXPLAINS, CLEAN_HELD_OUT, Consulted, DECISIVE_LEFT, DECISIVE_RIVAL,
-    DECISIVE_SHARE, HELD_OUT_ABOVE, HELD_OUT_DOWN, HELD_OUT_FAR, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE, LAW_SHORT,
-    LEFTOVER, MIXTURE_LAWS, MIXTURE_LEFT, NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, asked,
+    DECISIVE_SHARE, HELD_OUT_ABOVE, HELD_OUT_CLEAR, HELD_OUT_DOWN, HELD_OUT_FAR, HELD_OUT_HOLDS, HELD_OUT_NO_WORSE,
+    LAW_SHORT, LEFTOVER, MIXTURE_LAWS, MIXTURE_LEFT, NAMED_SHARE, NAMED_SHARE_OF_SEVERAL, RESTLESS_RATIO, asked,
 };
 use crate::diagnose::search::residual_effect::ResidualEffect;
 use crate::diagnose::search::selection::Selection;
@@ -147,11 +147,12 @@ fn mixture(l: &Laws) -> Answer {
     Answer::from(l.facts.data.noise_known) & asked!(laws, MIXTURE_LAWS: l.facts.selection.mixture()) & stand_in(l)
 }
 
-/// Whether several laws may only stand in for one: those that bring records which were held out down to the noise do not.
+/// Whether several laws may only stand in for one: those that bring records which were held out down to the noise do not, where the linear refit
+/// leaves so much that an error of the noise's level cannot feign it.
 fn stand_in(l: &Laws) -> Answer {
     l.facts.whitened.map_or(true.into(), |[refit, after]| {
         let left = (after - 1.0) / (refit - 1.0);
-        asked!(left, MIXTURE_LEFT: !(refit > 1.0 && left < MIXTURE_LEFT))
+        asked!(left, MIXTURE_LEFT: !(MIXTURE_LEFT * (refit - 1.0) > HELD_OUT_CLEAR && left < MIXTURE_LEFT))
     })
 }
 

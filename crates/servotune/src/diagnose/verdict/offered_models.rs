@@ -15,6 +15,7 @@ use crate::diagnose::rules::{REFIT_BETTER, REFIT_FAR, SIMULATION_ALIKE, SIMULATI
 use crate::diagnose::search::selection::Selection;
 use crate::lti::Plant;
 use crate::numeric::digits::said;
+use crate::numeric::statistics::rms_of;
 use crate::recording::Role;
 
 /// Stretches that records are cut into where there are fewer of them.
@@ -41,6 +42,8 @@ impl Offer {
 pub(in crate::diagnose) struct Reported {
     pub refitted: Offer,
     pub fixed: Offer,
+    /// What the latter leaves of every run, as the report simulates it.
+    pub left: Vec<Vec<f64>>,
     /// Whether any linear refit is offered.
     pub refits: bool,
     /// Why the model of the search is not offered, where it is not.
@@ -152,19 +155,22 @@ fn stretches(runs: &[(&Run, usize)], sample_time_s: f64) -> Vec<(Run, usize)> {
     all
 }
 
-/// What a figure is compared with.
+/// What a model leaves of every run, and its root mean square by role.
 struct Measured {
+    left: Vec<Vec<f64>>,
     fit: f64,
     held: Option<f64>,
 }
 
 impl Reporting<'_> {
     fn measured(&self, offer: &Offer) -> Measured {
-        let held = self.of_role(Role::Holdout);
-        Measured {
-            fit: self.rms(offer, &self.of_role(Role::Fit)),
-            held: (!held.is_empty()).then(|| self.rms(offer, &held)),
-        }
+        let left = self.errors(offer, &self.runs.iter().collect::<Vec<_>>(), self.closed);
+        let of_role = |role: Role| {
+            let own = self.runs.iter().zip(&left).filter(|(r, _)| r.role == role && !r.shocked);
+            rms_of(own.flat_map(|(_, e)| e.iter().copied()))
+        };
+        let held = self.runs.iter().any(|r| r.role == Role::Holdout && !r.shocked);
+        Measured { fit: of_role(Role::Fit), held: held.then(|| of_role(Role::Holdout)), left }
     }
 
     fn samples(&self, role: Role) -> usize {
@@ -238,12 +244,18 @@ impl Reporting<'_> {
     }
 
     /// The corrected model that is offered, or why none is.
-    fn fixed_offer(&self, linear: &Offer, given: &Offer, of_given: &Measured) -> (Offer, Option<String>) {
+    fn fixed_offer(
+        &self,
+        linear: &Offer,
+        given: &Offer,
+        of_given: &Measured,
+    ) -> (Offer, Vec<Vec<f64>>, Option<String>) {
         let last = self.selection.last();
         let data = self.data;
         let made = |m: &Model| Offer { made: corrected(&data.form, &m.refitted.p, &m.chosen, &data.scene), full: true };
         let samples = self.samples(Role::Fit);
-        let least = of_given.fit.min(self.measured(linear).fit * (1.0 + SIMULATION_ALIKE));
+        let of_linear = self.measured(linear);
+        let least = of_given.fit.min(of_linear.fit * (1.0 + SIMULATION_ALIKE));
         let mut offer = made(last);
         let mut of_offer = self.measured(&offer);
         let unit = &data.form.given.position_unit;
@@ -258,14 +270,14 @@ impl Reporting<'_> {
                     error_said(of_offer.fit),
                     error_said(least)
                 );
-                return (linear.clone(), Some(why));
+                return (linear.clone(), of_linear.left, Some(why));
             };
             offer = made(&other);
             of_offer = self.measured(&offer);
         }
         match self.denied("the model with findings", &of_offer, of_given) {
-            Some(why) => (linear.clone(), Some(why)),
-            None => (offer, None),
+            Some(why) => (linear.clone(), of_linear.left, Some(why)),
+            None => (offer, of_offer.left, None),
         }
     }
 
@@ -275,10 +287,14 @@ impl Reporting<'_> {
         let of_given = self.measured(&given);
         let mut remarks = Vec::new();
         let (refitted, refits) = self.linear_offer(&given, &of_given, &mut remarks);
-        let (fixed, withdrawn) = match self.selection.model.chosen.is_empty() {
-            true => (Offer { full: true, ..refitted.clone() }, None),
+        let (fixed, left, withdrawn) = match self.selection.model.chosen.is_empty() {
+            true => {
+                let fixed = Offer { full: true, ..refitted.clone() };
+                let left = self.measured(&fixed).left;
+                (fixed, left, None)
+            }
             false => self.fixed_offer(&refitted, &given, &of_given),
         };
-        Reported { refitted, fixed, refits, withdrawn, remarks }
+        Reported { refitted, fixed, left, refits, withdrawn, remarks }
     }
 }
