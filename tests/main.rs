@@ -17,6 +17,7 @@ mod diagnose_report;
 mod diagnose_rules;
 mod diagnose_sealed;
 mod diagnose_slow;
+mod diagnose_starts;
 mod documentation;
 mod export;
 mod feedback_margins;

@@ -134,7 +134,7 @@ fn a_mode_that_hardens_is_named_and_measured() {
     for (g, size, role) in [("a", 0.02, Role::Fit), ("b", 0.06, Role::Fit), ("h", 0.05, Role::Holdout)] {
         let u = excitation(size, 60 + records.len() as u64);
         let y = duffing(&u, cubic);
-        for i in 0..if role == Role::Fit { 3 } else { 1 } {
+        for i in 0..if role == Role::Fit { 2 } else { 1 } {
             let y = y.iter().map(|y| y + NOISE * noise.normal()).collect();
             records.push(record(&format!("{g}{i}.csv"), role, g, &u, y));
         }

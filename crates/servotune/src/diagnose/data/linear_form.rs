@@ -2,8 +2,10 @@
 //!
 //! Parameters are relative to the plant that the case came with: 0 everywhere is that plant.
 
-use crate::lti::{Body, DiscretePlant, LtiError, Plant};
+use crate::lti::{Body, DiscretePlant, LtiError, Mode, Plant};
 use crate::physics::Sample;
+use nalgebra::Complex;
+use std::f64::consts::PI;
 
 /// One parameter of the linear plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -224,4 +226,52 @@ pub fn free_motions(body: &Body, sample_time_s: f64, n: usize) -> [Vec<f64>; 3] 
             })
             .collect()
     })
+}
+
+/// Samples over which a mode must ring to be seen.
+const RINGS: f64 = 4.0;
+/// Most commands on their way as a record begins, the newest.
+const ON_THEIR_WAY: usize = 32;
+
+/// What a record carries over from before it beside the body's motion, each of a size near 1: none where it begins at rest. A log may be cut out of a
+/// running machine, or its drive may set in with its first sample.
+pub fn carried_over(plant: &Plant, rested: bool, sample_time_s: f64, n: usize) -> Vec<Vec<f64>> {
+    if rested { Vec::new() } else { [ringing(plant, sample_time_s, n), arriving(plant, sample_time_s, n)].concat() }
+}
+
+/// What modes ring, two motions each; none of those that die within few samples or lie above half the sample rate.
+fn ringing(plant: &Plant, sample_time_s: f64, n: usize) -> Vec<Vec<f64>> {
+    let seen = |m: &&Mode| {
+        let (w, z) = (m.pole_rad_s * sample_time_s, m.pole_damping_ratio);
+        z < 1.0 && w < PI && z * w * RINGS < 1.0
+    };
+    let swing = |m: &Mode| {
+        let (w, z) = (m.pole_rad_s * sample_time_s, m.pole_damping_ratio);
+        let step = Complex::new(-z * w, w * (1.0 - z * z).sqrt()).exp();
+        let all: Vec<Complex<f64>> =
+            std::iter::successors(Some(Complex::new(1.0, 0.0)), |q| Some(q * step)).take(n).collect();
+        [all.iter().map(|q| q.re).collect(), all.iter().map(|q| q.im).collect::<Vec<f64>>()]
+    };
+    plant.modes.iter().filter(seen).flat_map(swing).collect()
+}
+
+/// What commands before the record make that the plant's delay still holds back: nobody recorded them.
+fn arriving(plant: &Plant, sample_time_s: f64, n: usize) -> Vec<Vec<f64>> {
+    let Some(delayed) = DiscretePlant::of(plant, sample_time_s).ok().filter(|_| plant.delay_s > 0.0) else {
+        return Vec::new();
+    };
+    let held_back = (delayed.whole_delay_samples() + 1).min(ON_THEIR_WAY);
+    let mut pulse = vec![0.0; n + held_back];
+    pulse[0] = 1.0;
+    let mut answer = vec![0.0; n + held_back];
+    delayed.add_response(&pulse, &mut answer);
+    let most = answer.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    answer.iter_mut().for_each(|v| *v /= most.max(f64::MIN_POSITIVE));
+    (1..=held_back).map(|early| answer[early..early + n].to_vec()).collect()
+}
+
+/// Motions that a record may begin with: free motions of the body under a constant torque, and what it carries over.
+pub fn starts(plant: &Plant, rested: bool, sample_time_s: f64, n: usize) -> Vec<Vec<f64>> {
+    let over = carried_over(plant, rested, sample_time_s, n);
+    free_motions(&plant.body, sample_time_s, n).into_iter().chain(over).collect()
 }

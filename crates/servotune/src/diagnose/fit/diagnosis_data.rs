@@ -7,7 +7,9 @@ use super::regressors::{Drive, drive, raw_columns};
 use super::selected_effect::SelectedEffect;
 use super::trajectory::{Smoother, Trajectory, acting, apart};
 use crate::diagnose::data::checks::{Grid, quantum};
-use crate::diagnose::data::linear_form::{LinearForm, NominalModel, Sampled, body_numbers, free_motions, free_scales};
+use crate::diagnose::data::linear_form::{
+    LinearForm, NominalModel, Sampled, body_numbers, free_motions, free_scales, starts,
+};
 use crate::diagnose::data::run::{Run, mean_run};
 use crate::diagnose::data::stacked_records::{NuisanceBasis, StackedRecords};
 use crate::diagnose::noise::lines::{Line, take_lines};
@@ -104,7 +106,8 @@ impl DiagnosisData {
         let p = vec![0.0; form.free_parameters.len()];
         let nominal = form.nominal(&p);
         let sampled = Sampled::of(&nominal.plant, sample_time_s)?;
-        let free = |n: usize| free_motions(&given.body, sample_time_s, n).to_vec();
+        let rested = fit_runs.iter().all(|&r| runs[r].rested);
+        let free = |n: usize| starts(given, rested, sample_time_s, n);
         let mut errors: Vec<(usize, Vec<f64>)> =
             fit_runs.iter().map(|&r| (r, linear_error(&sampled, &nominal, &runs[r]))).collect();
         let body = &nominal.plant.body;
@@ -170,8 +173,9 @@ impl DiagnosisData {
     pub fn renewed(mut self, p: &[f64], chosen: &[SelectedEffect]) -> DiagnosisData {
         let t = self.scene.sample_time_s;
         let left: Vec<(usize, Vec<f64>)> = self.fit(chosen.to_vec()).errors(p).into_iter().enumerate().collect();
-        let body = self.form.nominal(p).plant.body;
-        (self.levels, self.whitener, _) = noise_of(&left, &|n| free_motions(&body, t, n).to_vec(), &body, t, false);
+        let (plant, rested) = (self.form.nominal(p).plant, self.rested());
+        let free = |n: usize| starts(&plant, rested, t, n);
+        (self.levels, self.whitener, _) = noise_of(&left, &free, &plant.body, t, false);
         self.scene.noise = self.levels.sensor_rms;
         self
     }
@@ -179,12 +183,22 @@ impl DiagnosisData {
     /// Without repeats, the noise of what a plant and a law leave together in plain simulation, run by run: no error of the linear plant holds it
     /// alone where a law acts.
     pub fn with_noise(mut self, left: Vec<Vec<f64>>) -> DiagnosisData {
-        let (t, body) = (self.scene.sample_time_s, self.form.given.body.clone());
+        let (t, body) = (self.scene.sample_time_s, &self.form.given.body);
         let left: Vec<(usize, Vec<f64>)> = left.into_iter().enumerate().collect();
-        (self.levels, self.whitener, _) = noise_of(&left, &|n| free_motions(&body, t, n).to_vec(), &body, t, false);
+        (self.levels, self.whitener, _) = noise_of(&left, &|n| self.starts(n), body, t, false);
         self.scene.noise = self.levels.sensor_rms;
         self.noise_known = true;
         self
+    }
+
+    /// Whether every fitted record begins at rest.
+    fn rested(&self) -> bool {
+        self.fit_runs.iter().all(|&r| self.runs[r].rested)
+    }
+
+    /// Motions of the given plant that a fitted record of `n` samples may begin with.
+    pub fn starts(&self, n: usize) -> Vec<Vec<f64>> {
+        starts(&self.form.given, self.rested(), self.scene.sample_time_s, n)
     }
 
     /// Whether the plant has a spring: a free body drifts in simulation, and between repeats.
@@ -262,8 +276,7 @@ impl DiagnosisData {
 
     /// Errors of the mean runs with each one's own start taken out.
     pub fn without_starts(&self, errors: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-        let free = |n: usize| free_motions(&self.form.given.body, self.scene.sample_time_s, n).to_vec();
-        values(&without_start(&errors.into_iter().enumerate().collect::<Vec<_>>(), &free, &|_| {}))
+        values(&without_start(&errors.into_iter().enumerate().collect::<Vec<_>>(), &|n| self.starts(n), &|_| {}))
     }
 
     /// The error of a model on any run along its recorded motion, effects of each record's own left out.

@@ -6,7 +6,7 @@
 use super::diagnosis_data::DiagnosisData;
 use super::regressors::columns_along;
 use super::selected_effect::SelectedEffect;
-use crate::diagnose::data::linear_form::{Sampled, free_motions};
+use crate::diagnose::data::linear_form::Sampled;
 use crate::diagnose::data::repeat_difference::Difference;
 use crate::diagnose::noise::repeats::{noise_series, without_start};
 use crate::numeric::least_squares::dot;
@@ -24,8 +24,6 @@ impl Difference {
         if !law.effect().is_hard_nonlinearity() || law.facts().entry != Entry::Command {
             return sum;
         }
-        let t = data.scene.sample_time_s;
-        let free = |n: usize| free_motions(&data.form.given.body, t, n).to_vec();
         for (s, motion) in data.stack.segments.iter().zip(&data.trajectories).filter(|(s, _)| s.runs.len() > 1) {
             let answer = |(&run, own): (&usize, &Vec<Sample>)| {
                 let column = columns_along(law, &data.scene, own, &motion.turned).swap_remove(0);
@@ -39,7 +37,7 @@ impl Difference {
             }
             // Scaled like the records' own differences, of which one in so many is no information.
             let apart = noise_series(&answers, &data.runs);
-            let apart = without_start(&apart, &free, &|x| data.whitener.apply(x));
+            let apart = without_start(&apart, &|n| data.starts(n), &|x| data.whitener.apply(x));
             let repeats = s.runs.len() as f64;
             let by = (repeats - 1.0) / repeats * s.weight * s.weight / repeats;
             for (run, law) in &apart {

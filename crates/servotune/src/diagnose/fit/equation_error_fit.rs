@@ -5,7 +5,7 @@ use super::fit_inputs::Fit;
 use super::regressors::{Drive, Entering, drive, entering};
 use super::slopes::Slopes;
 use super::trajectory::Trajectory;
-use crate::diagnose::data::linear_form::{NominalModel, Sampled, free_motions};
+use crate::diagnose::data::linear_form::{NominalModel, Sampled, starts};
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::{NuisanceBasis, Segment};
 use crate::lti::Plant;
@@ -256,7 +256,7 @@ impl Fit<'_> {
         for (s, run) in self.stack.segments.iter().zip(self.means) {
             let t = self.scene.sample_time_s;
             let lines = self.lines.iter().flat_map(|l| l.columns(run, t));
-            for mut column in free_motions(&self.form.given.body, t, s.len).into_iter().chain(lines) {
+            for mut column in starts(&self.form.given, run.rested, t, s.len).into_iter().chain(lines) {
                 self.whitener.apply(&mut column);
                 basis.add_local(s.start, column);
             }

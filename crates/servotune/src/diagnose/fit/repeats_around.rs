@@ -5,7 +5,7 @@
 
 use super::diagnosis_data::DiagnosisData;
 use super::equation_error_fit::linear_error;
-use crate::diagnose::data::linear_form::{LinearForm, Sampled, free_motions};
+use crate::diagnose::data::linear_form::{LinearForm, Sampled};
 use crate::diagnose::noise::repeats::{in_laps, noise_series, values, without_start};
 use crate::diagnose::noise::torque_noise::Differences;
 use crate::lti::{LtiError, Plant};
@@ -19,7 +19,6 @@ pub(in crate::diagnose) fn repeats_around(
     if data.repeats.is_empty() {
         return Ok(out);
     }
-    let free = |n: usize| free_motions(&data.form.given.body, data.scene.sample_time_s, n).to_vec();
     let own = errors(data, &data.form.given)?;
     for plant in plants {
         if out.iter().any(|d| d.plant == plant) {
@@ -30,7 +29,7 @@ pub(in crate::diagnose) fn repeats_around(
             e.iter_mut().zip(own).for_each(|(e, o)| *e -= o);
         }
         let series = noise_series(&in_laps(&apart, &data.runs), &data.runs);
-        let moved = without_start(&series, &free, &|x| data.whitener.apply(x));
+        let moved = without_start(&series, &|n| data.starts(n), &|x| data.whitener.apply(x));
         let mut series = data.repeats.clone();
         for ((_, x), (_, moved)) in series.iter_mut().zip(&moved) {
             x.iter_mut().zip(moved).for_each(|(x, m)| *x += m);

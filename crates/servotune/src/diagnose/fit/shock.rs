@@ -8,7 +8,7 @@ use super::fitted_model::refit;
 use super::regressors::raw_columns;
 use super::simulation::{SimulatedModel, error};
 use super::trajectory::Trajectory;
-use crate::diagnose::data::linear_form::{Sampled, free_motions};
+use crate::diagnose::data::linear_form::Sampled;
 use crate::diagnose::data::repeat_difference::Difference;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::Segment;
@@ -183,8 +183,8 @@ fn clear(data: &DiagnosisData, plant: &Plant, spindle_hz: Option<f64>) -> Option
     let fit = without.fit(vec![]);
     let [own, mean] = [&stand, &without.means].map(|runs| fit.errors_of(&p, runs).swap_remove(at));
     let apart: Vec<f64> = own.iter().zip(&mean).map(|(a, b)| a - b).collect();
-    let free = |n: usize| free_motions(&without.form.given.body, without.scene.sample_time_s, n).to_vec();
-    let whitened = without_start(&[(shock.run, apart)], &free, &|x| without.whitener.apply(x)).swap_remove(0).1;
+    let whitened =
+        without_start(&[(shock.run, apart)], &|n| without.starts(n), &|x| without.whitener.apply(x)).swap_remove(0).1;
     // The mean of the others has noise of its own.
     let gain = shock.gain(&without, &whitened)? / (1.0 + 1.0 / without.stack.segments[at].runs.len() as f64);
     let log_p = shock.log_p + log_tail(gain, 1) - log_tail(shock.gain, 1);

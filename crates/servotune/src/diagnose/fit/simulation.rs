@@ -8,7 +8,7 @@ use super::model::Model;
 use super::regressors::raw_columns;
 use super::trajectory::Trajectory;
 use crate::controller::Law;
-use crate::diagnose::data::linear_form::{Sampled, free_motions};
+use crate::diagnose::data::linear_form::{Sampled, carried_over, free_motions};
 use crate::diagnose::data::run::Run;
 use crate::diagnose::noise::lines::Line;
 use crate::lti::{Body, DiscretePlant, LtiError, Plant, PlantState, step_chain};
@@ -68,7 +68,7 @@ impl<'a> SimulatedModel<'a> {
         }
     }
 
-    /// What is each record's own, in the position: the start, lines, and effects of a strength of their own.
+    /// What is each record's own, in the position: the start, lines, and effects of a strength of their own; what it carries over from before comes last.
     pub fn columns(&self, run: &Run) -> Result<Vec<Vec<f64>>, LtiError> {
         let t = self.scene.sample_time_s;
         let direct = Sampled::of(self.plant, t)?.direct;
@@ -102,6 +102,7 @@ impl<'a> SimulatedModel<'a> {
                 all.push(y);
             }
         }
+        all.extend(carried_over(&self.scene.plant, run.rested, t, run.len()));
         Ok(all)
     }
 }
@@ -161,6 +162,8 @@ pub struct Begun<'a> {
     constant: Option<f64>,
     /// What the start is made of, in the position.
     open: Vec<Vec<f64>>,
+    /// How many of those laws feel: what is carried over goes on whatever acts on the arm.
+    resisted: usize,
     /// What of it is seen, no law resisting: in closed loop the controller answers.
     pub linear: Vec<Vec<f64>>,
 }
@@ -175,6 +178,7 @@ impl<'a> Begun<'a> {
     ) -> Result<Begun<'a>, LtiError> {
         let closed = closed.filter(|_| run.reference.is_some());
         let open = model.columns(run)?;
+        let resisted = open.len() - carried_over(&model.scene.plant, run.rested, model.scene.sample_time_s, 1).len();
         let linear: Vec<Vec<f64>> = match closed {
             Some(law) => {
                 let plant = DiscretePlant::of(model.plant, model.scene.sample_time_s)?;
@@ -182,7 +186,7 @@ impl<'a> Begun<'a> {
             }
             None => open.clone(),
         };
-        Ok(Begun { model, run, closed, constant, open, linear })
+        Ok(Begun { model, run, closed, constant, open, resisted, linear })
     }
 
     /// What of the start's motions is seen around one that is near: a drag resists them, and an arm that is stuck does not swing back.
@@ -193,7 +197,8 @@ impl<'a> Begun<'a> {
             let there = self.simulated(free.iter().zip(d).map(|(f, d)| f + step * d).collect())?;
             Ok(here.iter().zip(&there).map(|(a, b)| (a - b) / step).collect())
         };
-        self.open.iter().map(one).collect()
+        let felt = self.open[..self.resisted].iter().map(one).collect::<Result<Vec<_>, LtiError>>()?;
+        Ok([felt, self.linear[self.resisted..].to_vec()].concat())
     }
 
     /// Simulates from a free motion that is near the right one, in a number of rounds; `seen` is what the motions of the start come to.

@@ -152,7 +152,7 @@ impl<'a> Evidence<'a> {
         let laws = !nameless && facts.log_checks.finding.is_none() && !search.named.is_empty();
         let open = if laws { search.named.iter().any(is_family) } else { names.first().is_some_and(is_family) };
         let silent = !ends && !nameless && names.is_empty() && linear.clock().is_none();
-        let astray = silent.then(|| astray(facts.data, facts.held_out)).flatten();
+        let astray = (silent && !facts.given_stands()).then(|| astray(facts.data, facts.held_out)).flatten();
         let astray = astray.and_then(|h| unseen(facts.data, facts.selection, h));
         Evidence { facts, search, unsteady, linear, given_far, astray, names, open }
     }

@@ -8,7 +8,7 @@ use super::offered_models::Reported;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::Simulation;
 use crate::diagnose::rules::{
-    Answer, COLOURED, LOOP_EXPLAINS, LOOP_EXPLAINS_HALF, LOOP_LEFT, LOOP_LEFT_TWICE, WIND_LEFT, asked,
+    Answer, COLOURED, HELD_OUT_DOWN, LOOP_EXPLAINS, LOOP_EXPLAINS_HALF, LOOP_LEFT, LOOP_LEFT_TWICE, WIND_LEFT, asked,
 };
 use crate::diagnose::search::selection::Selection;
 use crate::lti::Plant;
@@ -57,6 +57,13 @@ impl Facts<'_> {
     /// The same over the sensor's noise.
     pub(super) fn coloured_rest(&self) -> Answer {
         self.coloured(self.data.levels.sensor_rms)
+    }
+
+    /// Whether no refit is offered because the given plant simulates the records that were not used down to their noise, in open loop: a refit may err
+    /// where the fitted records excite little.
+    pub(super) fn given_stands(&self) -> bool {
+        let down = |h: FitFigures| h.rms_before < HELD_OUT_DOWN * h.noise_floor;
+        !self.reported.refits && self.fit.simulation == Simulation::OpenLoop && self.fit.holdout.is_some_and(down)
     }
 
     /// Whether figures of records in closed loop leave several times the noise and much of what the given plant leaves.

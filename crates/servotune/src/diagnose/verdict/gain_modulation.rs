@@ -6,7 +6,7 @@
 use super::finding::{Estimate, Finding};
 use super::line_finding::left;
 use super::naming::everywhere;
-use crate::diagnose::data::linear_form::{Sampled, free_motions};
+use crate::diagnose::data::linear_form::{Sampled, starts};
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::{Normal, NuisanceBasis};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
@@ -42,7 +42,7 @@ impl Ready {
         let t = data.scene.sample_time_s;
         // Lines are looked for elsewhere: at a frequency that the command has too, a swing would take them.
         let lines = data.lines.iter().flat_map(|l| l.columns(run, t));
-        for mut c in free_motions(&data.form.given.body, t, run.len()).into_iter().chain(lines) {
+        for mut c in starts(&data.form.given, run.rested, t, run.len()).into_iter().chain(lines) {
             data.whitener.apply(&mut c);
             local.add_local(0, c);
         }

@@ -2,7 +2,7 @@
 
 use super::finding::Finding;
 use super::localisation::{Part, place_of};
-use crate::diagnose::data::linear_form::free_motions;
+use crate::diagnose::data::linear_form::starts;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::Segment;
 use crate::diagnose::fit::corrected_model::Corrected;
@@ -133,7 +133,7 @@ pub(super) fn astray<'a>(data: &DiagnosisData, all: &'a [HeldOut]) -> Option<&'a
 pub(super) fn unseen(data: &DiagnosisData, selection: &Selection, h: &HeldOut) -> Option<Finding> {
     let run = data.runs.iter().find(|r| r.name == h.record)?;
     let nominal = data.form.nominal(&selection.baseline.refitted.p).plant;
-    let free = free_motions(&nominal.body, data.scene.sample_time_s, run.len());
+    let free = starts(&nominal, run.rested, data.scene.sample_time_s, run.len());
     let error = data.along(run, &selection.baseline, &free).ok()?;
     let t = data.scene.sample_time_s;
     let speed = |k: usize| (run.position[(k + 1).min(run.len() - 1)] - run.position[k.saturating_sub(1)]) / (2.0 * t);

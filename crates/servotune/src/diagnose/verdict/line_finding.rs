@@ -2,7 +2,7 @@
 
 use super::finding::{Estimate, Finding, Where};
 use super::naming::{HUM, RUNOUT, everywhere, text_of};
-use crate::diagnose::data::linear_form::{Sampled, free_motions};
+use crate::diagnose::data::linear_form::{Sampled, starts};
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::noise::lines::Line;
@@ -35,11 +35,11 @@ struct Phasors([Vec<[f64; 2]>; 3], f64);
 
 impl Phasors {
     fn of(data: &DiagnosisData, runs: &[(Run, Vec<f64>)], line: &Line) -> Phasors {
-        let (t, body) = (data.scene.sample_time_s, &data.form.given.body);
+        let (t, given) = (data.scene.sample_time_s, &data.form.given);
         let over = |part: [usize; 2]| -> Vec<[f64; 2]> {
             let each = runs.iter().map(|(run, e)| {
                 let [from, to] = part.map(|p| p * run.len() / 2);
-                line.fit(run, from..to, &free_motions(body, t, to - from), t, e)
+                line.fit(run, from..to, &starts(given, run.rested, t, to - from), t, e)
             });
             each.collect()
         };

@@ -11,7 +11,6 @@ use super::localisation::place;
 use super::naming::RUNOUT;
 use super::outcome::Outcome;
 use crate::controller::Law;
-use crate::diagnose::data::linear_form::free_motions;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, entry};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
@@ -168,8 +167,7 @@ struct Left<'a> {
 
 /// Series that each belong to a record, whitened, the record's start taken out.
 fn seen(data: &DiagnosisData, series: &[(usize, Vec<f64>)]) -> Vec<Vec<f64>> {
-    let free = |n: usize| free_motions(&data.form.given.body, data.scene.sample_time_s, n).to_vec();
-    without_start(series, &free, &|x| data.whitener.apply(x)).into_iter().map(|s| s.1).collect()
+    without_start(series, &|n| data.starts(n), &|x| data.whitener.apply(x)).into_iter().map(|s| s.1).collect()
 }
 
 impl<'a> Left<'a> {
