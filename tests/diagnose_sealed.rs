@@ -9,7 +9,7 @@ use servotune_lab::{Outcome, Row, sealed_set};
 /// getting worse, and is no evidence of how well.
 const SEED: u64 = 77;
 const CASES: usize = 32;
-const SAMPLES: usize = 500;
+const SAMPLES: usize = 700;
 
 #[test]
 fn nothing_is_seen_where_nothing_is_missing_and_what_is_missing_is_named() {

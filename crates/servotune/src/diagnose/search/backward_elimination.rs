@@ -31,8 +31,7 @@ pub(super) fn prune(data: &DiagnosisData, model: &mut Model, before: f64, iterat
         let without = |i: usize| {
             let mut chosen = model.chosen.clone();
             chosen.remove(i);
-            // A mode that was bent against a law which stood in for another one may stay bent without it.
-            fitted_from_both(data, &chosen, &model.refitted.p, iterations)
+            fitted(data, chosen, &model.refitted.p, iterations)
         };
         let all: Vec<Model> = (0..model.chosen.len()).map(without).collect();
         let Some((i, best)) = all.into_iter().enumerate().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost)) else { return };
