@@ -2,17 +2,13 @@
 //! running machine. Exact modal sums under a held command, written out here; no code shared with the program.
 #![allow(clippy::unwrap_used)]
 
+use crate::diagnose_common::{N, T, diagnosed_with, record};
 use nalgebra::Complex;
-use servotune::diagnose::{DiagnoseSettings, Diagnosis, Verdict, diagnose};
+use servotune::diagnose::{Diagnosis, Verdict};
 use servotune::lti::{Body, Mode, Plant};
 use servotune::numeric::random::Random;
-use servotune::recording::{Case, Record, RecordEntry, Role};
+use servotune::recording::Role;
 use std::f64::consts::TAU;
-use std::path::PathBuf;
-
-/// Sample time (s), samples of a record.
-const T: f64 = 2e-4;
-const N: usize = 2000;
 
 /// A body, two modes that ring for hundreds of samples, and a delay of one and a half samples.
 fn plant() -> Plant {
@@ -25,10 +21,10 @@ fn plant() -> Plant {
     Plant {
         position_unit: "um".into(),
         command_unit: "A".into(),
-        body: Body::SecondOrder { dc_gain: 5.0, natural_frequency_rad_s: TAU * 12.0, damping_ratio: 0.2 },
+        body: Body::SecondOrder { dc_gain: 5.0, natural_frequency_rad_s: TAU * 24.0, damping_ratio: 0.2 },
         delay_s: 1.5 * T,
         resonance_gain: 1.0,
-        modes: vec![mode(230.0, 251.0, 0.006), mode(640.0, 590.0, 0.012)],
+        modes: vec![mode(460.0, 502.0, 0.006), mode(1280.0, 1180.0, 0.012)],
         physics: vec![],
     }
 }
@@ -71,39 +67,16 @@ fn diagnosed(skipped: usize, seed: u64) -> Diagnosis {
     let mut random = Random::new(seed);
     let mut records = Vec::new();
     for (group, size, role) in [("a", 0.5, Role::Fit), ("b", 1.5, Role::Fit), ("h", 1.0, Role::Holdout)] {
-        let lines: Vec<(f64, f64)> = (1..180).map(|h| (5.0 * f64::from(h), random.between(0.0, TAU))).collect();
+        let lines: Vec<(f64, f64)> = (1..180).map(|h| (10.0 * f64::from(h), random.between(0.0, TAU))).collect();
         let drive = |k: usize| lines.iter().map(|(hz, p)| (TAU * hz * k as f64 * T + p).cos()).sum::<f64>() / 9.5;
         let command: Vec<f64> = (0..skipped + N).map(|k| size * drive(k)).collect();
         let answer = respond(&plant, &command);
         for i in 0..if role == Role::Fit { 2 } else { 1 } {
-            let file = PathBuf::from(format!("{group}{i}.csv"));
             let position = answer[skipped..].iter().map(|y| y + 1e-4 * random.normal()).collect();
-            let entry = RecordEntry { file: file.clone(), role, repeat_group: Some(group.into()) };
-            let record = Record {
-                file,
-                sample_time_s: T,
-                gaps: vec![],
-                reference: None,
-                excitation: vec![0.0; N],
-                command: command[skipped..].to_vec(),
-                position,
-                pes: None,
-                spindle_rad: None,
-                temperature_c: None,
-                further: vec![],
-            };
-            records.push((entry, record));
+            records.push(record(&format!("{group}{i}.csv"), role, group, &command[skipped..], position));
         }
     }
-    let case = Case {
-        id: "starts".into(),
-        plant: PathBuf::new(),
-        controller: None,
-        spindle_hz: None,
-        further_inputs: vec![],
-        records,
-    };
-    diagnose(&case, &plant, None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
+    diagnosed_with(&plant, records)
 }
 
 #[test]
