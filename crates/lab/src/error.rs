@@ -54,6 +54,8 @@ pub enum StudyError {
     Gate(#[from] GateError),
     #[error("the numbers of the study cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
+    #[error(transparent)]
+    Toml(#[from] toml::ser::Error),
     /// A trial could not be started or its files not be made.
     #[error("a trial could not be started: {source}")]
     Thread { source: std::io::Error },

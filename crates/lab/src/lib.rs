@@ -42,6 +42,7 @@ mod recordings;
 mod reliability_readers;
 mod sealed;
 mod sealed_draw;
+mod sealed_folder;
 mod sealed_page;
 mod sealed_row;
 pub mod study_identify;

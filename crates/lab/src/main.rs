@@ -31,7 +31,7 @@ struct StudyArguments {
     /// Changed files (study `reliability-readers`)
     #[arg(long, value_name = "N", default_value_t = 12_000)]
     runs: usize,
-    /// Cases to make again, all unless told: the others keep their lines (study `abroad`), or the diagnoses are written instead of the page (study `sealed`)
+    /// Cases to make again, all unless told: the others keep their lines (study `abroad`), or cases and diagnoses are written instead of the page (study `sealed`)
     #[arg(long, value_name = "ID,ID,...", value_delimiter = ',')]
     cases: Vec<String>,
     /// Seed of the set (studies `sealed` and `sealed-digests`)

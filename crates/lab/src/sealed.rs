@@ -8,7 +8,7 @@ use super::foreign_trial::{Model, Trial};
 use super::sealed_draw::{Drawn, Made, WHOLE, draw, kind};
 use super::sealed_page::page;
 use super::sealed_row::{Outcome, Row, outcome};
-use super::{Study, StudyError};
+use super::{Study, StudyError, sealed_folder};
 use rayon::prelude::*;
 use servotune::controller::Controller;
 use servotune::diagnose::{DiagnoseSettings, Diagnosis, FitFigures, diagnose};
@@ -232,7 +232,7 @@ fn written(seed: u64, cases: &[SealedCase], known: Option<&str>, rows: &[Row]) -
     Ok(study)
 }
 
-/// Some cases of a set, by their names, the beginnings of them or their kinds: the diagnoses as files, the lines as they are known.
+/// Some cases of a set, by their names, the beginnings of them or their kinds: cases and diagnoses as files, the lines as they are known.
 pub fn sealed_cases(
     seed: u64,
     count: Option<usize>,
@@ -246,6 +246,7 @@ pub fn sealed_cases(
         if let Some(d) = diagnosis {
             study.page(&format!("mismatch/{}.json", case.id), serde_json::to_string_pretty(&d)? + "\n");
         }
+        sealed_folder::add(&mut study, &case.id, &case.made)?;
     }
     Ok(study)
 }

@@ -32,6 +32,8 @@ pub struct DiagnosisData {
     pub runs: Vec<Run>,
     /// Runs for fitting.
     pub fit_runs: Vec<usize>,
+    /// The plant around which repeats tell the noise.
+    pub heard: Plant,
     /// Noise of the open-loop error.
     pub levels: NoiseLevels,
     /// Its whitening filter.
@@ -148,6 +150,7 @@ impl DiagnosisData {
             form,
             runs,
             fit_runs,
+            heard: given.clone(),
             levels,
             whitener,
             lines,

@@ -7,7 +7,7 @@ use super::differing_repeats::differing;
 use super::model::Model;
 use super::selected_effect::SelectedEffect;
 use crate::diagnose::data::linear_form::FreeParameter;
-use crate::diagnose::rules::{FAR_OFF, OTHER_START};
+use crate::diagnose::rules::{CLEAN, FAR_OFF, OTHER_START};
 use crate::physics::AnyLaw;
 use rayon::prelude::*;
 use std::f64::consts::LN_2;
@@ -137,10 +137,17 @@ fn to_its_end(data: &DiagnosisData, mut model: Model, iterations: usize) -> Mode
     model
 }
 
-/// The linear refit from the given plant, and the ground around it.
+/// The linear refit from the given plant, and the ground around it. Where it stands out from the noise, once more with the noise as repeats show it
+/// around the refit: that one stays if it then is at the noise.
 pub fn refit(data: DiagnosisData, iterations: usize) -> (DiagnosisData, Model) {
     let given = vec![0.0; data.form.free_parameters.len()];
-    refit_from(data, &given, iterations)
+    let (data, linear) = refit_from(data, &given, iterations);
+    if linear.excess_sigma() < CLEAN {
+        return (data, linear);
+    }
+    let heard = data.heard_around(&data.form.plant(&linear.refitted.p));
+    let again = heard.map(|heard| refit_from(heard, &linear.refitted.p, iterations));
+    again.filter(|(_, again)| again.excess_sigma() < CLEAN).unwrap_or((data, linear))
 }
 
 /// The linear refit. A refit moves the motion that it was made along: once more, from there. Without repeats it moves the noise

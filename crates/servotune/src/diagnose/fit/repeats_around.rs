@@ -8,7 +8,9 @@ use super::equation_error_fit::linear_error;
 use crate::diagnose::data::linear_form::{LinearForm, Sampled};
 use crate::diagnose::noise::repeats::{in_laps, noise_series, values, without_start};
 use crate::diagnose::noise::torque_noise::Differences;
+use crate::diagnose::rules::HEARD_BETTER;
 use crate::lti::{LtiError, Plant};
+use crate::physics::Scene;
 
 /// What repeats differ by around each of some plants, each plant once, lines taken out as around the plant of `data`; nothing without repeats.
 pub(in crate::diagnose) fn repeats_around(
@@ -19,7 +21,7 @@ pub(in crate::diagnose) fn repeats_around(
     if data.repeats.is_empty() {
         return Ok(out);
     }
-    let own = errors(data, &data.form.given)?;
+    let own = errors(data, &data.heard)?;
     for plant in plants {
         if out.iter().any(|d| d.plant == plant) {
             continue;
@@ -38,6 +40,21 @@ pub(in crate::diagnose) fn repeats_around(
         out.push(Differences { plant, series: values(&series) });
     }
     Ok(out)
+}
+
+impl DiagnosisData {
+    /// The same with the noise as repeats show it around another plant, where they differ less by it; none where they do not. A free body is left
+    /// alone: what its repeats differ by is mostly drift. So is a log on a lattice: repeats that round alike differ by too little.
+    pub fn heard_around(&self, plant: &Plant) -> Option<DiagnosisData> {
+        if self.repeats.is_empty() || self.grid.is_some() || !self.is_sprung() || self.heard == *plant {
+            return None;
+        }
+        let (t, spindle_hz) = (self.scene.sample_time_s, self.scene.spindle_hz);
+        let heard = DiagnosisData::new(plant, self.runs.clone(), t, spindle_hz).ok()?;
+        let scene = Scene { plant: self.scene.plant.clone(), ..heard.scene.clone() };
+        let same = DiagnosisData { form: self.form.clone(), scene, foretold: self.foretold.clone(), ..heard };
+        (same.repeats_rms < HEARD_BETTER * self.repeats_rms).then_some(same)
+    }
 }
 
 /// Errors of the fit runs around a plant.

@@ -10,6 +10,9 @@ rules! {
     ROUNDING_ALIKE: f64 = 0.5, "ratio",
         "rounding over the noise of repeats from which repeats round alike",
         "a mean then does not take the rounding away (Widrow and Kollar 2008)";
+    HEARD_BETTER: f64 = 0.98, "ratio",
+        "what repeats differ by around the linear refit over the same around the given plant, below which the refit tells the noise",
+        "around the plant that is there the sensor's noise comes out smallest, whatever the controller makes of it: a monic filter adds power (Jensen)";
     FAR_FROM_REPEATS: f64 = 5.0, "ratio",
         "plain simulation error of the cleared plant and its law over what repeats differ by, from which models are judged by that error",
         "what is left then is the model's own, and its small parts at high frequencies choose no law";

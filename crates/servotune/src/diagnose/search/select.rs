@@ -65,10 +65,9 @@ pub fn select(
     settings: &SelectSettings,
     mut progress: impl FnMut(&str),
 ) -> (DiagnosisData, Selection) {
-    let zero = vec![0.0; data.form.free_parameters.len()];
-    let given = data.fit(vec![]).cost(&zero);
     progress("refit of the linear parameters");
     let (data, baseline) = refit(data, settings.iterations);
+    let given = data.fit(vec![]).cost(&vec![0.0; data.form.free_parameters.len()]);
     let calibration = (settings.bootstrap > 0).then(|| {
         progress("bootstrap: the search on records without physics");
         bootstrap(&data, library, &baseline, settings.iterations, settings.false_alarm, settings.bootstrap)
