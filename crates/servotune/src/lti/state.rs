@@ -93,7 +93,8 @@ impl PlantState {
     #[inline]
     pub fn after(&self, plant: &DiscretePlant, u: f64) -> f64 {
         let n = self.commands.len();
-        let back = |i: usize| self.commands[(self.head + i) % n];
+        let wrap = |i: usize| if i >= n { i - n } else { i };
+        let back = |i: usize| self.commands[wrap(self.head + i)];
         // The ring holds the commands before this one; `u` would stand in front of them.
         let (now, before) = (if n == 2 { u } else { back(n - 3) }, back(n - 2));
         let mut sum = 0.0;

@@ -16,7 +16,7 @@ use super::share::Share;
 use crate::lti::Body;
 use nalgebra::Complex;
 use std::cell::Cell;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// The play. With a contact its strength is the share of e that the encoder reads.
 #[derive(Clone, Debug, PartialEq)]
@@ -142,6 +142,9 @@ struct Apart {
     damper: f64,
     steps: usize,
     step_s: f64,
+    /// Over a whole sample, in contact: the transition of what is off the balance (none where too much happens in a sample), and the sample.
+    swing: Option<[f64; 4]>,
+    sample_s: f64,
     e: [f64; 2],
     /// Where the last step asked for leads: it is asked for once to be seen and once to be taken.
     ahead: Cell<Option<(Sample, f64, [f64; 2])>>,
@@ -170,9 +173,37 @@ impl Apart {
             damper: c / b,
             steps: steps as usize,
             step_s: scene.sample_time_s / steps,
+            swing: Self::swing(w, contact.damping_ratio, scene.sample_time_s),
+            sample_s: scene.sample_time_s,
             e: [0.0; 2],
             ahead: Cell::new(None),
         }
+    }
+
+    /// o and o' after a time, of o'' = -w² o - 2 z w o'; none beyond three quarters of half a swing, within which o turns round once at most.
+    fn swing(w: f64, z: f64, time_s: f64) -> Option<[f64; 4]> {
+        let root = (z < 1.0).then(|| (1.0 - z * z).sqrt()).filter(|root| w * root * time_s < 0.75 * PI)?;
+        let (sin, cos) = (w * root * time_s).sin_cos();
+        let (fall, lean) = ((-z * w * time_s).exp(), z / root * sin);
+        Some([cos + lean, sin / (w * root), -w / root * sin, cos - lean].map(|v| fall * v))
+    }
+
+    /// The sample in one step, where both masses stay apart, or in contact, all the time.
+    fn undisturbed(&self, push: f64) -> Option<[f64; 2]> {
+        let ([e, v], h) = (self.e, self.sample_s);
+        if e.abs() <= self.half {
+            let to = [e + h * (v + 0.5 * h * push), v + h * push];
+            let turns = if v * to[1] < 0.0 { e - 0.5 * v * v / push } else { e };
+            return (to[0].abs() <= self.half && turns.abs() <= self.half).then_some(to);
+        }
+        // Outwards counts up.
+        let (side, [a, b, c, d]) = (e.signum(), self.swing?);
+        let (rest, off, v) = (side * push / self.stiff, side * e - self.half, side * v);
+        let to = [a * (off - rest) + b * v, c * (off - rest) + d * v];
+        // It may come inwards and go out again: by no more than its swing.
+        let reach = if v < 0.0 && to[1] > 0.0 { (off - rest).hypot(v / self.stiff.sqrt()) } else { 0.0 };
+        let stays = rest + to[0] > 0.0 && (reach == 0.0 || rest > 2.0 * reach);
+        stays.then_some([side * (self.half + rest + to[0]), side * to[1]])
     }
 
     fn acceleration(&self, push: f64, e: f64, v: f64) -> f64 {
@@ -181,7 +212,7 @@ impl Apart {
         push - self.stiff * over - damped
     }
 
-    /// One sample on (velocity Verlet); none where no time goes by.
+    /// One sample on, exactly or, where a contact opens or closes in it, by velocity Verlet; none where no time goes by.
     fn next(&self, from: &Sample, to: &Sample) -> [f64; 2] {
         let [mut e, mut v] = self.e;
         if to.t <= from.t {
@@ -194,14 +225,17 @@ impl Apart {
             return reached;
         }
         let push = self.drive * (from.i - self.spring * from.x - self.damper * from.v);
-        let h = self.step_s;
-        for _ in 0..self.steps {
-            let middle = v + 0.5 * h * self.acceleration(push, e, v);
-            e += h * middle;
-            v = middle + 0.5 * h * self.acceleration(push, e, middle);
-        }
-        self.ahead.set(Some((*from, to.t, [e, v])));
-        [e, v]
+        let reached = self.undisturbed(push).unwrap_or_else(|| {
+            let h = self.step_s;
+            for _ in 0..self.steps {
+                let middle = v + 0.5 * h * self.acceleration(push, e, v);
+                e += h * middle;
+                v = middle + 0.5 * h * self.acceleration(push, e, middle);
+            }
+            [e, v]
+        });
+        self.ahead.set(Some((*from, to.t, reached)));
+        reached
     }
 }
 

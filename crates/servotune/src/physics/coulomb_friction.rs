@@ -14,6 +14,7 @@ use super::key::{Bound, Key, Measure};
 use super::parameter::{Parameter, Unit};
 use super::pivot_friction::{BRISTLE_TIME_S, BRISTLE_TIMES, SLID, bristle_rate, bristle_time_of, dahl, shortest_loop};
 use super::sample::{Sample, Scene, logarithmic};
+use std::cell::Cell;
 
 /// Dry friction. Its strength is the level at speed.
 #[derive(Clone, Debug, PartialEq)]
@@ -176,13 +177,18 @@ impl Law for Bristles {
 struct Film {
     speed: f64,
     stribeck: Option<Stribeck>,
+    /// Speed from which a step was asked for last, and what it comes to: a step is tried several times.
+    last: Cell<[f64; 2]>,
 }
 
 impl Law for Film {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
         // Simpson's rule; the sign turns round over more than one sample.
         let at = |v: f64| (v / self.speed).tanh();
-        let mean = (at(from.v) + 4.0 * at(0.5 * (from.v + to.v)) + at(to.v)) / 6.0;
+        if self.last.get()[0] != from.v {
+            self.last.set([from.v, at(from.v)]);
+        }
+        let mean = (self.last.get()[1] + 4.0 * at(0.5 * (from.v + to.v)) + at(to.v)) / 6.0;
         out[0] = -mean * level(self.stribeck, 0.5 * (from.v + to.v));
     }
 }
@@ -273,7 +279,7 @@ impl Parametric for CoulombFriction {
                 Some(time_s) => Box::new(Bristles { length, time_s, stribeck, z: 0.0 }),
                 None => Box::new(Slider { length, stribeck, z: 0.0 }),
             },
-            Turning::Creep { speed } => Box::new(Film { speed, stribeck }),
+            Turning::Creep { speed } => Box::new(Film { speed, stribeck, last: Cell::new([f64::NAN; 2]) }),
         }
     }
 

@@ -55,12 +55,38 @@ struct Line {
     w: f64,
     /// sin(y)/y of half the interval's angle.
     mean: f64,
+    /// Sample time (s), and sine and cosine of the angle over it.
+    step: [f64; 3],
+    /// Middle of the interval before, its sine and cosine, and intervals since they were worked out: from one to the next they turn.
+    before: ([f64; 3], usize),
+}
+
+/// Samples over which the wave is turned on, its rounding errors with it; and share of a sample by which clocks may differ.
+const TURNED: usize = 32;
+const CLOCK: f64 = 1e-9;
+
+impl Line {
+    /// Middle of the interval, sine and cosine there, and intervals since they were worked out.
+    fn wave(&self, from: &Sample, to: &Sample) -> ([f64; 3], usize) {
+        let t = 0.5 * (from.t + to.t);
+        let ([before, s, c], count) = self.before;
+        let [step, turn_s, turn_c] = self.step;
+        if count < TURNED && (t - before - step).abs() < CLOCK * step {
+            return ([t, s * turn_c + c * turn_s, c * turn_c - s * turn_s], count + 1);
+        }
+        let (sin, cos) = (self.w * t).sin_cos();
+        ([t, sin, cos], 0)
+    }
 }
 
 impl Law for Line {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        let (sin, cos) = (self.w * 0.5 * (from.t + to.t)).sin_cos();
+        let ([_, sin, cos], _) = self.wave(from, to);
         (out[0], out[1]) = (self.mean * cos, self.mean * sin);
+    }
+
+    fn commit(&mut self, from: &Sample, to: &Sample) {
+        self.before = self.wave(from, to);
     }
 }
 
@@ -91,7 +117,13 @@ impl Parametric for LineDisturbance {
 
     fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
         let y = PI * self.frequency_hz * scene.sample_time_s;
-        Box::new(Line { w: TAU * self.frequency_hz, mean: if y == 0.0 { 1.0 } else { y.sin() / y } })
+        let (sin, cos) = (2.0 * y).sin_cos();
+        Box::new(Line {
+            w: TAU * self.frequency_hz,
+            mean: if y == 0.0 { 1.0 } else { y.sin() / y },
+            step: [scene.sample_time_s, sin, cos],
+            before: ([f64::NAN; 3], 0),
+        })
     }
 
     fn may_occur_several_times() -> bool {

@@ -1,7 +1,7 @@
 //! A machine in motion: the exactly sampled plant with effects at their places, one controller sample at a time.
 //!
 //! A torque depends on the motion that it causes: each step solves w = law(x + g w) for the mean torque w over the sample, by
-//! fixed-point steps and, where a stiff contact makes those crawl, by a bracketed secant. Second order in the step; where a law is so stiff that
+//! secants and, where a stiff contact makes those crawl, within a bracket. Second order in the step; where a law is so stiff that
 //! arm and law swing within few samples (a dry drag that holds), a sample is made in several steps.
 
 use super::effect::{COLUMNS, Entry, Law, Port};
@@ -56,7 +56,9 @@ pub struct Machine {
     last: Sample,
     now: Sample,
     x: [f64; 3],
-    w: f64,
+    /// The torque of the last two steps, and how much of a change of it its law gave back.
+    w: [f64; 2],
+    echo: f64,
     k: usize,
     /// When it began in its session (s).
     began_s: f64,
@@ -69,9 +71,12 @@ pub struct Machine {
     arm: f64,
 }
 
-/// Most rounds of two fixed-point steps, and the share to which the second must shrink the first for another round to follow.
+/// Most rounds of two points of the law, and the echo of a law from which on it is bracketed.
 const ROUNDS: usize = 6;
-const SHRINKS: f64 = 0.3;
+const ECHOES: f64 = 0.3;
+/// Share of the torque within which it is found, and share by which a law's echo bends over the last move.
+const EXACT: f64 = 1e-9;
+const BENDS: f64 = 0.01;
 /// Steps of the secant at most; every third halves the bracket.
 const SECANTS: usize = 90;
 /// Farthest that arm and stiffest law swing within one step (rad), and most steps of a sample: errors go with the square of it.
@@ -123,7 +128,7 @@ impl Machine {
         self.standing[0] = command + value(&self.command, &still);
         let arm = still.scaled(self.arm);
         self.standing[1] = value(&self.torque, &arm);
-        self.w = self.standing[1];
+        self.w = [self.standing[1]; 2];
         self.history.fill(self.standing[0]);
         self
     }
@@ -137,7 +142,7 @@ impl Machine {
     pub fn held_by(mut self, torque: f64, gain_at_rest: f64) -> Machine {
         let spring = if gain_at_rest.is_finite() && gain_at_rest != 0.0 { self.origin / gain_at_rest } else { 0.0 };
         self.standing = [spring - torque, 0.0];
-        self.w = 0.0;
+        self.w = [0.0; 2];
         self
     }
 
@@ -209,7 +214,8 @@ impl Machine {
             last: Sample::default(),
             now: Sample::default(),
             x: [0.0; 3],
-            w: 0.0,
+            w: [0.0; 2],
+            echo: 0.0,
             k: 0,
             began_s: 0.0,
             origin: 0.0,
@@ -270,8 +276,8 @@ impl Machine {
             acting += part.value(&self.last, &self.now);
             part.law.commit(&self.last, &self.now);
         }
-        self.history.rotate_left(1);
         let n = self.history.len();
+        self.history.copy_within(1.., 0);
         self.history[n - 1] = acting;
         let share = self.delayed.fractional_delay_s() / self.delayed.sample_time_s();
         self.now.i = share * self.history[0] + (1.0 - share) * self.history[1];
@@ -301,8 +307,9 @@ impl Machine {
             let answer = self.steps_between.get(j).map_or(self.pushed.position(), |at| self.held.between(at));
             let (before, after) = (self.free_motions(self.k), self.free_motions(self.k + 1));
             let carried = self.origin + answer + before + share * (after - before);
-            self.w = self.solve(&from, carried);
-            self.torqued.command(self.w - self.standing[1]);
+            let (torque, echo) = self.solve(&from, carried);
+            (self.w, self.echo) = ([torque, self.w[0]], echo);
+            self.torqued.command(torque - self.standing[1]);
             if self.read {
                 self.held_torqued[j].clone_from(&self.torqued);
             }
@@ -322,36 +329,51 @@ impl Machine {
     fn ahead(&self, from: &Sample, x: f64) -> Sample {
         let t = self.direct.sample_time_s();
         let (after, session) = (from.t + t, from.session + t);
-        Sample { t: after, session, x, v: (3.0 * x - 4.0 * self.path[0] + self.path[1]) / (2.0 * t), ..*from }
+        Sample { t: after, session, x, v: self.speed_at(x), ..*from }
     }
 
-    /// The mean torque over a step that leads to `carried` without it.
-    fn solve(&self, from: &Sample, carried: f64) -> f64 {
+    /// The speed there: second-order backward difference.
+    fn speed_at(&self, x: f64) -> f64 {
+        (3.0 * x - 4.0 * self.path[0] + self.path[1]) / (2.0 * self.direct.sample_time_s())
+    }
+
+    /// The mean torque over a step that leads to `carried` without it, and the law's echo there.
+    fn solve(&self, from: &Sample, carried: f64) -> (f64, f64) {
         let free = carried + self.torqued.after(&self.direct, -self.standing[1]);
-        let one = from.scaled(self.arm);
+        let (one, end) = (from.scaled(self.arm), self.ahead(from, free));
         let law = |w: f64| {
-            let to = self.ahead(from, free + self.reach * w).scaled(self.arm);
+            let x = free + self.reach * w;
+            let to = Sample { x: x * self.arm, v: self.speed_at(x) * self.arm, ..end };
             self.torque.iter().map(|p| p.value(&one, &to)).sum::<f64>()
         };
-        let near = |by: f64, w: f64| by.abs() <= 1e-9 * (w.abs() + (w - by).abs());
-        let mut w = self.w;
+        let near = |by: f64, w: f64| by.abs() <= EXACT * w.abs();
+        // Torque and echo go on as they went; a straight law is solved by two points of it.
+        let (mut w, mut echo) = (2.0 * self.w[0] - self.w[1], self.echo);
         for _ in 0..ROUNDS {
             let first = law(w);
             if near(first - w, first) {
-                return first;
+                return (first, echo);
             }
-            let second = law(first);
-            if near(second - first, second) {
-                return second;
+            let next = w + (first - w) / (1.0 - echo);
+            let second = law(next);
+            if near(second - next, second) {
+                return (second, echo);
             }
-            // Aitken: steps that shrink by one ratio end where their sum does.
-            let ratio = (second - first) / (first - w);
-            w = second;
-            if ratio.abs() > SHRINKS {
+            echo = (second - first) / (next - w);
+            if !(echo.abs() < ECHOES) {
+                w = second;
                 break;
             }
-            w += (second - first) * ratio / (1.0 - ratio);
+            w = next + (second - next) / (1.0 - echo);
+            if near(BENDS * (w - next), w) {
+                return (w, echo);
+            }
         }
+        (self.bracketed(law, w), 0.0)
+    }
+
+    /// The same where arm and law answer one another too strongly, or the law has a kink there: by a bracket around the root.
+    fn bracketed(&self, law: impl Fn(f64) -> f64, w: f64) -> f64 {
         // w - law(w) rises with w for every law that resists motion: bracket its root and close in.
         let off = |w: f64| w - law(w);
         let size = w.abs().max(law(0.0).abs()).max(f64::MIN_POSITIVE);

@@ -45,6 +45,9 @@ pub static FACTS: Facts = Facts {
     band_hz: [1.0, 500.0],
 };
 
+/// Half of the wave's phase over a step (rad) up to which the series of tan(h)/h is exact to 1e-12.
+const SHORT: f64 = 0.1;
+
 struct Ripple {
     wave: f64,
     factor: bool,
@@ -58,12 +61,22 @@ impl Law for Ripple {
         if x != from.x {
             (s0, c0) = (self.wave * from.x).sin_cos();
         }
-        let (s1, c1) = (self.wave * 0.5 * (from.x + to.x)).sin_cos();
         let (s2, c2) = (self.wave * to.x).sin_cos();
         self.last.set([to.x, s2, c2]);
+        // The mean over a straight way: sin(h)/h times the wave at its middle, which is the ends' mean over cos(h).
+        let h = 0.5 * self.wave * (to.x - from.x);
         // The acting command is the mean over the interval already.
-        let by = if self.factor { from.i } else { 1.0 } / 6.0;
-        (out[0], out[1]) = (by * (c0 + 4.0 * c1 + c2), by * (s0 + 4.0 * s1 + s2));
+        let by = if self.factor { from.i } else { 1.0 };
+        (out[0], out[1]) = if h.abs() < SHORT {
+            let h2 = h * h;
+            let both =
+                0.5 * by * (1.0 + h2 * (1.0 / 3.0 + h2 * (2.0 / 15.0 + h2 * (17.0 / 315.0 + h2 * 62.0 / 2835.0))));
+            (both * (c0 + c2), both * (s0 + s2))
+        } else {
+            let (sin, cos) = (self.wave * 0.5 * (from.x + to.x)).sin_cos();
+            let by = by * h.sin() / h;
+            (by * cos, by * sin)
+        };
     }
 }
 

@@ -114,17 +114,17 @@ impl NuisanceBasis {
     /// Direction by direction, so that each is fetched once for all of them.
     pub fn coordinates<C: AsRef<[f64]>>(&self, columns: &[C], spans: &[[usize; 2]]) -> Vec<Vec<f64>> {
         let mut out = vec![Vec::with_capacity(self.dimension()); columns.len()];
-        for (start, q) in &self.local {
-            for ((x, span), out) in columns.iter().map(C::as_ref).zip(spans).zip(&mut out) {
-                let (low, high) = (span[0].max(*start), span[1].min(start + q.len()));
-                out.push(if low < high {
-                    dot(&x[low - span[0]..high - span[0]], &q[low - start..high - start])
-                } else {
-                    0.0
-                });
-            }
-        }
         wide(|| {
+            for (start, q) in &self.local {
+                for ((x, span), out) in columns.iter().map(C::as_ref).zip(spans).zip(&mut out) {
+                    let (low, high) = (span[0].max(*start), span[1].min(start + q.len()));
+                    out.push(if low < high {
+                        dot(&x[low - span[0]..high - span[0]], &q[low - start..high - start])
+                    } else {
+                        0.0
+                    });
+                }
+            }
             for q in &self.global {
                 for ((x, span), out) in columns.iter().map(C::as_ref).zip(spans).zip(&mut out) {
                     out.push(dot(x, &q[span[0]..span[1]]));

@@ -5,7 +5,7 @@
 
 use super::diagnosis_data::DiagnosisData;
 use super::selected_effect::SelectedEffect;
-use super::simulation::SimulatedModel;
+use super::simulated_model::SimulatedModel;
 use crate::diagnose::data::linear_form::{LinearForm, body_numbers};
 use crate::diagnose::rules::FREE_BODY;
 use crate::lti::{Body, PhysicsEntry, Plant};

@@ -5,7 +5,8 @@
 //! its first value before the record began. Spec: `specs/mismatch.md`, "Further inputs".
 
 use super::lagged_regression::{LaggedRegression, Padded, Responses};
-use super::simulation::{SimulatedModel, errors};
+use super::simulated_model::SimulatedModel;
+use super::simulation::errors;
 use crate::diagnose::data::linear_form::free_motions;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::scene;

@@ -18,6 +18,7 @@ pub(super) mod regressors;
 pub(super) mod repeats_around;
 pub(super) mod selected_effect;
 pub(super) mod shock;
+pub(super) mod simulated_model;
 pub(super) mod simulation;
 mod slopes;
 pub(super) mod trajectory;

@@ -7,7 +7,8 @@ use super::corrected_model::corrected;
 use super::diagnosis_data::DiagnosisData;
 use super::model::Model;
 use super::selected_effect::SelectedEffect;
-use super::simulation::{Begun, SimulatedModel, Started};
+use super::simulated_model::SimulatedModel;
+use super::simulation::{Begun, Felt, error_from};
 use crate::controller::Law;
 use crate::diagnose::data::linear_form::FreeParameter;
 use crate::diagnose::data::run::Run;
@@ -15,6 +16,7 @@ use crate::diagnose::data::stacked_records::{NuisanceBasis, Segment};
 use crate::diagnose::noise::lines::Line;
 use crate::numeric::levenberg::{Limit, Residuals};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Rounds in which a start is found.
 const ROUNDS: usize = 2;
@@ -64,7 +66,7 @@ struct Record<'a> {
     /// The free motion that it starts with, as found last: near enough for what is not far.
     start: Vec<f64>,
     /// What the motions of a start come to, laws resisting, around that one; as the linear plant has it where none was felt yet.
-    felt: Option<Vec<Vec<f64>>>,
+    felt: Option<Arc<Felt>>,
     /// The constant torque on it where it does not begin at rest (command_unit).
     constant: Option<f64>,
 }
@@ -133,27 +135,30 @@ impl Problem<'_> {
         self.records.par_iter().map(|r| of(r, &judged)).collect()
     }
 
-    /// Every record simulated, from the starts found last; infinite where it runs away.
-    fn simulate(&self, x: &[f64]) -> Vec<Started> {
+    /// The error of every record, from the starts found last; infinite where it runs away.
+    fn simulated(&self, x: &[f64]) -> Vec<Vec<f64>> {
         self.each(x, |r, judged| {
-            let one = || {
-                let begun = Begun::new(judged, r.run, self.law(), r.constant)?;
-                begun.found(r.start.clone(), r.felt.as_ref().unwrap_or(&begun.linear), 1)
+            let one = || match &r.felt {
+                Some(felt) => error_from(judged, r.run, self.law(), r.constant, &r.start, felt),
+                None => {
+                    let begun = Begun::new(judged, r.run, self.law(), r.constant)?;
+                    Ok(begun.found(r.start.clone(), &begun.unresisted(), 1)?.error)
+                }
             };
-            one().unwrap_or_else(|_| Started { error: vec![f64::INFINITY; r.run.len()], free: vec![0.0; r.run.len()] })
+            one().unwrap_or_else(|_| vec![f64::INFINITY; r.run.len()])
         })
     }
 
     /// Whitened simulation error, the mean over the repeats of each segment, one stacked vector, each segment's own directions taken out.
     fn error_at(&self, x: &[f64]) -> Vec<f64> {
-        self.whitened(&self.simulate(x))
+        self.whitened(&self.simulated(x))
     }
 
-    fn whitened(&self, all: &[Started]) -> Vec<f64> {
+    fn whitened(&self, all: &[Vec<f64>]) -> Vec<f64> {
         let mut out = vec![0.0; self.total()];
-        for (r, s) in self.records.iter().zip(all) {
+        for (r, error) in self.records.iter().zip(all) {
             let from = self.layout[r.segment].start;
-            out[from..].iter_mut().zip(&s.error).for_each(|(o, e)| *o += r.share * e);
+            out[from..].iter_mut().zip(error).for_each(|(o, e)| *o += r.share * e);
         }
         for s in &self.layout {
             let part = &mut out[s.start..s.start + s.len];
@@ -173,21 +178,18 @@ impl Problem<'_> {
     pub fn settle(&mut self, x: &[f64]) -> Vec<f64> {
         let found = self.each(x, |r, judged| {
             let begun = Begun::new(judged, r.run, self.law(), r.constant)?;
-            let near = begun.found(vec![0.0; r.run.len()], &begun.linear, 1)?;
+            let near = begun.found(vec![0.0; r.run.len()], &begun.unresisted(), 1)?;
             begun.better(near.free, ROUNDS)
         });
         let mut all = Vec::with_capacity(self.records.len());
         for (r, found) in self.records.iter_mut().zip(found) {
-            let sound = found.ok().filter(|(s, f): &(Started, Vec<Vec<f64>>)| {
-                s.free.iter().chain(f.iter().flatten()).all(|v| v.is_finite())
-            });
+            let sound = found.ok().filter(|(s, f)| s.free.iter().all(|v| v.is_finite()) && f.is_finite());
             all.push(match sound {
                 Some((started, felt)) => {
-                    r.start.clone_from(&started.free);
-                    r.felt = Some(felt);
-                    started
+                    (r.start, r.felt) = (started.free, Some(Arc::new(felt)));
+                    started.error
                 }
-                None => Started { error: vec![f64::INFINITY; r.run.len()], free: r.start.clone() },
+                None => vec![f64::INFINITY; r.run.len()],
             });
         }
         self.whitened(&all)
@@ -222,14 +224,13 @@ impl Residuals for Problem<'_> {
         self.settle(x);
         let firsts = self.on_firsts();
         let this = firsts.as_ref().unwrap_or(self);
-        let n = self.total();
         let of_mode = |i: usize| {
             let place = this.free.free_parameters.get(i);
             place.is_some_and(|&at| !is_of_body(this.data.form.free_parameters[at]))
         };
         let here = if (0..x.len()).any(of_mode) { this.error_at(x) } else { Vec::new() };
         // Both sides: the mean slope over a kink, not the slope on one side of it. A mode's number moves no law past its kinks: one side does.
-        j.par_chunks_exact_mut(n).enumerate().for_each(|(i, column)| {
+        j.par_chunks_exact_mut(self.total()).enumerate().for_each(|(i, column)| {
             let step = this.step(i, x[i]);
             let moved = |by: f64| {
                 let mut to = x.to_vec();

@@ -109,20 +109,16 @@ pub(in crate::diagnose) fn columns_along(
     let mut value = [0.0; COLUMNS];
     let by = if facts.entry == Entry::Torque { scene.arm_over_record() } else { 1.0 };
     let ahead = usize::from(facts.entry == Entry::Torque);
-    if let Some(first) = samples.first() {
-        moving.led(turned, first.x, by);
-    }
+    let Some(first) = samples.first() else { return out };
+    moving.led(turned, first.x, by);
+    // A torque acts on the arm itself, in front of the modes.
+    let mut from = first.scaled(by);
     for k in 0..n {
         // A torque's column belongs to the interval that starts at the sample, the others' to the sample itself.
-        let (from, to): (&Sample, &Sample) = if ahead == 1 {
-            (&samples[k], &samples[(k + 1).min(n - 1)])
-        } else {
-            (&samples[k.saturating_sub(1)], &samples[k])
-        };
-        // A torque acts on the arm itself, in front of the modes.
-        let (from, to) = (from.scaled(by), to.scaled(by));
+        let to = samples[(k + ahead).min(n - 1)].scaled(by);
         moving.columns(&from, &to, &mut value[..facts.columns]);
         moving.commit(&from, &to);
+        from = to;
         for (column, v) in out.iter_mut().zip(&value) {
             column[k] = *v;
         }

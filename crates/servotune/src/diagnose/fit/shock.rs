@@ -6,7 +6,8 @@
 use super::diagnosis_data::DiagnosisData;
 use super::fitted_model::refit;
 use super::regressors::raw_columns;
-use super::simulation::{SimulatedModel, error};
+use super::simulated_model::SimulatedModel;
+use super::simulation::error;
 use super::trajectory::Trajectory;
 use crate::diagnose::data::linear_form::Sampled;
 use crate::diagnose::data::repeat_difference::Difference;

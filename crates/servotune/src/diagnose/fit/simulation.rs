@@ -3,21 +3,15 @@
 //! Closed loop from reference and excitation where a controller is known and its law holds; open loop from the recorded
 //! command otherwise. The start of each record is estimated.
 
-use super::diagnosis_data::DiagnosisData;
-use super::model::Model;
-use super::regressors::raw_columns;
-use super::trajectory::Trajectory;
+use super::simulated_model::{SimulatedModel, simulate};
 use crate::controller::Law;
-use crate::diagnose::data::linear_form::{Sampled, carried_over, free_motions};
+use crate::diagnose::data::linear_form::carried_over;
 use crate::diagnose::data::run::Run;
-use crate::diagnose::noise::lines::Line;
-use crate::lti::{Body, DiscretePlant, LtiError, Plant, PlantState, step_chain};
+use crate::lti::{DiscretePlant, LtiError, PlantState, step_chain};
 use crate::numeric::least_squares::{Qr, dot};
 use crate::numeric::random::Random;
 use crate::numeric::statistics::{median, rms_of};
-use crate::physics::{AnyLaw, Entry, Machine, Sample, Scene, Setting};
 use rayon::prelude::*;
-use std::f64::consts::TAU;
 
 /// How records are simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -27,84 +21,6 @@ pub enum Simulation {
     OpenLoop,
     /// The controller drives the plant from reference and excitation.
     ClosedLoop,
-}
-
-/// A model to be judged.
-pub struct SimulatedModel<'a> {
-    /// The plant.
-    pub plant: &'a Plant,
-    /// Its effects.
-    pub effects: Vec<&'a Setting>,
-    /// Effects whose strengths are each record's own, as their laws: fitted to the record that is judged, like
-    /// its start.
-    pub own: Vec<&'a AnyLaw>,
-    /// Lines whose phase is each record's own.
-    pub lines: &'a [Line],
-    /// The diagnosis data and the fit that the model comes from, for records that do not begin at rest: the constant torque on them is
-    /// then found along the recorded motion.
-    pub fit: Option<(&'a DiagnosisData, &'a Model)>,
-    /// Machine and size of its motion.
-    pub scene: &'a Scene,
-}
-
-impl<'a> SimulatedModel<'a> {
-    /// A plant with effects and nothing that is a record's own.
-    pub fn of(plant: &'a Plant, effects: &'a [Setting], scene: &'a Scene) -> SimulatedModel<'a> {
-        SimulatedModel { plant, effects: effects.iter().collect(), own: vec![], lines: &[], fit: None, scene }
-    }
-
-    /// The constant torque on a record that does not begin at rest, where laws feel it (command_unit).
-    pub fn constant_torque(&self, run: &Run) -> Result<Option<f64>, LtiError> {
-        let asked = self.fit.filter(|_| !run.rested && !self.effects.is_empty());
-        asked.map(|(data, fit)| data.constant_torque(run, fit)).transpose()
-    }
-
-    /// Position per constant command (position_unit per command_unit), infinite for a free inertia.
-    fn gain_at_rest(&self) -> f64 {
-        let modes: f64 = self.plant.modes.iter().map(|m| (m.zero_rad_s / m.pole_rad_s).powi(2)).product();
-        match self.plant.body {
-            Body::SecondOrder { dc_gain, .. } => dc_gain * self.plant.resonance_gain * modes,
-            Body::FreeInertia { .. } | Body::Rational(_) => f64::INFINITY,
-        }
-    }
-
-    /// What is each record's own, in the position: the start, lines, and effects of a strength of their own; what it carries over from before comes last.
-    pub fn columns(&self, run: &Run) -> Result<Vec<Vec<f64>>, LtiError> {
-        let t = self.scene.sample_time_s;
-        let direct = Sampled::of(self.plant, t)?.direct;
-        let mut all = free_motions(&self.plant.body, t, run.len()).to_vec();
-        all.extend(self.lines.iter().flat_map(|l| l.columns(run, t)));
-        all.extend(self.effects.iter().flat_map(|s| s.law.free_motions(self.scene, run.len())));
-        for tau in self.effects.iter().filter_map(|s| s.law.memory_time_s()) {
-            let left: Vec<f64> = (0..run.len()).map(|k| (-(k as f64 * t) / tau).exp()).collect();
-            let mut y = vec![0.0; run.len()];
-            direct.add_response(&left, &mut y);
-            all.push(y);
-        }
-        let spindle = self.scene.spindle_hz.unwrap_or(0.0) * TAU;
-        let samples = (0..run.len())
-            .map(|k| Sample {
-                t: k as f64 * t,
-                session: run.began_s + k as f64 * t,
-                u: run.input[k],
-                spindle_rad: run.spindle_rad.as_ref().map_or(spindle * k as f64 * t, |s| s[k]),
-                ..Sample::default()
-            })
-            .collect();
-        let motion = Trajectory { samples, ..Trajectory::default() };
-        for law in &self.own {
-            for column in raw_columns(law, self.scene, &motion) {
-                let mut y = vec![0.0; column.len()];
-                match law.facts().entry {
-                    Entry::Position => y = column,
-                    _ => direct.add_response(&column, &mut y),
-                }
-                all.push(y);
-            }
-        }
-        all.extend(carried_over(&self.scene.plant, run.rested, t, run.len()));
-        Ok(all)
-    }
 }
 
 /// Rounds in which the start of a record is found where laws are not straight in it.
@@ -124,9 +40,9 @@ pub fn error(model: &SimulatedModel, run: &Run, closed: Option<&Law>) -> Result<
     let begun = Begun::new(model, run, closed, constant)?;
     let rest = vec![0.0; run.len()];
     if model.effects.is_empty() {
-        return Ok(begun.found(rest, &begun.linear, 1)?.error);
+        return Ok(begun.found(rest, &begun.unresisted(), 1)?.error);
     }
-    let near = begun.found(rest, &begun.linear, 2)?;
+    let near = begun.found(rest, &begun.unresisted(), 2)?;
     let (better, _) = begun.better(near.free.clone(), ROUNDS)?;
     let best = if size(&better.error) < size(&near.error) { better } else { near };
     if begun.closed.is_some() && model.effects.iter().any(|s| s.law.effect().is_drag()) {
@@ -142,6 +58,49 @@ const DRAWS: u64 = 8;
 /// Sum of squares.
 pub fn size(series: &[f64]) -> f64 {
     dot(series, series)
+}
+
+/// What the motions of a start come to in the error, ready to be taken out of it.
+#[derive(Clone, Debug, Default)]
+pub struct Felt {
+    columns: Vec<Vec<f64>>,
+    /// Those that are taken out: columns start at a size near 1, and one that runs away in a loop is no start.
+    sound: Vec<usize>,
+    factors: Qr,
+}
+
+impl Felt {
+    /// Of motions that come to these columns.
+    pub fn of(columns: Vec<Vec<f64>>) -> Felt {
+        let sound: Vec<usize> = (0..columns.len()).filter(|&i| columns[i].iter().all(|v| v.abs() < 1e6)).collect();
+        let n = sound.first().map_or(0, |&i| columns[i].len());
+        let mut factors = Qr::default();
+        if n >= sound.len() {
+            factors.factor(n, sound.len(), |a| {
+                a.chunks_exact_mut(n.max(1)).zip(&sound).for_each(|(a, &i)| a.copy_from_slice(&columns[i]));
+            });
+        }
+        Felt { columns, sound, factors }
+    }
+
+    /// Whether every number of it is finite.
+    pub fn is_finite(&self) -> bool {
+        self.columns.iter().flatten().all(|v| v.is_finite())
+    }
+
+    /// Takes the motions out of an error by least squares; the share of each that counts.
+    fn taken_out_of(&self, error: &mut [f64]) -> Vec<(usize, f64)> {
+        if self.sound.is_empty() || error.len() < self.sound.len() {
+            return Vec::new();
+        }
+        let shares = self.factors.solve(&mut error.to_vec());
+        let shares = shares.into_iter().map(|s| if s.is_finite() { s } else { 0.0 });
+        let shares: Vec<(usize, f64)> = self.sound.iter().copied().zip(shares).collect();
+        for (i, s) in &shares {
+            error.iter_mut().zip(&self.columns[*i]).for_each(|(e, v)| *e -= s * v);
+        }
+        shares
+    }
 }
 
 /// A simulation whose start was found.
@@ -165,7 +124,7 @@ pub struct Begun<'a> {
     /// How many of those laws feel: what is carried over goes on whatever acts on the arm.
     resisted: usize,
     /// What of it is seen, no law resisting: in closed loop the controller answers.
-    pub linear: Vec<Vec<f64>>,
+    linear: Vec<Vec<f64>>,
 }
 
 impl<'a> Begun<'a> {
@@ -189,6 +148,16 @@ impl<'a> Begun<'a> {
         Ok(Begun { model, run, closed, constant, open, resisted, linear })
     }
 
+    /// What the start's motions come to, no law resisting.
+    pub fn unresisted(&self) -> Felt {
+        self.unresisted_of(|linear| linear)
+    }
+
+    /// The same of some of them only.
+    pub fn unresisted_of(&self, of: impl Fn(Vec<Vec<f64>>) -> Vec<Vec<f64>>) -> Felt {
+        Felt::of(of(self.linear.clone()))
+    }
+
     /// What of the start's motions is seen around one that is near: a drag resists them, and an arm that is stuck does not swing back.
     fn felt(&self, free: &[f64], here: &[f64]) -> Result<Vec<Vec<f64>>, LtiError> {
         let one = |d: &Vec<f64>| {
@@ -202,22 +171,14 @@ impl<'a> Begun<'a> {
     }
 
     /// Simulates from a free motion that is near the right one, in a number of rounds; `seen` is what the motions of the start come to.
-    pub fn found(&self, free: Vec<f64>, seen: &[Vec<f64>], rounds: usize) -> Result<Started, LtiError> {
+    pub fn found(&self, free: Vec<f64>, seen: &Felt, rounds: usize) -> Result<Started, LtiError> {
         let raw = self.simulated(free.clone())?;
         self.found_from(free, raw, seen, rounds)
     }
 
     /// The same, the simulation from that motion being known.
-    fn found_from(
-        &self,
-        mut free: Vec<f64>,
-        first: Vec<f64>,
-        seen: &[Vec<f64>],
-        rounds: usize,
-    ) -> Result<Started, LtiError> {
+    fn found_from(&self, mut free: Vec<f64>, first: Vec<f64>, seen: &Felt, rounds: usize) -> Result<Started, LtiError> {
         let mut next = Some(first);
-        // Columns start at a size near 1: one that runs away in a loop is no start.
-        let sound: Vec<usize> = (0..seen.len()).filter(|&i| seen[i].iter().all(|v| v.abs() < 1e6)).collect();
         let mut best: Option<(f64, Started)> = None;
         for _ in 0..rounds.max(1) {
             let raw = match next.take() {
@@ -227,10 +188,8 @@ impl<'a> Begun<'a> {
             if raw.iter().any(|v| !v.is_finite()) {
                 return Ok(best.map_or(Started { error: raw, free }, |b| b.1));
             }
-            let shares = least_squares(seen, &sound, &raw);
             let mut left = raw;
-            for (&i, s) in sound.iter().zip(&shares) {
-                left.iter_mut().zip(&seen[i]).for_each(|(e, v)| *e -= s * v);
+            for (i, s) in seen.taken_out_of(&mut left) {
                 free.iter_mut().zip(&self.open[i]).for_each(|(f, v)| *f += s * v);
             }
             let size = size(&left);
@@ -249,7 +208,7 @@ impl<'a> Begun<'a> {
     }
 
     /// A better start from one that is near, and what its motions come to there.
-    pub fn better(&self, free: Vec<f64>, rounds: usize) -> Result<(Started, Vec<Vec<f64>>), LtiError> {
+    pub fn better(&self, free: Vec<f64>, rounds: usize) -> Result<(Started, Felt), LtiError> {
         self.better_of(free, rounds, |felt| felt)
     }
 
@@ -264,9 +223,9 @@ impl<'a> Begun<'a> {
         free: Vec<f64>,
         rounds: usize,
         of: impl Fn(Vec<Vec<f64>>) -> Vec<Vec<f64>>,
-    ) -> Result<(Started, Vec<Vec<f64>>), LtiError> {
+    ) -> Result<(Started, Felt), LtiError> {
         let here = self.simulated(free.clone())?;
-        let felt = of(self.felt(&free, &here)?);
+        let felt = Felt::of(of(self.felt(&free, &here)?));
         Ok((self.found_from(free, here, &felt, rounds)?, felt))
     }
 
@@ -288,59 +247,24 @@ impl<'a> Begun<'a> {
     }
 }
 
-/// Shares of some of the columns in a series.
-fn least_squares(columns: &[Vec<f64>], which: &[usize], series: &[f64]) -> Vec<f64> {
-    let n = series.len();
-    if which.is_empty() || n < which.len() {
-        return Vec::new();
-    }
-    let mut qr = Qr::default();
-    qr.factor(n, which.len(), |a| {
-        a.chunks_exact_mut(n).zip(which).for_each(|(a, &i)| a.copy_from_slice(&columns[i]));
-    });
-    qr.solve(&mut series.to_vec()).into_iter().map(|s| if s.is_finite() { s } else { 0.0 }).collect()
-}
-
-/// Recorded less simulated position with a free motion of the machine, the controller hearing noise of the sensor where it is given.
-fn simulate(
+/// The error of a record from a start that is near, what the motions of the start come to there being known: one simulation.
+pub fn error_from(
     model: &SimulatedModel,
     run: &Run,
     closed: Option<&Law>,
-    constant_torque: Option<f64>,
-    free: Vec<f64>,
-    mut noise: Option<Random>,
+    constant: Option<f64>,
+    start: &[f64],
+    felt: &Felt,
 ) -> Result<Vec<f64>, LtiError> {
-    let mut machine = Machine::new(model.plant, &model.effects, model.scene)?
-        .begun_at(run.began_s)
-        .started_at(run.origin, run.before);
-    if let Some(torque) = constant_torque {
-        machine = machine.held_by(torque, model.gain_at_rest());
+    let closed = closed.filter(|_| run.reference.is_some());
+    let mut error = simulate(model, run, closed, constant, start.to_vec(), None)?;
+    if error.iter().all(|v| v.is_finite()) {
+        felt.taken_out_of(&mut error);
+        if size(&error).is_nan() || size(&error) == f64::INFINITY {
+            error.fill(f64::INFINITY);
+        }
     }
-    let mut machine = machine.carried_by(free).led_by(&run.turned);
-    let t = model.scene.sample_time_s;
-    let spindle = model.scene.spindle_hz.unwrap_or(0.0) * TAU;
-    // The controller hears what further inputs move, too.
-    let beside = |k: usize| run.coupled.get(k).copied().unwrap_or(0.0);
-    let mut out = Vec::with_capacity(run.len());
-    let mut loops = closed.zip(run.reference.as_deref()).map(|(law, reference)| {
-        let recorded: Vec<f64> = (0..run.len()).map(|k| reference[k] - run.position[k] - beside(k)).collect();
-        (law, reference, law.memory(reference, &recorded, &run.command))
-    });
-    for k in 0..run.len() {
-        let angle = run.spindle_rad.as_ref().map_or(spindle * k as f64 * t, |s| s[k]);
-        let y = machine.measure(angle, run.temperature.as_ref().map_or(0.0, |c| c[k]));
-        out.push(run.position[k] - y);
-        let heard = y + beside(k) + noise.as_mut().map_or(0.0, |n| model.scene.noise * n.normal());
-        let u = match &mut loops {
-            Some((law, reference, memory)) => {
-                let sum = step_chain(&law.chain, memory, reference[k] - heard) + law.ahead(reference, k);
-                sum.clamp(-law.limit, law.limit) + run.excitation[k]
-            }
-            None => run.input[k],
-        };
-        machine.command(u);
-    }
-    Ok(out)
+    Ok(error)
 }
 
 /// What a disturbance of the position leaves in closed loop, no limit met.

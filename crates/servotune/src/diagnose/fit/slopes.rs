@@ -186,7 +186,7 @@ mod tests {
         let controller = nominal_controller().unwrap();
         let scene = scene(&plant, controller.sample_time_s, 5.0, SAMPLES, 3e-3);
         let run = Run { position: vec![1e200; SAMPLES], rested: false, ..run(0, 1) };
-        let judged = crate::diagnose::fit::simulation::SimulatedModel {
+        let judged = crate::diagnose::fit::simulated_model::SimulatedModel {
             plant: &plant,
             effects: Vec::new(),
             own: Vec::new(),

@@ -9,12 +9,14 @@ use super::stretches::Stretches;
 use crate::diagnose::data::linear_form::FreeParameter;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
-use crate::diagnose::fit::simulation::{Begun, SimulatedModel};
+use crate::diagnose::fit::simulated_model::SimulatedModel;
+use crate::diagnose::fit::simulation::{Begun, Felt, error_from};
 use crate::lti::{Body, Plant};
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
 use crate::physics::{CurvePort, Setting};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Most Jacobians of a fit, and the relative fall of the error at which it ends.
 const ITERATIONS: usize = 6;
@@ -60,7 +62,7 @@ pub(in crate::diagnose) struct Trial<'a> {
 #[derive(Clone, Default)]
 struct Start {
     free: Vec<f64>,
-    felt: Vec<Vec<f64>>,
+    felt: Arc<Felt>,
 }
 
 /// A trial's model, ready to be simulated.
@@ -188,8 +190,7 @@ impl<'a> Trial<'a> {
     fn plain_error(&self, x: &[f64]) -> Vec<Vec<f64>> {
         self.each(x, |i, run, judged| {
             let start = &self.starts[i];
-            let found = Begun::new(judged, run, None, None)
-                .and_then(|begun| begun.found(start.free.clone(), &start.felt, 1).map(|s| s.error));
+            let found = error_from(judged, run, None, None, &start.free, &start.felt);
             // A simulation that ran away from its first sample on has no error at all.
             let whole = found.ok().filter(|e| e.len() == run.len());
             whole.unwrap_or_else(|| vec![f64::INFINITY; run.len()])
@@ -206,13 +207,14 @@ impl<'a> Trial<'a> {
             let known = last.is_some() && !reads;
             let places = if known { Vec::new() } else { start_places(judged, run, reads) };
             let free = places.into_iter().map(|x| begun.moved(x));
+            let unresisted = begun.unresisted_of(|f| seen(f, reads));
             let mut best: Option<(f64, Start)> = None;
             for free in free.chain(last) {
-                let Ok(near) = begun.found(free, &seen(&begun.linear, reads), 1) else { continue };
-                let Ok((started, felt)) = begun.better_of(near.free, ROUNDS, |f| seen(&f, reads)) else { continue };
+                let Ok(near) = begun.found(free, &unresisted, 1) else { continue };
+                let Ok((started, felt)) = begun.better_of(near.free, ROUNDS, |f| seen(f, reads)) else { continue };
                 let size = crate::diagnose::fit::simulation::size(&started.error);
                 if size.is_finite() && best.as_ref().is_none_or(|b| size < b.0) {
-                    best = Some((size, Start { free: started.free, felt }));
+                    best = Some((size, Start { free: started.free, felt: Arc::new(felt) }));
                 }
             }
             best.map(|b| b.1)
@@ -220,7 +222,7 @@ impl<'a> Trial<'a> {
         let before = std::mem::take(&mut self.starts);
         self.starts = (found.into_iter().enumerate())
             .map(|(i, f)| {
-                let rest = || Start { free: vec![0.0; self.stretches.runs[i].len()], felt: Vec::new() };
+                let rest = || Start { free: vec![0.0; self.stretches.runs[i].len()], felt: Arc::default() };
                 f.or_else(|| before.get(i).cloned()).unwrap_or_else(rest)
             })
             .collect();
@@ -310,10 +312,10 @@ impl<'a> Trial<'a> {
 
 /// The motions of a start that are looked for: where the reading is a curve of the position the torque that all records share is in
 /// the curve, and none of each record's own.
-fn seen(all: &[Vec<f64>], reads: bool) -> Vec<Vec<f64>> {
-    let left_out = |i: usize| reads && i == CONSTANT;
+fn seen(mut all: Vec<Vec<f64>>, reads: bool) -> Vec<Vec<f64>> {
     // A column that is nowhere finite is no part of a start.
-    all.iter().enumerate().map(|(i, c)| if left_out(i) { vec![f64::INFINITY; 1] } else { c.clone() }).collect()
+    all.get_mut(CONSTANT).filter(|_| reads).into_iter().for_each(|c| *c = vec![f64::INFINITY; 1]);
+    all
 }
 
 /// Places of the arm, less where it stood, from which a record may begin.

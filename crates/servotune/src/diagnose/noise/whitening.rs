@@ -8,6 +8,7 @@
 use crate::diagnose::data::linear_form::body_numbers;
 use crate::lti::Body;
 use crate::numeric::spectrum::forward;
+use crate::numeric::wide::wide;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use std::f64::consts::TAU;
 
@@ -158,6 +159,8 @@ pub struct Whitener {
 
 /// Most coefficients of the autoregression.
 const AR_ORDER: usize = 16;
+/// Samples that are filtered together.
+const BLOCK: usize = 64;
 
 impl Whitener {
     /// The innovation filter for these levels and this body.
@@ -223,10 +226,18 @@ impl Whitener {
         if order > 0 {
             // Backwards, so that each sample still finds its own past unfiltered; the coefficients run oldest first.
             let oldest: Vec<f64> = self.ar.iter().rev().copied().collect();
-            for i in (order..x.len()).rev() {
-                let past: f64 = oldest.iter().zip(&x[i - order..i]).map(|(a, v)| a * v).sum();
-                x[i] = (x[i] - past) * self.ar_scale;
-            }
+            wide(|| {
+                let mut end = x.len();
+                while end > order {
+                    let start = end.saturating_sub(BLOCK).max(order);
+                    let mut past = [0.0; BLOCK];
+                    for (j, a) in oldest.iter().enumerate() {
+                        past.iter_mut().zip(&x[start - order + j..end - order + j]).for_each(|(p, v)| *p += a * v);
+                    }
+                    x[start..end].iter_mut().zip(&past).for_each(|(v, p)| *v = (*v - p) * self.ar_scale);
+                    end = start;
+                }
+            });
             for i in (0..order.min(x.len())).rev() {
                 let past: f64 = (0..i).map(|j| self.ar[j] * x[i - 1 - j]).sum();
                 x[i] = (x[i] - past) * self.ar_scale;

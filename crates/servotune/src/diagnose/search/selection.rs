@@ -8,7 +8,7 @@ use crate::diagnose::fit::corrected_model::Corrected;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::selected_effect::SelectedEffect;
-use crate::diagnose::fit::simulation::SimulatedModel;
+use crate::diagnose::fit::simulated_model::SimulatedModel;
 use crate::diagnose::rules::{MIXTURE_LAWS, MIXTURE_LEADS};
 
 /// One step of the search.

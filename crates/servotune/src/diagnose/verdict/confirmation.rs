@@ -11,7 +11,7 @@ use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::fitted;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::selected_effect::SelectedEffect;
-use crate::diagnose::fit::simulation::SimulatedModel;
+use crate::diagnose::fit::simulated_model::SimulatedModel;
 use crate::diagnose::rules::{LAW_FAR, LAW_SAYS, LAW_SHORT};
 use crate::diagnose::search::selection::Selection;
 use crate::lti::LtiError;

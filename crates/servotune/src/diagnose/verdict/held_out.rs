@@ -8,7 +8,8 @@ use crate::diagnose::data::stacked_records::Segment;
 use crate::diagnose::fit::corrected_model::Corrected;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
-use crate::diagnose::fit::simulation::{SimulatedModel, error};
+use crate::diagnose::fit::simulated_model::SimulatedModel;
+use crate::diagnose::fit::simulation::error;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{
     ASTRAY_SHARE, ASTRAY_SIGMA, BEYOND_FAR, BEYOND_LEFT, HELD_OUT_CLEAR, HELD_OUT_FAR, HELD_OUT_LEFT,
