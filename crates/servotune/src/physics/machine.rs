@@ -360,7 +360,7 @@ impl Machine {
                 return (second, echo);
             }
             echo = (second - first) / (next - w);
-            if !(echo.abs() < ECHOES) {
+            if echo.is_nan() || echo.abs() >= ECHOES {
                 w = second;
                 break;
             }
