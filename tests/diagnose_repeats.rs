@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::diagnose_common::*;
-use servotune::diagnose::Verdict;
+use servotune::diagnose::{DiagnoseSettings, Verdict, diagnose};
 use servotune::numeric::random::Random;
-use servotune::recording::{Record, RecordEntry, Role};
+use servotune::recording::{Case, Record, RecordEntry, Role};
 
 /// Drag (command) and length over which it comes up (um) of the bearing, by Dahl's equation; the shake of each command, rms.
 const LEVEL: f64 = 0.012;
@@ -77,45 +77,83 @@ fn what_shakes_each_repeat_does_not_shorten_a_bearing() {
     assert!((h.rms_after / NOISE - 1.0).abs() < 0.06, "{h:?}");
 }
 
-/// Commands and positions of a sound arm under a controller (PD) that hears the sensor's noise; its gain is that of the model over 1.43.
-fn held_arm(drive: &[f64], seed: u64) -> (Vec<f64>, Vec<f64>) {
-    let mut noise = Random::new(seed);
-    let h = T / STEPS as f64;
-    let late = (GIVEN.delay / h).round() as usize;
-    let slope = |[x, v]: [f64; 2], w: f64| [v, GIVEN.b / 1.43 * w - GIVEN.k * x - GIVEN.c * v];
-    let (mut state, mut before) = ([0.0; 2], 0.0);
-    let (mut u, mut y): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
-    for d in drive {
-        let heard = state[0] + NOISE * noise.normal();
-        u.push(d - 0.1 * heard - 2e-4 * (heard - before) / T);
-        before = heard;
-        y.push(heard);
-        let first = (y.len() - 1) * STEPS;
-        for s in first..first + STEPS {
-            // Steps of the integrator are so short that the midpoint rule errs by far less than the noise.
-            let w = if s < late { 0.0 } else { u[(s - late) / STEPS] };
-            let [dx, dv] = slope(state, w);
-            let d = slope([state[0] + 0.5 * h * dx, state[1] + 0.5 * h * dv], w);
-            state = [state[0] + h * d[0], state[1] + h * d[1]];
+/// An arm under a controller (PD) that hears the sensor's noise: gain over that of the model, half of a dead band of the amplifier (A), amplitude
+/// of a run-out (um).
+struct HeldArm {
+    gain: f64,
+    dead_band: f64,
+    run_out: f64,
+}
+
+/// The spindle (Hz): between the lines of the excitation.
+const SPINDLE: f64 = 42.5;
+
+impl HeldArm {
+    /// Commands and positions.
+    fn answers(&self, drive: &[f64], seed: u64) -> (Vec<f64>, Vec<f64>) {
+        let mut noise = Random::new(seed);
+        let h = T / STEPS as f64;
+        let late = (GIVEN.delay / h).round() as usize;
+        let slope = |[x, v]: [f64; 2], w: f64| [v, self.gain * GIVEN.b * w - GIVEN.k * x - GIVEN.c * v];
+        let (mut state, mut before) = ([0.0; 2], 0.0);
+        let (mut u, mut y): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+        for (k, d) in drive.iter().enumerate() {
+            let run_out = self.run_out * (std::f64::consts::TAU * SPINDLE * k as f64 * T).cos();
+            let heard = state[0] + run_out + NOISE * noise.normal();
+            u.push(d - 0.1 * heard - 2e-4 * (heard - before) / T);
+            before = heard;
+            y.push(heard);
+            let first = (y.len() - 1) * STEPS;
+            for s in first..first + STEPS {
+                // Steps of the integrator are so short that the midpoint rule errs by far less than the noise.
+                let w = if s < late { 0.0 } else { u[(s - late) / STEPS] };
+                let w = w - w.clamp(-self.dead_band, self.dead_band);
+                let [dx, dv] = slope(state, w);
+                let d = slope([state[0] + 0.5 * h * dx, state[1] + 0.5 * h * dv], w);
+                state = [state[0] + h * d[0], state[1] + h * d[1]];
+            }
         }
+        (u, y)
     }
-    (u, y)
+
+    fn records(&self) -> Vec<(RecordEntry, Record)> {
+        let groups = [("a", 0.05, 4, Role::Fit), ("b", 0.15, 4, Role::Fit), ("held", 0.1, 1, Role::Holdout)];
+        let mut all = Vec::new();
+        for (name, size, repeats, role) in groups {
+            let drive = excitation(size, 5 + all.len() as u64);
+            for i in 0..repeats {
+                let (u, y) = self.answers(&drive, 700 + all.len() as u64);
+                all.push(record(&format!("{name}{i}.csv"), role, name, &u, y));
+            }
+        }
+        all
+    }
 }
 
 #[test]
 fn a_sound_arm_is_sound_where_the_given_gain_colours_what_repeats_differ_by() {
-    let groups = [("a", 0.05, 4, Role::Fit), ("b", 0.15, 4, Role::Fit), ("held", 0.1, 1, Role::Holdout)];
-    let mut all = Vec::new();
-    for (name, size, repeats, role) in groups {
-        let drive = excitation(size, 5 + all.len() as u64);
-        for i in 0..repeats {
-            let (u, y) = held_arm(&drive, 700 + all.len() as u64);
-            all.push(record(&format!("{name}{i}.csv"), role, name, &u, y));
-        }
-    }
-    let d = diagnosed_from(all);
+    let d = diagnosed_from(HeldArm { gain: 1.0 / 1.43, dead_band: 0.0, run_out: 0.0 }.records());
     assert_eq!(d.verdict, Verdict::Refit, "{:?}", d.findings);
     // The loop adds power to the noise of the wrong plant, none to that of the right one.
     assert!((d.noise.sensor_rms / NOISE - 1.0).abs() < 0.03, "{:?}", d.noise);
     assert!((d.whitened[1] - 1.0).abs() < 0.05, "{:?}", d.whitened);
+}
+
+#[test]
+fn a_run_out_is_heard_beside_a_dead_band_that_answers_the_noise() {
+    // Around a linear arm repeats differ by what the dead band makes of each one's noise, and the run-out is small beside that.
+    let (half, run_out) = (0.03, 3.0 * NOISE);
+    let arm = HeldArm { gain: 1.0, dead_band: half, run_out };
+    let case = Case { spindle_hz: Some(SPINDLE), ..case(arm.records()) };
+    let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
+    let names: Vec<&str> = d.findings.iter().map(|f| f.effect.as_str()).collect();
+    assert_eq!((d.verdict, &names[..]), (Verdict::Named, &["dead_band", "repeatable_runout"][..]), "{:?}", d.remarks);
+    let within = |at: usize, name: &str, truth: f64| {
+        let e = &d.findings[at].parameters[name];
+        assert!((e.value / truth - 1.0).abs() < 0.03, "{name} {e:?}");
+    };
+    within(0, "half_width", half);
+    within(1, "amplitude", run_out);
+    let h = d.fit.holdout.unwrap();
+    assert!(h.rms_after < 1.1 * NOISE, "{h:?}");
 }

@@ -126,17 +126,21 @@ pub fn diagnosed_from(records: Vec<(RecordEntry, Record)>) -> Diagnosis {
     diagnosed_with(&plant(), records)
 }
 
-/// The diagnosis of these records with a model of their machine.
-pub fn diagnosed_with(model: &Plant, records: Vec<(RecordEntry, Record)>) -> Diagnosis {
-    let case = Case {
+/// These records, nothing known of a controller or a spindle.
+pub fn case(records: Vec<(RecordEntry, Record)>) -> Case {
+    Case {
         id: "test".into(),
         plant: PathBuf::new(),
         controller: None,
         spindle_hz: None,
         further_inputs: vec![],
         records,
-    };
-    diagnose(&case, model, None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
+    }
+}
+
+/// The diagnosis of these records with a model of their machine.
+pub fn diagnosed_with(model: &Plant, records: Vec<(RecordEntry, Record)>) -> Diagnosis {
+    diagnose(&case(records), model, None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis
 }
 
 /// Two moves of three repeats, and one held out.

@@ -6,10 +6,11 @@
 use super::diagnosis_data::DiagnosisData;
 use super::equation_error_fit::linear_error;
 use crate::diagnose::data::linear_form::{LinearForm, Sampled};
-use crate::diagnose::noise::repeats::{in_laps, noise_series, values, without_start};
+use crate::diagnose::noise::repeats::{in_laps, noise_of, noise_series, values, without_start};
 use crate::diagnose::noise::torque_noise::Differences;
 use crate::diagnose::rules::HEARD_BETTER;
 use crate::lti::{LtiError, Plant};
+use crate::numeric::statistics::rms;
 use crate::physics::Scene;
 
 /// What repeats differ by around each of some plants, each plant once, lines taken out as around the plant of `data`; nothing without repeats.
@@ -54,6 +55,26 @@ impl DiagnosisData {
         let scene = Scene { plant: self.scene.plant.clone(), ..heard.scene.clone() };
         let same = DiagnosisData { form: self.form.clone(), scene, foretold: self.foretold.clone(), ..heard };
         (same.repeats_rms < HEARD_BETTER * self.repeats_rms).then_some(same)
+    }
+}
+
+impl DiagnosisData {
+    /// The same with the noise as repeats show it around a model with laws, `left` being what it leaves of every fit run in plain simulation, where
+    /// they differ less by it; none where they do not. A law answers the other noise in each repeat, and a linear plant leaves that in their difference.
+    pub fn heard_through(&self, left: &[Vec<f64>]) -> Option<DiagnosisData> {
+        if self.repeats.is_empty() || self.grid.is_some() || !self.is_sprung() {
+            return None;
+        }
+        let own: Vec<(usize, Vec<f64>)> = self.fit_runs.iter().copied().zip(left.iter().cloned()).collect();
+        let series = noise_series(&in_laps(&own, &self.runs), &self.runs);
+        let free = |n: usize| self.starts(n);
+        let rms = rms(&values(&without_start(&series, &free, &|_| {})).concat());
+        if rms.is_nan() || rms >= HEARD_BETTER * self.repeats_rms {
+            return None;
+        }
+        let (levels, whitener, repeats) =
+            noise_of(&series, &free, &self.form.given.body, self.scene.sample_time_s, true);
+        Some(DiagnosisData { levels, whitener, repeats, repeats_rms: rms, ..self.clone() })
     }
 }
 

@@ -73,6 +73,9 @@ rules! {
     REFIT_BETTER: f64 = 0.95, "ratio",
         "share of the refit's error that the fit by simulation must stay below",
         "another kind of fit needs a reason";
+    HEARD_AGAIN: f64 = 0.95, "ratio",
+        "open-loop error of the fit records with numbers fitted once more under the noise that repeats show around the model, over that before, below which they are taken",
+        "judgement: less is not worth another answer";
     BALANCES: f64 = 0.3, "share",
         "squares of the linear balance of torques that a curve leaves, below which it balances well and is the start of its fit",
         "judgement: it saves fits, and the error on parts left out decides";

@@ -11,7 +11,7 @@ rules! {
         "rounding over the noise of repeats from which repeats round alike",
         "a mean then does not take the rounding away (Widrow and Kollar 2008)";
     HEARD_BETTER: f64 = 0.98, "ratio",
-        "what repeats differ by around the linear refit over the same around the given plant, below which the refit tells the noise",
+        "what repeats differ by around the linear refit, or a model with laws, over the same around the given plant, below which that model tells the noise",
         "around the plant that is there the sensor's noise comes out smallest, whatever the controller makes of it: a monic filter adds power (Jensen)";
     FAR_FROM_REPEATS: f64 = 5.0, "ratio",
         "plain simulation error of the cleared plant and its law over what repeats differ by, from which models are judged by that error",

@@ -8,7 +8,7 @@ use super::rule::{Floor, Rule, rules};
 rules! {
     Floor::Verdict;
     RUN_OUT_HELPS: f64 = 0.9, "ratio",
-        "error of the records that judge with a run-out that was taken out and all searched again, over that without, below which it is kept",
+        "error of the records that judge, as shown or in open loop, with a run-out that was taken out and all searched again, over that without, below which it is kept",
         "judgement: an order that another law's form feeds takes little with it";
     SHOWN_BY: f64 = 0.02, "share",
         "energy of an effect in a record over that in the strongest, above which the record shows it",

@@ -4,12 +4,15 @@ use super::bootstrap_chance::Bootstrap;
 use super::candidate::Candidate;
 use super::residual_effect::ResidualEffect;
 use super::rival_model::Rival;
-use crate::diagnose::fit::corrected_model::Corrected;
+use crate::diagnose::data::run::Run;
+use crate::diagnose::fit::corrected_model::{Corrected, corrected};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
+use crate::diagnose::fit::output_error_fit::{simulated_from, simulation_error};
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::fit::simulated_model::SimulatedModel;
-use crate::diagnose::rules::{MIXTURE_LAWS, MIXTURE_LEADS};
+use crate::diagnose::fit::simulation::{errors, rms, size};
+use crate::diagnose::rules::{HEARD_AGAIN, MIXTURE_LAWS, MIXTURE_LEADS};
 
 /// One step of the search.
 #[derive(Clone)]
@@ -74,6 +77,44 @@ impl Selection {
     /// The model that numbers are taken from.
     pub fn last(&self) -> &Model {
         self.simulated.as_ref().unwrap_or(&self.model)
+    }
+}
+
+impl Selection {
+    /// The same with the last model's numbers fitted once more under the noise as repeats show it around that model, where that simulates the fit
+    /// records clearly better in open loop. Intervals stay those of the noise that the search went by.
+    ///
+    /// Around a linear plant repeats of a loop differ by what a missing law makes of its noise, too, most of all at the low frequencies that a
+    /// position is made of; a fit under that noise hardly looks at them.
+    pub fn heard_again(self, data: &DiagnosisData) -> Selection {
+        match self.better_heard(data) {
+            Some(found) => Selection { simulated: Some(found), ..self },
+            None => self,
+        }
+    }
+
+    fn better_heard(&self, data: &DiagnosisData) -> Option<Model> {
+        let last = self.last();
+        let fit: Vec<&Run> = data.fit_runs.iter().map(|&r| &data.runs[r]).collect();
+        let left = |m: &Model| {
+            let made = corrected(&data.form, &m.refitted.p, &m.chosen, &data.scene);
+            errors(&made.judged(data, self), &fit, None)
+        };
+        if last.chosen.is_empty() {
+            return None;
+        }
+        let before = left(last);
+        let mut found = simulated_from(&data.heard_through(&before)?, last, f64::INFINITY)?;
+        let [after, before] = [&left(&found), &before].map(|e| rms(e));
+        if after.is_nan() || after >= HEARD_AGAIN * before {
+            return None;
+        }
+        found.cost = size(&simulation_error(data, &found));
+        found.refitted.cost = found.cost;
+        if found.refitted.count() == last.refitted.count() {
+            found.refitted.directions.clone_from(&last.refitted.directions);
+        }
+        Some(found)
     }
 }
 

@@ -46,6 +46,11 @@ impl Outcome {
         judged(&self.data, &self.errors[2])
     }
 
+    /// The same in open loop.
+    pub fn judged_open(&self) -> f64 {
+        judged(&self.data, &self.open[2])
+    }
+
     /// The figures that count.
     pub fn figures(&self) -> FitFigures {
         self.fit.holdout.unwrap_or(self.fit.fit)

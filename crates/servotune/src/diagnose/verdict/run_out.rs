@@ -48,6 +48,8 @@ impl RunOut {
         if named || made.judgement.verdict == Verdict::DataFault {
             return None;
         }
+        let heard = heard(made);
+        let data = heard.as_ref().unwrap_or(data);
         let left = Left::of(data, &made.open[2])?;
         let mut orders = standing_orders(&left.errors, data.scene.sample_time_s, data.scene.spindle_hz);
         orders.retain(|o| data.lines.iter().all(|l| l.order != o.order));
@@ -56,7 +58,8 @@ impl RunOut {
 
     /// The same orders once more, fitted to what is left where they are taken out already.
     pub fn bettered(&self, made: &Outcome) -> Option<RunOut> {
-        let more = Left::of(&made.data, &made.open[2])?.fitted(self.orders.clone())?;
+        let heard = heard(made);
+        let more = Left::of(heard.as_ref().unwrap_or(&made.data), &made.open[2])?.fitted(self.orders.clone())?;
         let phasors = self.phasors.iter().zip(&more.phasors).map(|(a, b)| [a[0] + b[0], a[1] + b[1]]).collect();
         Some(RunOut { phasors, gain: self.gain + more.gain, ..more })
     }
@@ -148,6 +151,12 @@ impl RunOut {
             place,
         }
     }
+}
+
+/// The diagnosis data with the noise as repeats show it around the offered model, where that is less.
+fn heard(made: &Outcome) -> Option<DiagnosisData> {
+    let left: Vec<Vec<f64>> = made.data.fit_runs.iter().map(|&r| made.open[2][r].clone()).collect();
+    made.data.heard_through(&left)
 }
 
 /// The frequencies of a run-out's harmonics, as a person says them.
