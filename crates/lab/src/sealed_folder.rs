@@ -14,6 +14,8 @@ struct CaseFile<'a> {
     id: &'a str,
     plant: &'static str,
     controller: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    spindle_hz: Option<f64>,
     records: Vec<RecordEntry>,
 }
 
@@ -26,7 +28,8 @@ pub(super) fn add(study: &mut Study, id: &str, given: &(Case, Plant, Controller)
         study.page(&format!("mismatch/{id}/{file}"), csv(record));
         records.push(RecordEntry { file: file.into(), ..entry.clone() });
     }
-    let file = CaseFile { id, plant: "plant.toml", controller: "controller.toml", records };
+    let (plant_file, controller_file) = ("plant.toml", "controller.toml");
+    let file = CaseFile { id, plant: plant_file, controller: controller_file, spindle_hz: case.spindle_hz, records };
     study.page(&format!("mismatch/{id}/case.toml"), toml::to_string(&file)?);
     study.page(&format!("mismatch/{id}/plant.toml"), toml::to_string(&PlantFile::from(plant))?);
     study.page(&format!("mismatch/{id}/controller.toml"), toml::to_string(controller)?);
