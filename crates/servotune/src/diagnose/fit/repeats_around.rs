@@ -44,10 +44,15 @@ pub(in crate::diagnose) fn repeats_around(
 }
 
 impl DiagnosisData {
-    /// The same with the noise as repeats show it around another plant, where they differ less by it; none where they do not. A free body is left
-    /// alone: what its repeats differ by is mostly drift. So is a log on a lattice: repeats that round alike differ by too little.
+    /// Whether what repeats differ by may be told anew. A free body is left alone: what its repeats differ by is mostly drift. So is a log on a
+    /// lattice: repeats that round alike differ by too little.
+    fn may_be_heard_anew(&self) -> bool {
+        !self.repeats.is_empty() && self.grid.is_none() && self.is_sprung()
+    }
+
+    /// The same with the noise as repeats show it around another plant, where they differ less by it; none where they do not.
     pub fn heard_around(&self, plant: &Plant) -> Option<DiagnosisData> {
-        if self.repeats.is_empty() || self.grid.is_some() || !self.is_sprung() || self.heard == *plant {
+        if !self.may_be_heard_anew() || self.heard == *plant {
             return None;
         }
         let (t, spindle_hz) = (self.scene.sample_time_s, self.scene.spindle_hz);
@@ -56,13 +61,11 @@ impl DiagnosisData {
         let same = DiagnosisData { form: self.form.clone(), scene, foretold: self.foretold.clone(), ..heard };
         (same.repeats_rms < HEARD_BETTER * self.repeats_rms).then_some(same)
     }
-}
 
-impl DiagnosisData {
     /// The same with the noise as repeats show it around a model with laws, `left` being what it leaves of every fit run in plain simulation, where
     /// they differ less by it; none where they do not. A law answers the other noise in each repeat, and a linear plant leaves that in their difference.
     pub fn heard_through(&self, left: &[Vec<f64>]) -> Option<DiagnosisData> {
-        if self.repeats.is_empty() || self.grid.is_some() || !self.is_sprung() {
+        if !self.may_be_heard_anew() {
             return None;
         }
         let own: Vec<(usize, Vec<f64>)> = self.fit_runs.iter().copied().zip(left.iter().cloned()).collect();
