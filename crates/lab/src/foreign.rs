@@ -151,12 +151,6 @@ impl Foreign {
         if self.lattice > 0.0 { self.lattice * (y / self.lattice).floor() } else { y }
     }
 
-    /// Sum of squares of the encoder's noise in a record of so many samples.
-    pub fn noise_drawn(&self, samples: usize, seed: u64) -> f64 {
-        let mut noise = Random::stream(seed, 0);
-        (0..samples).map(|_| (self.noise * noise.normal()).powi(2)).sum()
-    }
-
     /// Reference and excitation to command and position, in closed loop from rest. The seed draws noise and wind.
     pub fn record(&self, reference: &[f64], excitation: &[f64], seed: u64) -> [Vec<f64>; 2] {
         let (mut noise, mut wind) = (Random::stream(seed, 0), Random::stream(seed, 1));

@@ -152,12 +152,13 @@ impl SealedCase {
         })
     }
 
-    /// Share of what the better linear model leaves beyond the noise that was drawn, which the program does not know; none of a stage.
+    /// Share of what the better linear model leaves beyond what the machine itself leaves without its encoder's noise, which the program does not
+    /// know; none of a stage.
     fn explained(&self, held: &FitFigures) -> Option<f64> {
         let Made::Arm(trial) = &self.drawn.made else { return None };
         let records = self.made.0.records.iter().enumerate();
         let held_out: Vec<usize> = records.filter(|(_, (e, _))| e.role == Role::Holdout).map(|(i, _)| i).collect();
-        let noise = self.drawn.scale.position.powi(2) * trial.noise_drawn(&held_out);
+        let noise = self.drawn.scale.position.powi(2) * trial.left_by_itself(&held_out);
         let beyond = |rms: f64| rms * rms - noise;
         Some(1.0 - beyond(held.rms_after) / beyond(held.rms_before.min(held.rms_refit_linear)))
     }

@@ -112,7 +112,7 @@ pub(super) fn page(seed: u64, rows: &[Row], published: Option<usize>) -> String 
     );
     line(
         &mut text,
-        "of those, a curve explains at least 90 % of the excess on held-out records (over the noise that was drawn)",
+        "of those, a curve explains at least 90 % of the excess on held-out records (beyond what the machine itself leaves when it is simulated without its encoder's noise)",
         share(count(&outside, &explained), outside.len()),
         "80 %",
     );

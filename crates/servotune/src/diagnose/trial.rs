@@ -162,7 +162,7 @@ impl Trial<'_> {
         let sound = self.log_checks.finding.is_none();
         let search_settings = SelectSettings { by_simulation: sound, ..self.settings.select.clone() };
         let (data, selection) = select(data, library(), &search_settings, &mut *progress);
-        let selection = if sound { selection.heard_again(&data) } else { selection };
+        let selection = if sound { selection.heard_again(&data, search_settings.iterations) } else { selection };
         progress("simulating all records");
         let last = selection.last();
         let plants = [data.form.given.clone(), data.form.plant(&selection.baseline.refitted.p), self.given.clone()];

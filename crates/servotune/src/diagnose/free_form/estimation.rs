@@ -128,7 +128,7 @@ fn better<'a>(a: Option<Foretelling<'a>>, b: Option<Foretelling<'a>>) -> Option<
 /// The best fit of a shape from several linear parameters.
 fn from_each<'a>(
     data: &'a DiagnosisData,
-    stretches: &'a Stretches,
+    stretches: &'a Stretches<'a>,
     starts: &[Vec<f64>],
     shape: &Shape,
 ) -> Option<Foretelling<'a>> {
@@ -150,7 +150,7 @@ fn doubled(at: &[f64]) -> Vec<f64> {
 }
 
 /// The same curve over more knots, where it foretells clearly better: what acts at one place only falls between few.
-fn finer<'a>(data: &'a DiagnosisData, ground: &'a Stretches, mut found: Foretelling<'a>) -> Foretelling<'a> {
+fn finer<'a>(data: &'a DiagnosisData, ground: &'a Stretches<'a>, mut found: Foretelling<'a>) -> Foretelling<'a> {
     for _ in 0..FINER {
         let Shape::Curve(port, knots, value) = &found.trial.shape else { break };
         if matches!(port, CurvePort::SensorOverPosition | CurvePort::TorqueOverMotion) {
@@ -200,7 +200,7 @@ pub(in crate::diagnose) fn may_fold(data: &DiagnosisData) -> bool {
 }
 
 /// Readings that fold or end at limits, each fitted from several starts.
-fn readings<'a>(data: &'a DiagnosisData, stretches: &'a Stretches, starts: &[Vec<f64>]) -> Vec<Foretelling<'a>> {
+fn readings<'a>(data: &'a DiagnosisData, stretches: &'a Stretches<'a>, starts: &[Vec<f64>]) -> Vec<Foretelling<'a>> {
     let Some([(low, below), (high, above)]) = ends(&stretches.runs) else { return Vec::new() };
     let fitted = |starts: &[Vec<f64>], reading: Shape| {
         // A lag in front changes the whole motion: it is no afterthought here.
@@ -219,7 +219,7 @@ fn readings<'a>(data: &'a DiagnosisData, stretches: &'a Stretches, starts: &[Vec
 /// The sensor's curve: from a straight one, and from the readings that fold or end.
 fn sensor<'a>(
     data: &'a DiagnosisData,
-    stretches: &'a Stretches,
+    stretches: &'a Stretches<'a>,
     starts: &[Vec<f64>],
     readings: &[Foretelling<'a>],
 ) -> Option<Foretelling<'a>> {
@@ -254,7 +254,7 @@ fn range(data: &DiagnosisData) -> f64 {
 }
 
 /// Stretches for the linear plant and most ports, and for the sensor's curve.
-pub(in crate::diagnose) fn grounds(data: &DiagnosisData) -> [Stretches; 2] {
+pub(in crate::diagnose) fn grounds<'a>(data: &DiagnosisData) -> [Stretches<'a>; 2] {
     let plain = Stretches::of(data);
     let one_place = plain.standing_alike();
     [plain, one_place]
@@ -264,7 +264,7 @@ pub(in crate::diagnose) fn grounds(data: &DiagnosisData) -> [Stretches; 2] {
 /// curve is not asked for.
 pub(in crate::diagnose) fn estimated<'a>(
     data: &'a DiagnosisData,
-    (ground, one_place): (&'a Stretches, Option<&'a Stretches>),
+    (ground, one_place): (&'a Stretches<'a>, Option<&'a Stretches<'a>>),
     starts: &[Vec<f64>],
     curves: &[Curved],
     progress: &mut dyn FnMut(&str),
@@ -335,7 +335,7 @@ pub(in crate::diagnose) fn estimated<'a>(
 /// The fit of a shape from the curve of a balance, with the plant beside which it simulates best: its own, or one of some others.
 fn from_balance<'a>(
     data: &'a DiagnosisData,
-    ground: &'a Stretches,
+    ground: &'a Stretches<'a>,
     curve: &Curved,
     others: &[Vec<f64>],
 ) -> Option<Foretelling<'a>> {
@@ -353,7 +353,7 @@ fn from_balance<'a>(
 /// A torque over position and velocity, where the balance foretells clearly better with it than with any curve over one argument.
 fn surface<'a>(
     data: &'a DiagnosisData,
-    ground: &'a Stretches,
+    ground: &'a Stretches<'a>,
     curves: &[Curved],
     starts: &[Vec<f64>],
 ) -> Option<Foretelling<'a>> {
@@ -365,7 +365,7 @@ fn surface<'a>(
 }
 
 /// The best curve at another port beside a reading that folds or ends at limits.
-fn beside<'a>(reading: &Foretelling<'a>, one_place: &'a Stretches) -> Option<(Foretelling<'a>, Vec<(CurvePort, f64)>)> {
+fn beside<'a>(reading: &Foretelling<'a>, one_place: &'a Stretches<'a>) -> Option<(Foretelling<'a>, Vec<(CurvePort, f64)>)> {
     let data = reading.trial.data;
     let (mut best, mut tried) = (None, Vec::new());
     for port in CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition) {

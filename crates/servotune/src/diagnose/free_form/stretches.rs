@@ -3,6 +3,7 @@
 //!
 //! In: the diagnosis data. Out: runs, and which of them are left out together.
 
+use crate::controller::Law;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 
@@ -21,9 +22,11 @@ const BRIEF: usize = 100;
 const BRIEF_PIECES: usize = 24;
 
 /// What a curve is fitted to.
-pub(in crate::diagnose) struct Stretches {
+pub(in crate::diagnose) struct Stretches<'a> {
     /// One after the other.
     pub runs: Vec<Run>,
+    /// The controller, where they are simulated in the loop that they were recorded in.
+    pub closed: Option<&'a Law<'a>>,
     /// Blocks of consecutive samples of the runs in their order: samples, and the part that it is left out with.
     pub blocks: Vec<(usize, usize)>,
 }
@@ -33,9 +36,9 @@ fn piece(run: &Run, from: usize, to: usize, sample_time_s: f64) -> Run {
     Run { rested: false, ..run.stretch(from, to, sample_time_s) }
 }
 
-impl Stretches {
+impl<'a> Stretches<'a> {
     /// Of the mean runs of the diagnosis data.
-    pub fn of(data: &DiagnosisData) -> Stretches {
+    pub fn of(data: &DiagnosisData) -> Stretches<'a> {
         let total: usize = data.means.iter().map(Run::len).sum();
         let runs = if total <= MOST { data.means.clone() } else { spread(&data.means, total, data) };
         let whole = runs.len() >= MANY;
@@ -47,12 +50,17 @@ impl Stretches {
                 blocks.push((len, if whole { i % FOLDS } else { k % FOLDS }));
             }
         }
-        Stretches { runs, blocks }
+        Stretches { runs, closed: None, blocks }
+    }
+
+    /// The same in the loop that they were recorded in, which holds motions together that a law would drive apart.
+    pub fn in_loop(&self, law: &'a Law<'a>) -> Stretches<'a> {
+        Stretches { runs: self.runs.clone(), closed: Some(law), blocks: self.blocks.clone() }
     }
 
     /// The same in short pieces, each with a start of its own: a law that drives motions apart is followed over as long as they stay
     /// together. None where records are short already.
-    pub fn in_short_pieces(&self, sample_time_s: f64) -> Option<Stretches> {
+    pub fn in_short_pieces(&self, sample_time_s: f64) -> Option<Stretches<'a>> {
         let cut = |run: &Run| -> Vec<Run> {
             let pieces = (run.len() / BRIEF).clamp(1, BRIEF_PIECES);
             let edge = |k: usize| run.len() * k / pieces;
@@ -64,17 +72,17 @@ impl Stretches {
         };
         let runs: Vec<Run> = self.runs.iter().flat_map(cut).collect();
         let blocks = runs.iter().enumerate().map(|(i, r)| (r.len(), i % FOLDS)).collect();
-        (runs.len() > self.runs.len()).then_some(Stretches { runs, blocks })
+        (runs.len() > self.runs.len()).then_some(Stretches { runs, closed: self.closed, blocks })
     }
 
     /// The same for a sensor whose curve is asked for: where the arm stands is not known from what it reads, but all records share
     /// one machine, which stands at one place under one command.
-    pub fn standing_alike(&self) -> Stretches {
+    pub fn standing_alike(&self) -> Stretches<'a> {
         let samples: f64 = self.runs.iter().map(|r| r.len() as f64).sum();
         let mean = |of: &dyn Fn(&Run) -> &Vec<f64>| self.runs.iter().flat_map(of).sum::<f64>() / samples;
         let (origin, before) = (mean(&|r| &r.position), mean(&|r| &r.input));
         let runs = self.runs.iter().map(|r| Run { origin, before, ..r.clone() }).collect();
-        Stretches { runs, blocks: self.blocks.clone() }
+        Stretches { runs, closed: self.closed, blocks: self.blocks.clone() }
     }
 
     /// Samples in all.

@@ -43,7 +43,7 @@ const LOOKED: usize = 64;
 #[derive(Clone)]
 pub(in crate::diagnose) struct Trial<'a> {
     pub data: &'a DiagnosisData,
-    pub stretches: &'a Stretches,
+    pub stretches: &'a Stretches<'a>,
     /// All linear parameters; those that are not free stay as they stand here.
     pub p: Vec<f64>,
     /// Those that are free.
@@ -90,7 +90,7 @@ fn free_parameters(data: &DiagnosisData, shape: &Shape) -> Vec<usize> {
 
 impl<'a> Trial<'a> {
     /// A fit from these linear parameters.
-    pub fn new(data: &'a DiagnosisData, stretches: &'a Stretches, p: &[f64], shape: Shape) -> Trial<'a> {
+    pub fn new(data: &'a DiagnosisData, stretches: &'a Stretches<'a>, p: &[f64], shape: Shape) -> Trial<'a> {
         Trial {
             data,
             stretches,
@@ -110,7 +110,7 @@ impl<'a> Trial<'a> {
     }
 
     /// The same numbers on other stretches.
-    pub fn over<'b>(self, stretches: &'b Stretches) -> Trial<'b>
+    pub fn over<'b>(self, stretches: &'b Stretches<'b>) -> Trial<'b>
     where
         'a: 'b,
     {
@@ -190,7 +190,7 @@ impl<'a> Trial<'a> {
     fn plain_error(&self, x: &[f64]) -> Vec<Vec<f64>> {
         self.each(x, |i, run, judged| {
             let start = &self.starts[i];
-            let found = error_from(judged, run, None, None, &start.free, &start.felt);
+            let found = error_from(judged, run, self.stretches.closed, None, &start.free, &start.felt);
             // A simulation that ran away from its first sample on has no error at all.
             let whole = found.ok().filter(|e| e.len() == run.len());
             whole.unwrap_or_else(|| vec![f64::INFINITY; run.len()])
@@ -201,7 +201,7 @@ impl<'a> Trial<'a> {
     fn settle(&mut self, x: &[f64]) {
         let reads = self.reads();
         let found = self.each(x, |i, run, judged| {
-            let begun = Begun::new(judged, run, None, None).ok()?;
+            let begun = Begun::new(judged, run, self.stretches.closed, None).ok()?;
             let last = self.starts.get(i).map(|s| s.free.clone());
             // Where the reading does not hide it, the arm stands where it was found to stand.
             let known = last.is_some() && !reads;
@@ -250,14 +250,16 @@ impl<'a> Trial<'a> {
     pub fn descend(&mut self) -> f64 {
         let mut x = self.numbers();
         let before = self.clone();
+        let rough = |t: &Self, x: &[f64]| size(&t.roughness(&x[t.shape_from()..]));
         self.settle(&x);
         let first = size(&self.error(&x));
+        let least = first + rough(self, &x);
         let iterations = if matches!(self.shape, Shape::Curve(..)) { ITERATIONS } else { OF_FEW };
         let settings = LevenbergSettings { iterations, tolerance: TOLERANCE };
         minimise(self, &mut x, &settings, &mut Workspace::default());
         self.settle(&x);
         let last = size(&self.error(&x));
-        if last < first || self.smoothness > 0.0 && last.is_finite() {
+        if last + rough(self, &x) < least {
             self.take(&x);
             return last;
         }

@@ -7,6 +7,7 @@ use super::rival_model::Rival;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, corrected};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
+use crate::diagnose::fit::fitted_model::fitted;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_fit::{simulated_from, simulation_error};
 use crate::diagnose::fit::selected_effect::SelectedEffect;
@@ -82,18 +83,23 @@ impl Selection {
 
 impl Selection {
     /// The same with the last model's numbers fitted once more under the noise as repeats show it around that model, where that simulates the fit
-    /// records clearly better in open loop. Intervals stay those of the noise that the search went by.
+    /// records clearly better in open loop. Intervals stay those of the noise that the search went by. Laws whose strength under the new noise
+    /// is nothing go: they stood in for what repeats differ by.
     ///
     /// Around a linear plant repeats of a loop differ by what a missing law makes of its noise, too, most of all at the low frequencies that a
     /// position is made of; a fit under that noise hardly looks at them.
-    pub fn heard_again(self, data: &DiagnosisData) -> Selection {
-        match self.better_heard(data) {
-            Some(found) => Selection { simulated: Some(found), ..self },
-            None => self,
+    pub fn heard_again(mut self, data: &DiagnosisData, iterations: usize) -> Selection {
+        let Some((heard, mut found)) = self.better_heard(data) else { return self };
+        while let Some(less) = self.without_silent(data, &heard, &found, iterations) {
+            (self, found) = less;
         }
+        found.cost = size(&simulation_error(data, &found));
+        found.refitted.cost = found.cost;
+        Selection { simulated: Some(found), ..self }
     }
 
-    fn better_heard(&self, data: &DiagnosisData) -> Option<Model> {
+    /// The noise around the last model, and that model fitted under it, where that is clearly better.
+    fn better_heard(&self, data: &DiagnosisData) -> Option<(DiagnosisData, Model)> {
         let last = self.last();
         let fit: Vec<&Run> = data.fit_runs.iter().map(|&r| &data.runs[r]).collect();
         let left = |m: &Model| {
@@ -104,18 +110,41 @@ impl Selection {
             return None;
         }
         let before = left(last);
-        let mut found = simulated_from(&data.heard_through(&before)?, last, f64::INFINITY)?;
+        let heard = data.heard_through(&before)?;
+        let found = with_errors_of(last, simulated_from(&heard, last, f64::INFINITY)?);
         let [after, before] = [&left(&found), &before].map(|e| rms(e));
-        if after.is_nan() || after >= HEARD_AGAIN * before {
-            return None;
-        }
-        found.cost = size(&simulation_error(data, &found));
-        found.refitted.cost = found.cost;
-        if found.refitted.count() == last.refitted.count() {
-            found.refitted.directions.clone_from(&last.refitted.directions);
-        }
-        Some(found)
+        (after < HEARD_AGAIN * before).then_some((heard, found))
     }
+
+    /// The search and the model under `heard` without the first law that has become nothing there; none where every law is something.
+    fn without_silent(
+        &self,
+        data: &DiagnosisData,
+        heard: &DiagnosisData,
+        found: &Model,
+        iterations: usize,
+    ) -> Option<(Selection, Model)> {
+        let count = found.chosen.len();
+        let at = (0..count).find(|&i| count > 1 && found.is_silent(i))?;
+        let mut less = found.clone();
+        less.chosen.remove(at);
+        let less = simulated_from(heard, &less, f64::INFINITY)?;
+        let mut rest = self.clone();
+        rest.model.chosen.remove(at);
+        rest.rivals.remove(at);
+        rest.model = fitted(data, rest.model.chosen, &rest.model.refitted.p, iterations);
+        rest.simulated = None;
+        let less = with_errors_of(&rest.model, less);
+        Some((rest, less))
+    }
+}
+
+/// A model with the errors of its numbers as another fit of the same numbers has them.
+fn with_errors_of(other: &Model, mut model: Model) -> Model {
+    if model.refitted.count() == other.refitted.count() {
+        model.refitted.directions.clone_from(&other.refitted.directions);
+    }
+    model
 }
 
 impl Corrected {

@@ -51,8 +51,8 @@ pub(in crate::diagnose) struct Standing<'a> {
     pub floor: f64,
 }
 
-/// Looks for a curve and takes it where it is worth it: on whole records, then on short pieces of them, for a law under which simulations of
-/// whole records part. It is estimated on the ground of the search, which may be of excerpts, and judged on the same with whole runs.
+/// Looks for a curve and takes it where it is worth it: on whole records, then in the loop that they were recorded in, then on short pieces of
+/// them, for a law under which simulations of whole records part. It is estimated on the ground of the search, which may be of excerpts, and judged on the same with whole runs.
 pub(in crate::diagnose) fn stand_in(
     [data, whole]: [&DiagnosisData; 2],
     selection: &Selection,
@@ -65,10 +65,15 @@ pub(in crate::diagnose) fn stand_in(
         let found = estimated(data, (ground, sensor), &starts, &balanced, progress)?;
         stands(whole, &found, &one_place, standing)
     };
-    on(&ground, Some(&one_place), progress).or_else(|| {
-        progress("a curve without a name, on short pieces of the records");
-        on(&ground.in_short_pieces(data.scene.sample_time_s)?, None, progress)
-    })
+    on(&ground, Some(&one_place), progress)
+        .or_else(|| {
+            progress("a curve without a name, in the loop of the records");
+            on(&ground.in_loop(standing.closed?), None, progress)
+        })
+        .or_else(|| {
+            progress("a curve without a name, on short pieces of the records");
+            on(&ground.in_short_pieces(data.scene.sample_time_s)?, None, progress)
+        })
 }
 
 /// What was estimated, where it is worth it.
@@ -121,7 +126,7 @@ fn shown(
         let place = &one_place.runs[0];
         let runs: Vec<Run> =
             data.runs.iter().map(|r| Run { origin: place.origin, before: place.before, ..r.clone() }).collect();
-        let all = Stretches { blocks: runs.iter().map(|r| (r.len(), 0)).collect(), runs };
+        let all = Stretches { blocks: runs.iter().map(|r| (r.len(), 0)).collect(), closed: None, runs };
         return best.trial.clone().over(&all).shown();
     }
     let every: Vec<&Run> = data.runs.iter().collect();
