@@ -1,7 +1,7 @@
 //! Tuning over a model: limits met by the exact judgement, verdicts, bounds, determinism, truth by enumeration.
 #![allow(clippy::unwrap_used)]
 
-use crate::tune_common::{paper_plant, paper_spec, start_controller};
+use crate::tune_common::{TUNED, paper_plant, paper_spec, quick, start_controller, tuned_on};
 use servotune::controller::{Controller, Pid};
 use servotune::feedback::{LoopOnGrid, ModelLoop, SampledPlant, margins};
 use servotune::lti::{Body, DiscretePlant, Plant};
@@ -13,22 +13,15 @@ use servotune::tune::{
 use std::f64::consts::TAU;
 use std::path::Path;
 
-fn quick() -> TuneSettings {
-    TuneSettings { starts: 6, ..TuneSettings::default() }
-}
-
 #[test]
 fn a_feasible_spec_is_met_by_exact_margins_and_lowers_the_dft() {
     let (plant, spec) = (paper_plant(), paper_spec());
     let machine = Machine::Model(&plant);
-    let start = start_controller();
-    let Outcome::Tuned(tuned) = tune(&machine, &spec, Some(&start), &TuneSettings::default()).unwrap() else {
-        panic!("feasible")
-    };
+    let Outcome::Tuned(tuned) = &*TUNED else { panic!("feasible") };
     let proof = judge(&machine, &tuned.controller, &spec).unwrap();
     assert!(proof.judged.passes() && proof.margins.stable);
     assert_eq!(proof, tuned.after[0]);
-    let before = &tuned.before.unwrap()[0].judged.found;
+    let before = &tuned.before.as_ref().unwrap()[0].judged.found;
     assert!(proof.judged.found.dft() < before.dft());
 }
 
@@ -38,7 +31,7 @@ fn an_infeasible_spec_names_the_conflict_and_a_relaxation_that_tuning_again_conf
     spec.margins.phase_margin_deg = Some(75.0);
     spec.margins.gain_crossover_hz = Some([900.0, 1500.0]);
     let machine = Machine::Model(&plant);
-    let Outcome::Infeasible(said) = tune(&machine, &spec, None, &TuneSettings::default()).unwrap() else {
+    let Outcome::Infeasible(said) = tune(&machine, &spec, None, &quick()).unwrap() else {
         panic!("75 deg at 900 Hz with 65 us of delay")
     };
     let named: Vec<What> = said.conflicts.iter().map(|c| c.what).collect();
@@ -69,14 +62,8 @@ fn an_infeasible_spec_names_the_conflict_and_a_relaxation_that_tuning_again_conf
 
 #[test]
 fn the_same_bytes_for_one_and_two_threads() {
-    let (plant, spec) = (paper_plant(), paper_spec());
-    let text = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let outcome =
-            pool.install(|| tune(&Machine::Model(&plant), &spec, Some(&start_controller()), &quick()).unwrap());
-        GainTable::of(&outcome, 1, String::new(), vec![]).unwrap().text().unwrap()
-    };
-    assert_eq!(text(1), text(2));
+    let text = |outcome: &Outcome| GainTable::of(outcome, 1, String::new(), vec![]).unwrap().text().unwrap();
+    assert_eq!(text(&tuned_on(1)), text(&TUNED));
 }
 
 #[test]
@@ -190,7 +177,7 @@ fn enumeration_of_two_gains_finds_nothing_better() {
 fn the_gain_holds_on_draws_that_the_search_never_saw() {
     let (plant, mut spec) = (paper_plant(), paper_spec());
     let (machine, start) = (Machine::Model(&plant), start_controller());
-    let Outcome::Tuned(t) = tune(&machine, &spec, Some(&start), &quick()).unwrap() else { panic!("feasible") };
+    let Outcome::Tuned(t) = &*TUNED else { panic!("feasible") };
     let mut power = [0.0; 2];
     for seed in 100..140 {
         spec.profile.as_mut().unwrap().noise.seed = seed;
@@ -230,10 +217,9 @@ fn one_controller_for_two_machines_holds_on_both() {
 
 #[test]
 fn a_gain_table_survives_the_way_to_text_and_refuses_other_sections() {
-    let (plant, spec) = (paper_plant(), paper_spec());
-    let outcome = tune(&Machine::Model(&plant), &spec, Some(&start_controller()), &quick()).unwrap();
+    let (spec, outcome) = (paper_spec(), &*TUNED);
     let inputs = vec![InputDigest { role: "plant".into(), sha256: "00".into() }];
-    let table = GainTable::of(&outcome, spec.search.seed, "11".into(), inputs).unwrap();
+    let table = GainTable::of(outcome, spec.search.seed, "11".into(), inputs).unwrap();
     let text = table.text().unwrap();
     let again = GainTable::parse(Path::new("gains.toml"), &text).unwrap();
     assert_eq!(table, again);

@@ -10,26 +10,37 @@ use servotune::twin::plants::{log_grid, measure};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::LazyLock;
 
 const PLANT: &str = include_str!("../specs/machines/tunable.toml");
 const SPEC: &str = include_str!("../specs/limits/paper.toml");
 const PROFILE: &str = include_str!("../specs/profiles/spiral.toml");
 
-/// A folder with plant, the paper's spec, profile and a tuned table.
-fn folder(name: &str) -> PathBuf {
-    folder_of(name, &SPEC.replace("../profiles/spiral.toml", "spiral.toml"), PROFILE)
+/// The paper's spec as it stands in a folder.
+fn paper_spec() -> String {
+    SPEC.replace("../profiles/spiral.toml", "spiral.toml")
 }
 
-fn folder_of(name: &str, spec_text: &str, profile: &str) -> PathBuf {
-    let dir = std::env::temp_dir().join(format!("servotune_verify_{name}_{}", std::process::id()));
-    std::fs::create_dir_all(&dir).unwrap();
+/// A table tuned to these limits, from a few starts.
+fn tuned(spec_text: &str, profile: &str) -> GainTable {
     let read: PlantFile = servotune::document::parse_toml(Path::new("plant"), PLANT).unwrap();
     let plant = Plant::try_from(read).unwrap();
     let spec = Spec::parse(spec_text, profile).unwrap();
     let settings = TuneSettings { starts: 4, ..TuneSettings::default() };
     let outcome = tune(&Machine::Model(&plant), &spec, Some(&nominal_controller().unwrap()), &settings).unwrap();
     let inputs = vec![InputDigest { role: "plant".into(), sha256: sha256_hex(PLANT.as_bytes()) }];
-    let table = GainTable::of(&outcome, 1, sha256_hex(spec_text.as_bytes()), inputs).unwrap();
+    GainTable::of(&outcome, 1, sha256_hex(spec_text.as_bytes()), inputs).unwrap()
+}
+
+/// A folder with plant, the paper's spec, profile and a tuned table, which is made once.
+fn folder(name: &str) -> PathBuf {
+    static TABLE: LazyLock<GainTable> = LazyLock::new(|| tuned(&paper_spec(), PROFILE));
+    folder_of(name, &paper_spec(), PROFILE, &TABLE)
+}
+
+fn folder_of(name: &str, spec_text: &str, profile: &str, table: &GainTable) -> PathBuf {
+    let dir = std::env::temp_dir().join(format!("servotune_verify_{name}_{}", std::process::id()));
+    std::fs::create_dir_all(&dir).unwrap();
     table.write(&dir.join("gains.toml")).unwrap();
     for (file, text) in [("plant.toml", PLANT), ("spec.toml", spec_text), ("spiral.toml", profile)] {
         std::fs::write(dir.join(file), text).unwrap();
@@ -87,7 +98,7 @@ fn a_band_above_half_the_rate_of_the_record_has_no_figure_and_hinders_no_proof()
     // Half of 1 kHz lies below both bands.
     let slow = PROFILE.replace("27480", "1000").replace("[200, 400]", "[20, 50]");
     assert_ne!(slow, PROFILE);
-    let dir = folder_of("no_bin", spec, &slow);
+    let dir = folder_of("no_bin", spec, &slow, &tuned(spec, &slow));
     assert!(!std::fs::read_to_string(dir.join("gains.toml")).unwrap().contains("dft_low"));
     let (code, text) = verify(&dir, &[]);
     assert_eq!(code, 0, "{text}");

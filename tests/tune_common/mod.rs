@@ -5,8 +5,11 @@ use servotune::controller::{Controller, Lowpass, Notch, Pid};
 use servotune::frf::Frf;
 use servotune::lti::{Body, FrequencyResponse, Mode, Plant};
 use servotune::pes::{Noise, PesClock, Profile, Spiral};
-use servotune::tune::{Bounds, Limits, MarginLimits, Minimise, Objective, Search, Spec, Structure};
+use servotune::tune::{
+    Bounds, Limits, Machine, MarginLimits, Minimise, Objective, Outcome, Search, Spec, Structure, TuneSettings, tune,
+};
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 /// The body of the paper's eq. (20), its delay, its first mode and two above it.
 pub fn paper_plant() -> Plant {
@@ -104,3 +107,18 @@ pub fn sweep(plant: &Plant, from_hz: f64, to_hz: f64, points: usize) -> Frf {
 pub fn paper_response() -> Frf {
     sweep(&paper_plant(), 10.0, 12_000.0, 600)
 }
+
+/// A short search: half of the starts that it has unless told otherwise.
+pub fn quick() -> TuneSettings {
+    TuneSettings { starts: 6, ..TuneSettings::default() }
+}
+
+/// The paper's spec tuned over the paper's plant from the contract's example, by a short search on this many threads.
+pub fn tuned_on(threads: usize) -> Outcome {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let (plant, start) = (paper_plant(), start_controller());
+    pool.install(|| tune(&Machine::Model(&plant), &paper_spec(), Some(&start), &quick()).unwrap())
+}
+
+/// The same on two threads, made once for all that look at it.
+pub static TUNED: LazyLock<Outcome> = LazyLock::new(|| tuned_on(2));
