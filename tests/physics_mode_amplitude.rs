@@ -62,6 +62,9 @@ fn a_free_swing_rings_lower_as_it_dies() {
 /// Zero and pole of the mode (rad/s), damping ratios; spring of the mode, hardening (1/position_unit^2 of the mode's share).
 const MODE: Mode = Mode { zero_rad_s: 1150.0, zero_damping_ratio: 0.02, pole_rad_s: 1250.0, pole_damping_ratio: 0.02 };
 
+/// Samples of a record: the mode swings a hundred times or so.
+const SAMPLES: usize = 1200;
+
 /// A machine of this model whose mode has a spring with a cubic part, as body and mode side by side: the answer to a command, without its delay.
 ///
 /// A pair of poles with residue r is (2 Re r s - 2 Re(r conj p))/(s^2 + 2 z w s + w^2).
@@ -135,8 +138,10 @@ fn a_mode_that_hardens_is_named_and_measured() {
         let u = excitation(size, 60 + records.len() as u64);
         let y = duffing(&u, cubic);
         for i in 0..if role == Role::Fit { 2 } else { 1 } {
-            let y = y.iter().map(|y| y + NOISE * noise.normal()).collect();
-            records.push(record(&format!("{g}{i}.csv"), role, g, &u, y));
+            let y = y.iter().take(SAMPLES).map(|y| y + NOISE * noise.normal()).collect();
+            let (entry, mut record) = record(&format!("{g}{i}.csv"), role, g, &u[..SAMPLES], y);
+            record.excitation.truncate(SAMPLES);
+            records.push((entry, record));
         }
     }
     let d = diagnosed_with(&model(), records);
