@@ -141,7 +141,8 @@ fn identify_and_tune_from_files() {
     assert!(ran.err.contains("phase margin"), "the decision about the phase is said: {}", ran.err);
     let id = json(&ran);
     assert_eq!(id["position_unit"], "track");
-    let tune = ["tune", "--plant", plant, "--spec", PAPER, "--controller", NOMINAL, "--out", gains, "--json"];
+    let search = ["tune", "--plant", plant, "--spec", PAPER, "--controller", NOMINAL, "--starts", "4"];
+    let tune = [&search[..], &["--out", gains, "--json"]].concat();
     let ran = servotune(&tune);
     assert_eq!(ran.code, 0, "{}", ran.err);
     assert_eq!(json(&ran)["verdict"], "tuned");
@@ -170,6 +171,8 @@ fn limits_that_cannot_be_met_are_an_answer_and_leave_no_table() {
         spec.to_str().unwrap(),
         "--sample-time-s",
         "39.6e-6",
+        "--starts",
+        "2",
         "--out",
         gains.to_str().unwrap(),
         "--json",

@@ -37,7 +37,7 @@ fn unstable_loop(r: &mut Random) -> (Plant, Controller) {
 fn unstable_plants_are_counted_as_the_eigenvalues_say() {
     let mut r = Random::new(8);
     let (mut stable, mut unstable) = (0, 0);
-    for i in 0..200 {
+    for i in 0..100 {
         let (plant, controller) = unstable_loop(&mut r);
         let sections = controller.sections().unwrap();
         let sampled = DiscretePlant::of(&plant, T).unwrap();
