@@ -31,7 +31,7 @@ fn an_infeasible_spec_names_the_conflict_and_a_relaxation_that_tuning_again_conf
     spec.margins.phase_margin_deg = Some(75.0);
     spec.margins.gain_crossover_hz = Some([900.0, 1500.0]);
     let machine = Machine::Model(&plant);
-    let Outcome::Infeasible(said) = tune(&machine, &spec, None, &quick()).unwrap() else {
+    let Outcome::Infeasible(said) = tune(&machine, &spec, None, &TuneSettings::default()).unwrap() else {
         panic!("75 deg at 900 Hz with 65 us of delay")
     };
     let named: Vec<What> = said.conflicts.iter().map(|c| c.what).collect();
