@@ -2,14 +2,22 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::diagnose_common::*;
-use servotune::diagnose::{Confirmation, DiagnoseSettings, Verdict, diagnose};
+use servotune::diagnose::{Confirmation, DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use servotune::numeric::random::Random;
-use servotune::recording::{Case, Role};
-use std::path::PathBuf;
+use servotune::recording::Role;
+use std::sync::LazyLock;
+
+/// A sound machine and one with dry friction, each with nine draws of the bootstrap: diagnosed once for all that look at them.
+static DRAWN: LazyLock<[Diagnosis; 2]> = LazyLock::new(|| {
+    let mut settings = DiagnoseSettings::default();
+    settings.select.bootstrap = 9;
+    let made = |truth: &Truth| diagnose(&case(records(truth)), &plant(), None, &settings, |_| {}).unwrap().diagnosis;
+    [made(&GIVEN), made(&Truth { coulomb: 0.006, ..GIVEN })]
+});
 
 #[test]
 fn a_sound_model_draws_no_name() {
-    let d = diagnosed(&GIVEN);
+    let d = &DRAWN[0];
     assert_eq!(d.verdict, Verdict::NoMismatch, "{:?}", d.findings);
     // White noise of the sensor, from 12 000 samples: two per cent is three standard errors.
     assert!((d.noise.sensor_rms / NOISE - 1.0).abs() < 0.02, "{}", d.noise.sensor_rms);
@@ -34,7 +42,7 @@ fn more_delay_is_named_and_measured() {
 
 #[test]
 fn dry_friction_is_named_and_measured() {
-    let d = diagnosed(&Truth { coulomb: 0.006, ..GIVEN });
+    let d = &DRAWN[1];
     assert!(matches!(d.verdict, Verdict::Named | Verdict::Family), "{:?}", d.verdict);
     let f = &d.findings[0];
     assert!(f.family.iter().any(|n| n == "coulomb_friction"), "{f:?}");
@@ -64,15 +72,7 @@ fn a_line_whose_phase_differs_between_repeats_is_a_finding_and_no_noise() {
             .enumerate()
             .for_each(|(k, y)| *y += amplitude * (std::f64::consts::TAU * hz * k as f64 * T + p).cos());
     }
-    let case = Case {
-        id: "test".into(),
-        plant: PathBuf::new(),
-        controller: None,
-        spindle_hz: None,
-        further_inputs: vec![],
-        records,
-    };
-    let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
+    let d = diagnosed_from(records);
     assert_eq!(d.findings[0].effect, "line_disturbance", "{:?}", d.verdict);
     let p = &d.findings[0].parameters;
     // Six records of 2000 samples: standard errors are 0.02 Hz and 1.3 % of the amplitude.
@@ -98,15 +98,7 @@ fn a_narrow_band_of_noise_is_no_hum() {
         let rms = (late.iter().map(|v| v * v).sum::<f64>() / N as f64).sqrt();
         record.position.iter_mut().zip(late).for_each(|(y, v)| *y += amplitude * v / rms);
     }
-    let case = Case {
-        id: "test".into(),
-        plant: PathBuf::new(),
-        controller: None,
-        spindle_hz: None,
-        further_inputs: vec![],
-        records,
-    };
-    let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
+    let d = diagnosed_from(records);
     assert!(d.findings.iter().all(|f| f.effect != "line_disturbance"), "{:?}", d.findings);
 }
 
@@ -125,15 +117,7 @@ fn a_push_into_one_repeat_is_found_where_it_fell() {
         push + if t < 0.0 { 0.0 } else { u[(t / T).floor() as usize] }
     };
     records[1].1.position = respond_to(&GIVEN, &held, 101);
-    let case = Case {
-        id: "test".into(),
-        plant: PathBuf::new(),
-        controller: None,
-        spindle_hz: None,
-        further_inputs: vec![],
-        records,
-    };
-    let d = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap().diagnosis;
+    let d = diagnosed_from(records);
     assert_eq!((d.verdict, d.findings.len()), (Verdict::Named, 1), "{:?}", d.findings);
     let f = &d.findings[0];
     assert_eq!((f.effect.as_str(), f.place.records.as_slice()), ("shock", ["a1".to_owned()].as_slice()));
@@ -145,29 +129,12 @@ fn a_push_into_one_repeat_is_found_where_it_fell() {
 
 #[test]
 fn the_bootstrap_believes_friction_and_sees_nothing_in_noise() {
-    let settings = |draws: usize| {
-        let mut s = DiagnoseSettings::default();
-        s.select.bootstrap = draws;
-        s
-    };
-    let made = |truth: &Truth| {
-        let case = Case {
-            id: "test".into(),
-            plant: PathBuf::new(),
-            controller: None,
-            spindle_hz: None,
-            further_inputs: vec![],
-            records: records(truth),
-        };
-        diagnose(&case, &plant(), None, &settings(9), |_| {}).unwrap().diagnosis
-    };
-    let sound = made(&GIVEN);
-    let b = sound.bootstrap.unwrap();
+    let [sound, sticky] = &*DRAWN;
+    let (b, sticky) = (sound.bootstrap.as_ref().unwrap(), sticky.bootstrap.as_ref().unwrap());
     // Nine draws under a bound of 1e-4 each: one alarm would be a sign of another noise than the measured one.
     assert_eq!((b.alarms, sound.verdict), (0, Verdict::NoMismatch));
     // The records are one more draw of the same kind: their statistic lies among the others, far from the friction's.
     assert!(b.observed_log_p > 3.0 * b.null_log_p[0] - 10.0, "{b:?}");
-    let sticky = made(&Truth { coulomb: 0.006, ..GIVEN }).bootstrap.unwrap();
     // The draws are of the refitted machine, however far friction has drawn it from the given one.
     assert_eq!((sticky.p_value, sticky.alarms), (0.1, 0), "{sticky:?}");
     assert!(sticky.observed_log_p < 10.0 * b.null_log_p[0] - 100.0, "{sticky:?}");
