@@ -9,10 +9,9 @@ use servotune::recording::{Case, Record, RecordEntry, Role};
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-/// Sample time (s), samples of a lap, laps of a record, steps of the integrator a sample, noise of the encoder (mm rms).
+/// Sample time (s), samples of a lap, steps of the integrator a sample, noise of the encoder (mm rms).
 const T: f64 = 2e-3;
 const LAP: usize = 2500;
-const LAPS: usize = 4;
 const STEPS: usize = 20;
 const NOISE: f64 = 2e-4;
 /// Acceleration per command (mm/s² per V), stiffness (1/s²), viscous rate (1/s).
@@ -25,14 +24,14 @@ const SECOND: [f64; 2] = [0.35, 11.0];
 const SLIDES: f64 = 450.0;
 const GIVES_WAY: f64 = 5.0;
 
-/// A multisine over one lap, 0.2 to 19.8 Hz.
-fn drive(seed: u64) -> Vec<f64> {
+/// A multisine over so many laps, 0.2 to 19.8 Hz.
+fn drive(laps: usize, seed: u64) -> Vec<f64> {
     let mut r = Random::new(seed);
     let phases: Vec<f64> = (0..99).map(|_| r.between(0.0, TAU)).collect();
     let lines = |k: usize| {
         phases.iter().enumerate().map(move |(h, p)| (TAU * (h + 1) as f64 * k as f64 / LAP as f64 + p).cos())
     };
-    (0..LAP * LAPS).map(|k| 0.05 * lines(k).sum::<f64>()).collect()
+    (0..LAP * laps).map(|k| 0.05 * lines(k).sum::<f64>()).collect()
 }
 
 /// What the encoder reads.
@@ -57,9 +56,10 @@ fn respond(u: &[f64], friction: f64, seed: u64) -> Vec<f64> {
     out
 }
 
-fn diagnosed(friction: f64) -> Diagnosed {
+/// The diagnosis of two records of so many laps.
+fn diagnosed(friction: f64, laps: usize) -> Diagnosed {
     let record = |i: u64, role: Role| {
-        let command = drive(40 + i);
+        let command = drive(laps, 40 + i);
         let file = PathBuf::from(format!("g{i}.csv"));
         let position = respond(&command, friction, 70 + i);
         let entry = RecordEntry { file: file.clone(), role, repeat_group: None };
@@ -104,7 +104,7 @@ fn diagnosed(friction: f64) -> Diagnosed {
 /// named, and nothing else.
 #[test]
 fn friction_is_named_beside_a_mode_that_the_model_lacks() {
-    let d = diagnosed(SLIDES).diagnosis;
+    let d = diagnosed(SLIDES, 4).diagnosis;
     let names: Vec<&str> = d.findings.iter().map(|f| f.effect.as_str()).collect();
     assert_eq!(d.verdict, Verdict::Named, "{names:?}");
     assert!(names.iter().all(|n| ["pivot_friction", "unmodelled_resonance"].contains(n)), "{names:?} {:?}", d.remarks);
@@ -118,7 +118,7 @@ fn friction_is_named_beside_a_mode_that_the_model_lacks() {
 /// Without friction nothing of the kind is named.
 #[test]
 fn no_friction_is_named_where_there_is_none() {
-    let d = diagnosed(0.0).diagnosis;
+    let d = diagnosed(0.0, 2).diagnosis;
     let drags = ["pivot_friction", "coulomb_friction"];
     assert!(d.findings.iter().all(|f| !drags.contains(&f.effect.as_str())), "{:?}", d.findings);
     let held = d.fit.holdout.unwrap();
