@@ -3,7 +3,7 @@
 
 use crate::program_common::{root, servotune};
 use serde_json::Value;
-use servotune::diagnose::decision_rules;
+use servotune::diagnose::{Consequence, decision_rules};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -29,6 +29,31 @@ fn the_document_has_every_rule() {
     let rules: Vec<&str> = decision_rules().map(|r| r.name).collect();
     assert_eq!(names, rules);
     assert!(all[0]["threshold"].is_number() && all[0]["floor"] == "data", "{}", all[0]);
+    assert!(all[0]["false_alarms"]["of"].is_number() && all[0]["guards"] == "log", "{}", all[0]);
+}
+
+/// Rates that the table prints are those that the study counted, and its counts are those of its cases.
+#[test]
+fn false_alarms_are_as_they_were_counted() {
+    let text = std::fs::read_to_string(root("results/mismatch/false_alarms.json")).unwrap();
+    let study: Value = serde_json::from_str(&text).unwrap();
+    let cases = study["cases"].as_array().unwrap();
+    for what in Consequence::COUNTED {
+        let key = serde_json::to_value(what).unwrap();
+        let key = key.as_str().unwrap();
+        let counted = serde_json::to_value(what.counted().unwrap()).unwrap();
+        assert_eq!(counted, study["counts"][key], "{key}: what the study counted belongs into rules/consequence.rs");
+        let had = cases.iter().map(|c| c["alarms"].as_object().unwrap());
+        let had = had.filter(|a| if what == Consequence::Anything { !a.is_empty() } else { a.contains_key(key) });
+        let both = counted["alarms"].as_u64().unwrap() + counted["lost"][0].as_u64().unwrap();
+        assert_eq!(both as usize, had.count(), "{key}");
+    }
+    assert_eq!(study["counts"].as_object().unwrap().len(), Consequence::COUNTED.len());
+    for rule in decision_rules() {
+        let told = rule.guards.measured();
+        assert_eq!(rule.false_alarms, rule.guards.counted(), "{}", rule.name);
+        assert!(rule.false_alarms.is_some() == told.contains(" of "), "{}: {told}", rule.name);
+    }
 }
 
 /// Files of a folder and of the folders in it, the table of rules itself left out.

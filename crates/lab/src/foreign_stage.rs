@@ -29,11 +29,13 @@ pub(super) struct Stage {
     pub dead_band: f64,
     /// Noise of the encoder (mm rms).
     pub noise: f64,
+    /// Draws phases and noise.
+    pub seed: u64,
 }
 
 /// A stage with nothing beside its mass: 1.4 m/s² per ampere.
 pub(super) const BARE: Stage =
-    Stage { body: [1400.0, 6.0], friction: [0.0, 0.0, 1.0, 1.0, 0.0], dead_band: 0.0, noise: 2e-4 };
+    Stage { body: [1400.0, 6.0], friction: [0.0, 0.0, 1.0, 1.0, 0.0], dead_band: 0.0, noise: 2e-4, seed: 0 };
 
 /// Gains of the controller: A/mm, A/(mm s), A s/mm, s.
 const GAINS: [f64; 4] = [7.0, 60.0, 0.11, 1e-3];
@@ -101,20 +103,22 @@ impl Stage {
         let there_and_back = |distance: f64, period: f64| -> Vec<f64> {
             (0..N).map(|k| 0.5 * distance * (1.0 - (TAU * k as f64 * T / period).cos())).collect()
         };
+        let of = |rms, seed| multisine(rms, seed + 100 * self.seed);
         let (fit, held) = (Role::Fit, Role::Holdout);
         type Wanted = (&'static str, usize, Role, Vec<f64>, Vec<f64>);
         let wanted: Vec<Wanted> = vec![
-            ("multisine_a", 3, fit, still.clone(), multisine(0.25, 31)),
-            ("multisine_b", 2, fit, still.clone(), multisine(0.8, 32)),
+            ("multisine_a", 3, fit, still.clone(), of(0.25, 31)),
+            ("multisine_b", 2, fit, still.clone(), of(0.8, 32)),
             ("move_a", 2, fit, move_to(30.0, 0.6), still.clone()),
             ("back_a", 2, fit, there_and_back(4.0, 1.0), still.clone()),
-            ("holdout_multisine", 1, held, still.clone(), multisine(0.5, 33)),
+            ("holdout_multisine", 1, held, still.clone(), of(0.5, 33)),
             ("holdout_move", 1, held, move_to(-18.0, 0.5), still),
         ];
         let mut records = Vec::new();
         for (group, count, role, reference, excitation) in wanted {
             for i in 0..count {
-                let [command, position] = self.record(&reference, &excitation, 500 + records.len() as u64);
+                let [command, position] =
+                    self.record(&reference, &excitation, 500 + 100 * self.seed + records.len() as u64);
                 let file = PathBuf::from(format!("{group}_{i}.csv"));
                 let entry = RecordEntry { file: file.clone(), role, repeat_group: Some(group.into()) };
                 let record = Record {
@@ -167,8 +171,8 @@ impl Stage {
             physics: vec![],
         };
         let Some(size) = size else { return Ok(exact) };
-        let excitation: Vec<f64> = multisine(size, 17).iter().cycle().take(5 * N).copied().collect();
-        let [command, position] = self.record(&vec![0.0; 5 * N], &excitation, 1);
+        let excitation: Vec<f64> = multisine(size, 17 + 100 * self.seed).iter().cycle().take(5 * N).copied().collect();
+        let [command, position] = self.record(&vec![0.0; 5 * N], &excitation, 1 + 100 * self.seed);
         let input: Vec<f64> = command.iter().zip(&excitation).map(|(c, x)| c + x).collect();
         let how = PeriodicSettings { period: N, discard: 1, least_amplitude: 0.02, ..PeriodicSettings::default() };
         let settings = IdentifySettings {

@@ -34,13 +34,13 @@ struct StudyArguments {
     /// Cases to make again, all unless told: the others keep their lines (study `abroad`), or cases and diagnoses are written instead of the page (study `sealed`)
     #[arg(long, value_name = "ID,ID,...", value_delimiter = ',')]
     cases: Vec<String>,
-    /// Seed of the set (studies `sealed` and `sealed-digests`)
+    /// Seed of the set (studies `sealed`, `sealed-digests` and `false-alarms`)
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Cases of the set, 208 unless told (studies `sealed` and `sealed-digests`)
+    /// Cases of the set (studies `sealed` and `sealed-digests`, 208 unless told, and `false-alarms`, 260)
     #[arg(long, value_name = "N")]
     count: Option<usize>,
-    /// Lines that a run printed: the page is of these cases, and nothing is run (study `sealed`)
+    /// Lines that a run printed: the page is of these cases, and nothing is run (studies `sealed` and `false-alarms`)
     #[arg(long, value_name = "FILE")]
     lines: Option<PathBuf>,
     /// Folder with the measured records (studies `mirror`, `mirror-inputs`, `motor`, `hdd`)
@@ -87,7 +87,7 @@ enum StudyName {
     FleetScale,
     /// Coverage over the number of shared tables for 1000 slots
     FleetShared,
-    /// The search for physics on records without any, for the cases in the folder --data
+    /// What the diagnosis says of cases on which nothing acts, and how often it is an alarm
     FalseAlarms,
     /// Changed files through every reader; memory and time of the largest inputs
     ReliabilityReaders,
@@ -171,7 +171,10 @@ fn run(a: &StudyArguments, say: &mut (dyn FnMut(&str) + Send)) -> Result<Vec<Pat
         StudyName::Plants => Pages(study::plants()?),
         StudyName::Mirror => Pages(study::mirror(&a.data)?),
         StudyName::MirrorInputs => Pages(study::mirror_inputs(&a.data, say)?),
-        StudyName::FalseAlarms => Pages(study::false_alarms(&a.data)?),
+        StudyName::FalseAlarms => Pages(match &a.lines {
+            Some(file) => study::false_alarms_of_lines(a.seed, &lines_of(file)?)?,
+            None => study::false_alarms(a.seed, a.count, say)?,
+        }),
         StudyName::Mismatch => Pages(study::mismatch(&a.data)?),
         StudyName::Recordings => Pages(study::recordings(&a.data)?),
         StudyName::Motor => Pages(study::motor(&a.data)?),

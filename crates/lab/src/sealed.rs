@@ -19,15 +19,15 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 /// Samples of a record of the set.
-const SAMPLES: usize = 2400;
+pub(super) const SAMPLES: usize = 2400;
 /// Draws that are tried for a place: some machines cannot be identified or held by their controller.
 const DRAWS: u64 = 8;
 
 /// A case ready for the program.
 pub struct SealedCase {
     id: String,
-    drawn: Drawn,
-    made: (Case, Plant, Controller),
+    pub(super) drawn: Drawn,
+    pub(super) made: (Case, Plant, Controller),
 }
 
 impl SealedCase {
@@ -71,18 +71,22 @@ pub fn sealed_set(seed: u64, count: usize, samples: usize) -> Vec<SealedCase> {
 }
 
 fn at_places(seed: u64, samples: usize, places: Vec<usize>) -> Vec<SealedCase> {
-    let at = |place: usize| (0..DRAWS).find_map(|again| made(seed, place, samples, again));
-    places.into_par_iter().filter_map(at).collect()
+    places.into_par_iter().filter_map(|place| of_kind(kind(place), seed, place, samples)).collect()
 }
 
-/// Name of the case at a place.
-fn name(place: usize) -> String {
-    format!("s{place:03}_{}", kind(place).replace('+', "_"))
+/// The case of a kind that is drawn for a place; none where no draw can be made.
+pub(super) fn of_kind(kind: &'static str, seed: u64, place: usize, samples: usize) -> Option<SealedCase> {
+    (0..DRAWS).find_map(|again| made(kind, seed, place, samples, again))
 }
 
-fn made(seed: u64, place: usize, samples: usize, again: u64) -> Option<SealedCase> {
-    let drawn = draw(seed, place, samples, again);
-    let id = name(place);
+/// Name of a case of this kind at a place.
+fn name(kind: &str, place: usize) -> String {
+    format!("s{place:03}_{}", kind.replace('+', "_"))
+}
+
+fn made(kind: &'static str, seed: u64, place: usize, samples: usize, again: u64) -> Option<SealedCase> {
+    let drawn = draw(kind, seed, place, samples, again);
+    let id = name(kind, place);
     let made = match &drawn.made {
         Made::Arm(trial) => trial.made(&id),
         Made::Stage(stage, size) => stage.made(&id, *size),
@@ -165,14 +169,10 @@ impl SealedCase {
 
     /// The line of a case without a diagnosis.
     fn refused(&self, why: &str, seconds: f64) -> Row {
-        let fitted_under = match &self.drawn.made {
-            Made::Arm(t) => matches!(t.model, Model::Fitted(_)),
-            Made::Stage(_, size) => size.is_some(),
-        };
         Row {
             id: self.id.clone(),
             kind: self.drawn.kind.into(),
-            fitted_under,
+            fitted_under: self.drawn.fitted(),
             lambda: if self.acts() { self.lambda() } else { 0.0 },
             expected: self.drawn.expected.join(", "),
             verdict: why.into(),
@@ -216,7 +216,7 @@ pub fn sealed_of_lines(seed: u64, known: Option<&str>, lines: &str) -> Result<St
     let lines = lines.lines().filter(|l| l.starts_with('{'));
     let mut rows: Vec<Row> = lines.map(serde_json::from_str).collect::<Result<_, _>>()?;
     rows.sort_by(|a, b| a.id.cmp(&b.id));
-    let has = |place: &usize| rows.iter().any(|r| r.id == name(*place));
+    let has = |place: &usize| rows.iter().any(|r| r.id == name(kind(*place), *place));
     let cases = at_places(seed, SAMPLES, (0..WHOLE).filter(has).collect());
     written(seed, &cases, known, &rows)
 }
@@ -240,7 +240,8 @@ pub fn sealed_cases(
     names: &[String],
     say: &mut (dyn FnMut(&str) + Send),
 ) -> Result<Study, StudyError> {
-    let asked = |place: &usize| names.iter().any(|n| name(*place).starts_with(n.as_str()) || kind(*place) == n);
+    let asked =
+        |place: &usize| names.iter().any(|n| name(kind(*place), *place).starts_with(n.as_str()) || kind(*place) == n);
     let cases = at_places(seed, SAMPLES, (0..count.unwrap_or(WHOLE)).filter(asked).collect());
     let mut study = Study::default();
     for (case, (_, diagnosis)) in cases.iter().zip(rows(&cases, say)?) {

@@ -27,6 +27,16 @@ pub(super) struct Drawn {
     pub scale: Scale,
 }
 
+impl Drawn {
+    /// Whether the given model was fitted to records.
+    pub fn fitted(&self) -> bool {
+        match &self.made {
+            Made::Arm(t) => matches!(t.model, Model::Fitted(_)),
+            Made::Stage(_, size) => size.is_some(),
+        }
+    }
+}
+
 /// Kinds and how many there are of each in a set of [`WHOLE`].
 const KINDS: [(&str, usize); 22] = [
     ("sound", 14),
@@ -55,6 +65,8 @@ const KINDS: [(&str, usize); 22] = [
 /// Of the stage with a dead band, and of all.
 const STAGE_DEAD: usize = 6;
 pub(super) const WHOLE: usize = 208;
+/// A stage on which nothing acts: no kind of the set, but one of those that tell false alarms.
+pub(super) const STAGE_SOUND: &str = "stage_sound";
 
 /// The kind of a place in the set. Places go through the kinds in turn, so that a part of a set holds of all.
 pub(super) fn kind(place: usize) -> &'static str {
@@ -68,10 +80,9 @@ pub(super) fn kind(place: usize) -> &'static str {
     places[place % places.len()].2
 }
 
-/// The case at a place of the set; `again` counts the draws that could not be made.
-pub(super) fn draw(seed: u64, place: usize, samples: usize, again: u64) -> Drawn {
+/// The case of a kind at a place; `again` counts the draws that could not be made.
+pub(super) fn draw(kind: &'static str, seed: u64, place: usize, samples: usize, again: u64) -> Drawn {
     let mut r = Random::stream(seed, (1 + again) * 100_000 + place as u64);
-    let kind = kind(place);
     let between = |r: &mut Random, low: f64, high: f64| low * (high / low).powf(r.uniform());
     let scale = scale(&mut r);
     if kind.starts_with("stage") {
@@ -188,17 +199,23 @@ fn stage(kind: &'static str, r: &mut Random, scale: Scale) -> Drawn {
     let body = [BARE.body[0] * r.between(0.8, 1.2), BARE.body[1] * r.between(0.5, 2.0)];
     let noise = BARE.noise * r.between(0.7, 2.0);
     let mut machine = Stage { body, noise, ..BARE };
-    let (expected, truth);
-    if kind == "stage_friction" {
-        let rise = if r.uniform() < 0.5 { 0.0 } else { r.between(0.1, 0.4) };
-        machine.friction = [0.05 * 8f64.powf(r.uniform()), rise, r.between(1.0, 4.0), 6e-3 * r.between(0.5, 2.0), 1e-3];
-        expected = "coulomb_friction";
-        truth = (expected, "level_command", machine.friction[0] * scale.command);
-    } else {
-        machine.dead_band = 0.02 * 8f64.powf(r.uniform());
-        expected = "dead_band";
-        truth = (expected, "half_width", machine.dead_band * scale.command);
-    }
+    let truth: Option<Truth> = match kind {
+        STAGE_SOUND => {
+            machine.seed = 1 + r.bits() % 1_000_000;
+            None
+        }
+        "stage_friction" => {
+            let rise = if r.uniform() < 0.5 { 0.0 } else { r.between(0.1, 0.4) };
+            machine.friction =
+                [0.05 * 8f64.powf(r.uniform()), rise, r.between(1.0, 4.0), 6e-3 * r.between(0.5, 2.0), 1e-3];
+            Some(("coulomb_friction", "level_command", machine.friction[0] * scale.command))
+        }
+        _ => {
+            machine.dead_band = 0.02 * 8f64.powf(r.uniform());
+            Some(("dead_band", "half_width", machine.dead_band * scale.command))
+        }
+    };
     let size = (r.uniform() < 0.7).then_some(if r.uniform() < 0.5 { 0.25 } else { 0.8 });
-    Drawn { kind, expected: vec![expected], truth: vec![truth], made: Made::Stage(machine, size), scale }
+    let expected = truth.iter().map(|t| t.0).collect();
+    Drawn { kind, expected, truth: truth.into_iter().collect(), made: Made::Stage(machine, size), scale }
 }

@@ -39,7 +39,7 @@ pub use fit::trajectory::Trajectory;
 pub use free_form::curve::FreeForm;
 pub use free_form::likeness::Likeness;
 pub use noise::whitening::{NoiseLevels, Whitener};
-pub use rules::{Consulted, Floor, Rule, decision_rules};
+pub use rules::{Consequence, Consulted, Counted, Floor, Rule, decision_rules};
 pub use search::bootstrap_chance::Bootstrap;
 pub use search::candidate::Candidate;
 pub use search::residual_effect::ResidualEffect;

@@ -3,10 +3,13 @@
 //! In: nothing. Out: a constant and a row of the table for each rule. Convention: thresholds in the unit of their row. Spec:
 //! `specs/rules.md`.
 
+use super::consequence::Consequence;
 use super::rule::{Floor, Rule, rules};
 
 rules! {
     Floor::Data;
+
+    [Log]
     OTHER_UNIT_GAIN: f64 = 8.0, "ratio",
         "factor of the gain between record and given plant, or its inverse, above which the log is in another unit",
         "no machine is eight times its own model; units differ by 10, 1000 or 57.3";
@@ -16,12 +19,33 @@ rules! {
     EARLY_LEFT: f64 = 0.3, "share",
         "error that moving an early position back may leave",
         "judgement: a shift that is the fault takes most of the error";
-    BEYOND_MOTION: f64 = 1e8, "ratio",
-        "simulated motion over recorded motion above which a case is refused",
-        "beyond it the numbers of a fit lose their digits (16 digits, half of them squared)";
     REPLAY_ERROR: f64 = 5e-3, "share",
         "error of the replayed command over the command above which the controller is not the documented one",
         "logs round their numbers to three or four digits";
+    STUCK_STEPS: f64 = 3.0, "counts",
+        "steps of the encoder that the model moves while the position stands still, from which the value is stuck",
+        "judgement: two counts may be rounding";
+    JUMP_STEPS: f64 = 1.5, "counts",
+        "jump of the position behind such a stretch, in steps of the encoder, from which it was stuck",
+        "an arm that stands goes on by one count";
+    SLIP_TAKEN: f64 = 0.7, "share",
+        "squares of the error that one slip may leave",
+        "judgement: each slip must earn its place";
+    SLIPS_LEFT: f64 = 0.1, "share",
+        "squares of the first error that all slips together may leave",
+        "a machine with another gain, delay and clock leaves more";
+
+    [Refusal]
+    BEYOND_MOTION: f64 = 1e8, "ratio",
+        "simulated motion over recorded motion above which a case is refused",
+        "beyond it the numbers of a fit lose their digits (16 digits, half of them squared)";
+
+    [Untried]
+    LAP_DIGITS: f64 = 1e-7, "share",
+        "difference between two laps of one drive up to which they are repeats",
+        "digits that are printed";
+
+    [Words]
     REPLAY_HELPS: f64 = 0.3, "share",
         "error of a failing replay that a shift or a factor may leave to explain it",
         "judgement: the fault itself takes nearly all of the error";
@@ -34,12 +58,6 @@ rules! {
     SHIFT_BROKEN: f64 = 0.7, "ratio",
         "error of a replay with a shift of parts of a sample over that with the best whole one, below which the former counts",
         "judgement: logs slip by whole samples more often";
-    STUCK_STEPS: f64 = 3.0, "counts",
-        "steps of the encoder that the model moves while the position stands still, from which the value is stuck",
-        "judgement: two counts may be rounding";
-    JUMP_STEPS: f64 = 1.5, "counts",
-        "jump of the position behind such a stretch, in steps of the encoder, from which it was stuck",
-        "an arm that stands goes on by one count";
     UNIT_FACTOR: f64 = 0.02, "share",
         "deviation of a factor from 1 above which a position counts as logged in other units",
         "a factor is found to parts in a thousand; 2 % leave room for rounding";
@@ -61,13 +79,4 @@ rules! {
     ROWS_WHOLE: f64 = 0.3, "rows",
         "distance of a count of lost rows from a whole number",
         "rows are lost whole";
-    SLIP_TAKEN: f64 = 0.7, "share",
-        "squares of the error that one slip may leave",
-        "judgement: each slip must earn its place";
-    SLIPS_LEFT: f64 = 0.1, "share",
-        "squares of the first error that all slips together may leave",
-        "a machine with another gain, delay and clock leaves more";
-    LAP_DIGITS: f64 = 1e-7, "share",
-        "difference between two laps of one drive up to which they are repeats",
-        "digits that are printed";
 }

@@ -2,6 +2,7 @@
 //!
 //! In: rows. Out: a constant for each and the table. Spec: `specs/rules.md`.
 
+use super::consequence::{Consequence, Counted};
 use serde::Serialize;
 
 /// Where in the diagnosis a rule decides.
@@ -48,35 +49,42 @@ pub struct Rule {
     pub unit: &'static str,
     /// Why this value.
     pub why: &'static str,
-    /// The false-alarm rate that was counted, with its page; none where it was not measured for this rule.
-    pub false_alarms: Option<&'static str>,
+    /// What it may bring about.
+    pub guards: Consequence,
+    /// How often that came about where nothing acts, all rules being in force.
+    pub false_alarms: Option<Counted>,
+    /// What was counted for this rule by itself, with its page.
+    pub counted_alone: Option<&'static str>,
 }
 
 impl Rule {
     /// The measured false-alarm rate in words.
-    pub fn measured(&self) -> &'static str {
-        self.false_alarms.unwrap_or("not measured")
+    pub fn measured(&self) -> String {
+        let together = self.guards.measured();
+        self.counted_alone.map_or(together.clone(), |alone| format!("{together}; alone: {alone}"))
     }
 }
 
-/// Makes a constant and a row of the table of each rule.
+/// Makes a constant and a row of the table of each rule; a heading in brackets says what the rules below it may bring about.
 macro_rules! rules {
-    ($floor:expr; $($name:ident: $type:ty = $value:expr, $unit:literal, $statistic:literal, $why:literal $(, $measured:literal)?;)*) => {
-        $(
+    ($floor:expr; $([$guards:ident] $($name:ident: $type:ty = $value:expr, $unit:literal, $statistic:literal, $why:literal $(, $alone:literal)?;)*)*) => {
+        $($(
             #[doc = concat!($statistic, " (", $unit, "); ", $why, ".")]
             pub(in crate::diagnose) const $name: $type = $value;
-        )*
-        pub(super) const TABLE: &[Rule] = &[$(Rule {
+        )*)*
+        pub(super) const TABLE: &[Rule] = &[$($(Rule {
             name: stringify!($name),
             floor: $floor,
             statistic: $statistic,
             threshold: $name as f64,
             unit: $unit,
             why: $why,
-            false_alarms: rules!(@measured $($measured)?),
-        }),*];
+            guards: Consequence::$guards,
+            false_alarms: Consequence::$guards.counted(),
+            counted_alone: rules!(@alone $($alone)?),
+        },)*)*];
     };
-    (@measured) => { None };
-    (@measured $text:literal) => { Some($text) };
+    (@alone) => { None };
+    (@alone $text:literal) => { Some($text) };
 }
 pub(super) use rules;
