@@ -62,10 +62,10 @@ impl Cleared {
                 "the search set out from the given plant with a law beside it: both leave at most a tenth more than the noise"
             }
             (Some(_), _) => {
-                "the search set out from a plant fitted together with a law: the given one conceals what acts"
+                "the search set out from a plant fitted together with a law: neither the given one nor a refit of it alone comes near the records"
             }
             (None, true) => {
-                "the search set out from a plant fitted together with a curve without a name: the given one conceals what acts"
+                "the search set out from a plant fitted together with a curve without a name: neither the given one nor a refit of it alone comes near the records"
             }
             (None, false) => {
                 "the search set out from a plant fitted to the balance of torques: the given one is far off"
