@@ -365,7 +365,10 @@ fn surface<'a>(
 }
 
 /// The best curve at another port beside a reading that folds or ends at limits.
-fn beside<'a>(reading: &Foretelling<'a>, one_place: &'a Stretches<'a>) -> Option<(Foretelling<'a>, Vec<(CurvePort, f64)>)> {
+fn beside<'a>(
+    reading: &Foretelling<'a>,
+    one_place: &'a Stretches<'a>,
+) -> Option<(Foretelling<'a>, Vec<(CurvePort, f64)>)> {
     let data = reading.trial.data;
     let (mut best, mut tried) = (None, Vec::new());
     for port in CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition) {
