@@ -18,6 +18,9 @@ rules! {
         "16 standard deviations of one number: laws differ from machines by more than noise does";
 
     [Cleared]
+    CLEARED_ALONE: f64 = 1.1, "ratio",
+        "simulation error of the same plant fitted without the law over that with it, up to which it is taken without: the given plant was far off, and nothing bent it",
+        "judgement: a law that is worth a tenth is found from that plant as well";
     CLEARED_BETTER: f64 = 0.5, "ratio",
         "simulation error with the law over that of the best linear plant below which its plant is taken",
         "a bent plant leaves several times the noise; half cannot be one more number's luck";

@@ -17,7 +17,7 @@ use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::fit::simulation::size;
 use crate::diagnose::free_form::estimation::Curved;
 use crate::diagnose::rules::{
-    CLEARED_BETTER, CLEARED_BY_CURVE, CLEARED_DONE, CLEARED_FAR, CLEARED_FULLER, CLEARED_TELLS,
+    CLEARED_ALONE, CLEARED_BETTER, CLEARED_BY_CURVE, CLEARED_DONE, CLEARED_FAR, CLEARED_FULLER, CLEARED_TELLS,
 };
 use crate::lti::Plant;
 use crate::physics::Setting;
@@ -133,7 +133,7 @@ pub(in crate::diagnose) fn cleared(
         return Some(Cleared { given_stands: true, ..firsts.cleared(&stands) });
     }
     let best = tried.of_curves(&bent, tried.of_laws(&laws)).map(|best| tried.with_modes(best));
-    let best = best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least)?;
+    let best = tried.alone(best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least)?);
     if !(repeated && best.drags()) {
         return Some(tried.cleared(&best));
     }
@@ -219,6 +219,17 @@ impl Tried<'_> {
         let Some(model) = descended(&best.ground, &best.model, None, &self.whole) else { return best };
         let left = self.left(&best.ground, &model);
         if left < CLEARED_FULLER * best.left { Fitted { left, model, ..best } } else { best }
+    }
+
+    /// The plant without its law, where it then leaves hardly more: it was far off, and nothing bent it.
+    fn alone(&self, best: Fitted) -> Fitted {
+        let bare = Model { chosen: vec![], ..best.model.clone() };
+        let Some(model) = self.fitted(&best.ground, &bare) else { return best };
+        let left = self.left(&best.ground, &model);
+        if left < CLEARED_ALONE * CLEARED_ALONE * best.left {
+            return Fitted { left, model, curve: false, ..best };
+        }
+        best
     }
 
     /// The best law beside the plant as given, where both leave hardly more than the noise: then nothing bent that plant.
