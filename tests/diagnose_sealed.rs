@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use rayon::prelude::*;
-use servotune_lab::{Outcome, Row, sealed_set};
+use servotune_lab::{Outcome, Row, false_alarm_line, sealed_set};
 
 /// Not the seed of a set that was published. The bounds of stuck samples and of hums were mended by what it showed: it keeps what works from
 /// getting worse, and is no evidence of how well.
@@ -34,4 +34,19 @@ fn nothing_is_seen_where_nothing_is_missing_and_what_is_missing_is_named() {
     let clear: Vec<&Row> = rows.iter().filter(|r| r.lambda >= 100.0 && !r.expected.is_empty()).collect();
     let named = clear.iter().filter(|r| matches!(r.outcome, Outcome::Right | Outcome::InFamily)).count();
     assert!(2 * clear.len() >= CASES && 3 * named >= 2 * clear.len(), "{named} of {}: {all:#?}", clear.len());
+}
+
+/// Sound machines of the count of false alarms whose given gain is nonsense. The program named laws on such machines, or said that it set out
+/// from a plant with one beside it.
+#[test]
+fn a_nonsensical_plant_of_a_sound_machine_is_refitted_and_cleared_of_nothing() {
+    let said: Vec<serde_json::Value> = [0, 12, 77]
+        .into_par_iter()
+        .map(|place| serde_json::from_str(&false_alarm_line(20_261_129, place).unwrap().unwrap()).unwrap())
+        .collect();
+    for s in said {
+        assert_eq!(s["model"], "lost", "{s}");
+        assert_eq!((&s["verdict"], s["cleared"].is_null()), (&"refit".into(), true), "{s}");
+        assert_eq!(s["findings"].as_array().map(Vec::len), Some(0), "{s}");
+    }
 }

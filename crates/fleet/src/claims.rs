@@ -40,13 +40,25 @@ fn door(folder: &Path) -> Result<File, FleetError> {
 /// Files that are nobody's: locks that several processes take in turn.
 const STAY: [&str; 2] = ["door", "install"];
 
+/// A lock that is given back when this is dropped. Closing the file is not enough: a child that is being started has it open too, until it
+/// runs its own program.
+#[derive(Debug)]
+pub(super) struct Held(File);
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        // Where this fails, the system gives the lock back when the last one closes the file.
+        let _ = self.0.unlock();
+    }
+}
+
 /// The lock that one process holds while it installs; none where another holds it and `wait` is not asked for.
-pub(super) fn install_lock(store: &Path, wait: bool) -> Result<Option<File>, FleetError> {
+pub(super) fn install_lock(store: &Path, wait: bool) -> Result<Option<Held>, FleetError> {
     locked(store, "install", wait)
 }
 
-/// A lock of a store by its name, held until the file is dropped; none where another process holds it and `wait` is not asked for.
-fn locked(store: &Path, name: &str, wait: bool) -> Result<Option<File>, FleetError> {
+/// A lock of a store by its name; none where another process holds it and `wait` is not asked for.
+fn locked(store: &Path, name: &str, wait: bool) -> Result<Option<Held>, FleetError> {
     let folder = folder(store);
     let file = folder.join(name);
     let fail = |action| {
@@ -57,10 +69,10 @@ fn locked(store: &Path, name: &str, wait: bool) -> Result<Option<File>, FleetErr
     let lock = open(&file).map_err(fail("opened"))?;
     if wait {
         lock.lock().map_err(fail("locked"))?;
-        return Ok(Some(lock));
+        return Ok(Some(Held(lock)));
     }
     match lock.try_lock() {
-        Ok(()) => Ok(Some(lock)),
+        Ok(()) => Ok(Some(Held(lock))),
         Err(TryLockError::WouldBlock) => Ok(None),
         Err(TryLockError::Error(source)) => Err(fail("locked")(source)),
     }

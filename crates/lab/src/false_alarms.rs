@@ -118,12 +118,21 @@ fn lost(plant: &Plant, drawn: &Drawn) -> bool {
     !(0.5..=2.0).contains(&ratio)
 }
 
+fn said_at(seed: u64, place: usize) -> Option<Said> {
+    Null::at(seed, place).map(|null| null.said())
+}
+
+/// The line of the case at a place of a seed: verdict, findings, the law that the plant was cleared of; none where its machine cannot be made.
+pub fn false_alarm_line(seed: u64, place: usize) -> Result<Option<String>, StudyError> {
+    Ok(said_at(seed, place).map(|said| serde_json::to_string(&said)).transpose()?)
+}
+
 /// Diagnoses cases on which nothing acts, each line said as it is known.
 pub fn false_alarms(seed: u64, count: Option<usize>, say: &mut (dyn FnMut(&str) + Send)) -> Result<Study, StudyError> {
     let say = Mutex::new(say);
     let one = |place: usize| -> Result<Option<Said>, StudyError> {
         // A case is made when its turn comes: all at once would fill the memory.
-        let Some(said) = Null::at(seed, place).map(|null| null.said()) else { return Ok(None) };
+        let Some(said) = said_at(seed, place) else { return Ok(None) };
         if let Ok(mut say) = say.lock() {
             say(&serde_json::to_string(&said)?);
         }

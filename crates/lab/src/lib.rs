@@ -54,7 +54,7 @@ pub use certificate::certificate;
 pub use certificate_write::certificate_write;
 pub use classes::classes;
 pub use error::StudyError;
-pub use false_alarms::{false_alarms, false_alarms_of_lines};
+pub use false_alarms::{false_alarm_line, false_alarms, false_alarms_of_lines};
 pub use fleet_kills::kills;
 pub use fleet_reliability::reliability;
 pub use fleet_study::{floor, scale, shared};
