@@ -50,3 +50,18 @@ fn a_nonsensical_plant_of_a_sound_machine_is_refitted_and_cleared_of_nothing() {
         assert_eq!(s["findings"].as_array().map(Vec::len), Some(0), "{s}");
     }
 }
+
+/// A sound machine of the ninth published set whose given gain is nonsense: the refit stopped at three times the noise, and a curve stood in.
+#[test]
+fn a_refit_that_stops_on_its_way_is_begun_again_where_torques_balance() {
+    let set = sealed_set(20_261_216, 3, 2400);
+    let row = set[2].row().unwrap();
+    assert_eq!(
+        (row.kind.as_str(), row.outcome),
+        ("sound", Outcome::Silent),
+        "{} {} {:?}",
+        row.verdict,
+        row.findings,
+        row.holdout
+    );
+}

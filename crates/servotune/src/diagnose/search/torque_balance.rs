@@ -274,10 +274,15 @@ impl<'a> Balance<'a> {
         Plant { body, delay_s: (delay_samples * t).clamp(0.0, 3.0 * LATER as f64 * t), ..given.clone() }
     }
 
+    /// The balance without a law.
+    pub fn linear(&self) -> Option<Balanced> {
+        self.solved(None)
+    }
+
     /// The best point of every law that bends or drags, with the share of the linear balance's error that it leaves.
     /// After them the balance without a law: the given plant may be far off by itself.
     pub fn laws(&self) -> Vec<(f64, Balanced)> {
-        let Some(linear) = self.solved(None) else { return Vec::new() };
+        let Some(linear) = self.linear() else { return Vec::new() };
         let bends = |e: &&&'static dyn Effect| {
             (e.is_hard_nonlinearity() || e.is_drag()) && !e.facts().per_record && e.facts().entry != Entry::Position
         };
