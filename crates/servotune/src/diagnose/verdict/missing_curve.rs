@@ -52,7 +52,8 @@ pub(in crate::diagnose) struct Standing<'a> {
 }
 
 /// Looks for a curve and takes it where it is worth it: on whole records, then in the loop that they were recorded in, then on short pieces of
-/// them, for a law under which simulations of whole records part. It is estimated on the ground of the search, which may be of excerpts, and judged on the same with whole runs.
+/// them, for a law under which simulations of whole records part. It is estimated on the ground of the search, which may be of excerpts, and
+/// judged on the same with whole runs.
 pub(in crate::diagnose) fn stand_in(
     [data, whole]: [&DiagnosisData; 2],
     selection: &Selection,
