@@ -131,9 +131,13 @@ fn a_clock_that_runs_wrong_is_a_fault_of_the_log() {
 
 /// A loop that follows a triangle: the law of the contract written out, the machine by Runge-Kutta as everywhere here.
 fn closed(seed: u64) -> (RecordEntry, Record) {
+    following(seed, &|k| 20.0 * (((k as f64 * T / 0.05 + 0.5) % 2.0 - 1.0).abs() - 0.5))
+}
+
+/// The same behind any reference.
+fn following(seed: u64, reference: &dyn Fn(usize) -> f64) -> (RecordEntry, Record) {
     let (pid, mut noise) = (law().pid, Random::new(seed));
-    let triangle = |k: usize| 20.0 * (((k as f64 * T / 0.05 + 0.5) % 2.0 - 1.0).abs() - 0.5);
-    let reference: Vec<f64> = (0..N).map(triangle).collect();
+    let reference: Vec<f64> = (0..N).map(reference).collect();
     let (mut x, mut v, mut sum, mut rate, mut last) = (0.0, 0.0, 0.0, 0.0, 0.0);
     let (mut command, mut position) = (Vec::new(), Vec::new());
     let h = T / STEPS as f64;
@@ -203,4 +207,78 @@ fn whole_rows_that_a_log_lacks_are_lost_samples_though_its_clock_runs_on() {
     assert_eq!((d.sample_faults.len(), f.record.as_str(), f.samples, f.stuck), (1, "closed2", 7.0, false));
     // The first row behind the gap.
     assert!((f.time_s - 1210.0 * T).abs() < 1.5 * T, "{f:?}");
+}
+
+/// Three records of the loop, their positions bent on the way into the log: the controller heard them straight.
+fn logged(bent: &dyn Fn(&[f64]) -> Vec<f64>) -> Diagnosis {
+    let mut records: Vec<_> = (1..4).map(closed).collect();
+    records.iter_mut().for_each(|(_, r)| r.position = bent(&r.position));
+    replayed(records)
+}
+
+#[test]
+fn a_log_that_is_cut_off_says_where_and_that_the_controller_heard_more() {
+    let d = logged(&|y| y.iter().map(|v| v.clamp(-6.0, 7.5)).collect());
+    let f = &d.findings[0];
+    assert_eq!((d.verdict, f.effect.as_str()), (Verdict::DataFault, "sensor_curve"), "{:?}", d.findings);
+    assert_eq!([f.parameters["lowest_reading"].value, f.parameters["highest_reading"].value], [-6.0, 7.5]);
+    assert!(f.says.contains("the controller heard more") && f.place.records.len() == 3, "{f:?}");
+}
+
+#[test]
+fn a_log_that_was_filtered_says_by_what_and_the_model_is_judged_without_it() {
+    // One pole at 0.7: half of the power at the angle whose cosine is 1 - 0.3^2/1.4. A mean of four delays by one and a half.
+    let one_pole = |y: &[f64]| {
+        let mut z = y[0];
+        let mut step = |v: &f64| {
+            z += 0.3 * (v - z);
+            z
+        };
+        y.iter().map(&mut step).collect()
+    };
+    let d = logged(&one_pole);
+    let f = &d.findings[0];
+    assert_eq!((d.verdict, f.effect.as_str()), (Verdict::DataFault, "sensor_lag"), "{:?}", d.findings);
+    let corner = (1.0f64 - 0.09 / 1.4).acos() / std::f64::consts::TAU / T;
+    assert!((f.parameters["bandwidth_hz"].value / corner - 1.0).abs() < 0.01, "{f:?} {corner}");
+    // Undone, it is the sound log again.
+    let sound = logged(&<[f64]>::to_vec).fit.fit;
+    assert!((d.fit.fit.rms_before / sound.rms_before - 1.0).abs() < 1e-3, "{:?} {sound:?}", d.fit.fit);
+    let mean = |y: &[f64]| (0..y.len()).map(|k| (0..4).map(|j| y[k.saturating_sub(j)]).sum::<f64>() / 4.0).collect();
+    let d = logged(&mean);
+    let f = &d.findings[0];
+    assert_eq!((d.verdict, f.effect.as_str()), (Verdict::DataFault, "sensor_lag"), "{:?}", d.findings);
+    assert!((f.parameters["time_constant_s"].value / (1.5 * T) - 1.0).abs() < 0.01 && f.says.contains("4 samples"));
+}
+
+#[test]
+fn a_log_that_wraps_round_is_laid_end_to_end() {
+    let d = logged(&|y| y.iter().map(|v| (v + 3.0).rem_euclid(7.0) - 3.0).collect());
+    assert_eq!(d.verdict, Verdict::NoMismatch, "{:?}", d.findings);
+    assert!(d.remarks.iter().any(|r| r.contains("wraps round every 7.000 um")), "{:?}", d.remarks);
+}
+
+#[test]
+fn readings_that_end_at_a_limit_are_told_without_a_controller_too() {
+    let highest = records(&GIVEN).iter().flat_map(|(_, r)| r.position.clone()).fold(0.0, f64::max);
+    let mut cut = records(&GIVEN);
+    cut.iter_mut().flat_map(|(_, r)| &mut r.position).for_each(|y| *y = y.min(0.6 * highest));
+    let d = diagnosed_from(cut);
+    let f = &d.findings[0];
+    assert_eq!((d.verdict, f.effect.as_str()), (Verdict::DataFault, "sensor_curve"), "{:?}", d.findings);
+    assert_eq!(f.parameters["highest_reading"].value, 0.6 * highest);
+    assert!(!f.parameters.contains_key("lowest_reading"));
+}
+
+#[test]
+fn a_log_that_has_lost_its_sign_says_so() {
+    // A swing instead of the triangle: one that turns in corners itself hides the fold.
+    let swing = |k: usize| 10.0 * (k as f64 * T * std::f64::consts::TAU * 20.0).sin();
+    let mut records: Vec<_> = (1..4).map(|seed| following(seed, &swing)).collect();
+    assert_eq!(replayed(records.clone()).verdict, Verdict::NoMismatch);
+    records.iter_mut().flat_map(|(_, r)| &mut r.position).for_each(|y| *y = y.abs());
+    let d = replayed(records);
+    let f = &d.findings[0];
+    assert_eq!((d.verdict, f.effect.as_str()), (Verdict::DataFault, "sensor_curve"), "{:?}", d.findings);
+    assert!(f.parameters["lowest_reading"].value.abs() < 0.05 && f.says.contains("lost it"), "{f:?}");
 }

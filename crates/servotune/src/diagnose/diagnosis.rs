@@ -20,6 +20,7 @@ use crate::diagnose::verdict::log_checks::{LogChecks, check};
 use crate::diagnose::verdict::outcome::Outcome;
 use crate::diagnose::verdict::run_out::RunOut;
 use crate::lti::{Body, Plant};
+use crate::numeric::digits::said;
 use crate::recording::{Case, Role};
 
 /// The remark where no filter of the noise judges models.
@@ -50,6 +51,10 @@ pub fn diagnose(
     let mut whole = std::mem::take(&mut decoupled.runs);
     let mut ground =
         Ground { case, given, controller, law: law.as_ref(), settings, log_checks, sample_time_s, remarks };
+    if let Some(lap) = ground.log_checks.lap {
+        let (lap, unit) = (said(lap, 4), &given.position_unit);
+        ground.remarks.push(format!("the logged position wraps round every {lap} {unit}: it was laid end to end"));
+    }
     let cut = excerpts(&whole, sample_time_s);
     if let Some(cut) = &cut {
         let kept: usize = cut.iter().filter(|r| r.role == Role::Fit).map(Run::len).sum();

@@ -66,7 +66,7 @@ const END: usize = 16;
 /// Squares of recorded less replayed commands off the limit, and of the recorded ones.
 ///
 /// The ends are left out: a shifted log lacks samples there.
-fn misfit(law: &Law, run: &Run, reference: &[f64], position: &dyn Fn(usize) -> f64) -> (f64, f64) {
+pub(super) fn misfit(law: &Law, run: &Run, reference: &[f64], position: &dyn Fn(usize) -> f64) -> (f64, f64) {
     let n = run.len();
     let inside = if n > 20 * END { END..n - END } else { 0..n };
     let error: Vec<f64> = inside.clone().map(|k| reference[k] - position(k)).collect();

@@ -3,10 +3,14 @@
 pub(super) mod checks;
 pub(super) mod excerpt;
 pub(super) mod linear_form;
+pub(super) mod log_filter;
 pub(super) mod plant_check;
+pub(super) mod reading_fold;
+pub(super) mod reading_limits;
 pub(super) mod repeat_difference;
 pub(super) mod run;
 pub(super) mod slip;
 pub(super) mod stacked_records;
 pub(super) mod time_shift;
 pub(super) mod turning_points;
+pub(super) mod wrapped;

@@ -237,8 +237,36 @@ pub fn mean_run(runs: &[Run], repeats: &[usize]) -> Run {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::AHEAD;
+pub(in crate::diagnose) mod tests {
+    use super::{AHEAD, Run};
+    use crate::recording::Role;
+
+    /// A run with nothing but positions.
+    pub fn run_at(position: Vec<f64>) -> Run {
+        let still = vec![0.0; position.len()];
+        Run {
+            name: "r".into(),
+            role: Role::Fit,
+            began_s: 0.0,
+            from_s: 0.0,
+            turned: vec![],
+            group: 0,
+            reference: None,
+            command: still.clone(),
+            excitation: still.clone(),
+            input: still,
+            position,
+            before: 0.0,
+            origin: 0.0,
+            rested: true,
+            shocked: false,
+            pes: None,
+            spindle_rad: None,
+            temperature: None,
+            further: vec![],
+            coupled: vec![],
+        }
+    }
 
     #[test]
     fn a_measured_command_is_raised_as_a_hold_weakens() {

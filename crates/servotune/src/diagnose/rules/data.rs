@@ -28,6 +28,51 @@ rules! {
     JUMP_STEPS: f64 = 1.5, "counts",
         "jump of the position behind such a stretch, in steps of the encoder, from which it was stuck",
         "an arm that stands goes on by one count";
+    LIMIT_SAMPLES: usize = 3, "samples",
+        "equal readings in a row at the lowest or the highest of all from which they lie on a limit",
+        "judgement: noise above the last digit makes no two equal";
+    LIMIT_SPEED: f64 = 0.05, "ratio",
+        "step by which readings come to a limit or leave it, over the usual step, from which they do so at speed",
+        "judgement: an arm that stands at the end of its way comes and goes slowly";
+    LIMIT_COUNTS: f64 = 3.0, "counts",
+        "the same over the count of a coarse encoder",
+        "an arm that stands between two counts reads now one, now the other";
+    LIMIT_CORNERS: usize = 2, "times",
+        "times that a limit must be met or left at speed",
+        "judgement: a stuck value does so once";
+    LIMIT_SHARE: f64 = 0.8, "share",
+        "times that it is met or left, of which so many must be at speed",
+        "judgement: a swing just above the limit turns round slowly now and then";
+    FOLD_SHARP: f64 = 3.2, "ratio",
+        "width of the lowest turns at 12 % of the range over that at 3 %, from which they are corners",
+        "four times at a corner, twice at a parabola";
+    FOLD_SMOOTH: f64 = 2.8, "ratio",
+        "the same of the highest turns, up to which they are none",
+        "a motion that turns in corners itself does so at both ends";
+    FOLD_ALIKE: f64 = 0.25, "share",
+        "deviation of the two sides of such a corner from each other, up to which it is a fold",
+        "judgement: an arm that bounces comes back more slowly";
+    FOLD_CORNERS: usize = 6, "turns",
+        "fewest such corners",
+        "judgement";
+    WRAP_JUMP: f64 = 0.5, "share",
+        "jump of the position over the range of all readings, from which it may wrap round",
+        "a wrap goes from one end to the other";
+    WRAP_STEP: f64 = 0.25, "share",
+        "longest of all other steps over a lap",
+        "judgement: a motion that makes half a lap a sample cannot be laid end to end";
+    WRAP_ALIKE: f64 = 0.05, "share",
+        "deviation of one jump from the usual one",
+        "a lap is as long as the next; 5 % leave room for noise and the motion's own step";
+    WRAP_ONWARD: f64 = 0.2, "ratio",
+        "step of the motion against the jump over the usual step",
+        "a counter that overflows jumps back where the motion goes on; a motion that leaps goes with its leap";
+    FILTER_HELPS: f64 = 0.3, "ratio",
+        "error of a failing replay over the log with a low-pass undone, over what a shift or a factor leaves, below which the log is filtered",
+        "judgement: the filter undone takes nearly all of the error; it has up to three numbers, a shift has one";
+    FILTER_GAIN: f64 = 0.02, "share",
+        "deviation of that low-pass from 1 at rest up to which it is one",
+        "a filter of a log keeps what stands; 2 % leave room for rounding";
     SLIP_TAKEN: f64 = 0.7, "share",
         "squares of the error that one slip may leave",
         "judgement: each slip must earn its place";

@@ -1,16 +1,20 @@
-//! What the logs of a case say before any model is fitted: sound, slipped, in other units, or made by another controller.
+//! What the logs of a case say before any model is fitted: sound, cut off, filtered, slipped, in other units, or made by another controller.
 
 use super::finding::Finding;
 use crate::controller::Law;
 use crate::diagnose::data::checks::{Replay, SampleFault, replay_records, sample_faults};
+use crate::diagnose::data::log_filter::{LogFilter, Numerator};
 use crate::diagnose::data::plant_check::Answers;
+use crate::diagnose::data::reading_fold::reading_fold;
+use crate::diagnose::data::reading_limits::reading_limits;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::slip::breaks_of_replay;
 use crate::diagnose::data::time_shift::shifted;
+use crate::diagnose::data::wrapped::unwrap;
 use crate::diagnose::fit::diagnosis_data::scene;
 use crate::diagnose::fit::simulated_model::SimulatedModel;
 use crate::diagnose::fit::simulation::error;
-use crate::diagnose::rules::{REPLAY_HELPS, SHIFT_BEFORE_SCALE, SHIFT_TOLD, UNIT_FACTOR};
+use crate::diagnose::rules::{FILTER_HELPS, REPLAY_HELPS, SHIFT_BEFORE_SCALE, SHIFT_TOLD, UNIT_FACTOR};
 use crate::lti::{LtiError, Plant};
 use crate::recording::Case;
 
@@ -22,9 +26,13 @@ pub(in crate::diagnose) struct LogChecks {
     pub finding: Option<Finding>,
     /// Whether the controller's law holds, so that the loop can be closed in simulation.
     pub closed: bool,
+    /// Whether positions have lost what no model gives back: they end at limits, have no sign, or are means of several samples.
+    pub lossy: bool,
+    /// Length of a lap, where positions wrapped round (position_unit).
+    pub lap: Option<f64>,
 }
 
-/// What the logs say; positions that turn out to be shifted are moved back.
+/// What the logs say; positions that turn out to be shifted are moved back, filtered ones restored, and such that wrap round laid end to end.
 pub(in crate::diagnose) fn check(
     case: &Case,
     runs: &mut [Run],
@@ -32,6 +40,7 @@ pub(in crate::diagnose) fn check(
     law: Option<&Law>,
     sample_time_s: f64,
 ) -> Result<LogChecks, LtiError> {
+    let lap = unwrap(runs, law);
     let smooth = smooth(given, runs, sample_time_s)?;
     let mut faults: Vec<SampleFault> = case
         .records
@@ -39,11 +48,18 @@ pub(in crate::diagnose) fn check(
         .zip(runs.iter().zip(&smooth))
         .flat_map(|((_, record), (run, smooth))| sample_faults(run, &record.gaps, sample_time_s, smooth))
         .collect();
-    let mut log_checks = LogChecks { replay: None, faults: Vec::new(), finding: None, closed: false };
+    let mut log_checks =
+        LogChecks { replay: None, faults: Vec::new(), finding: None, closed: false, lossy: false, lap };
     if let Some(law) = law {
         let all: Vec<&Run> = runs.iter().collect();
         log_checks.closed = all.iter().all(|r| r.reference.is_some());
         log_checks.replay = replay_records(law, &all, &smooth);
+    }
+    let heard = log_checks.replay.as_ref().map(|r| r.failing.is_empty());
+    if let Some(finding) = bent_reading(runs, heard, given, sample_time_s) {
+        (log_checks.finding, log_checks.lossy) = (Some(finding), true);
+        log_checks.closed = log_checks.closed && heard == Some(true);
+        return Ok(log_checks);
     }
     if let (Some(r), Some(law)) = (&log_checks.replay, law)
         && !r.failing.is_empty()
@@ -58,7 +74,11 @@ pub(in crate::diagnose) fn check(
             faults.extend(breaks);
             log_checks.closed = false;
         } else if faults.is_empty() {
-            if shifted && r.shift_samples.abs() > SHIFT_TOLD {
+            if let Some(filter) = filter(law, &named, r) {
+                log_checks.finding = Some(super::log_finding::filtered(&filter, sample_time_s, &named));
+                log_checks.lossy = matches!(filter.numerator, Numerator::Mean(_));
+                failing.iter().for_each(|&i| runs[i].position = filter.undone(&runs[i].position));
+            } else if shifted && r.shift_samples.abs() > SHIFT_TOLD {
                 log_checks.finding = Some(super::log_finding::misalignment(r, sample_time_s, &named));
                 let by = r.shift_samples;
                 failing.iter().for_each(|&i| shift(&mut runs[i], by));
@@ -89,6 +109,24 @@ pub(in crate::diagnose) fn check(
     }
     log_checks.faults = faults;
     Ok(log_checks)
+}
+
+/// Readings that end at limits, or that fold where the controller heard the sign; `heard` says whether it got what is in the log, where that is known.
+fn bent_reading(runs: &[Run], heard: Option<bool>, given: &Plant, sample_time_s: f64) -> Option<Finding> {
+    let unit = &given.position_unit;
+    if let Some(limits) = reading_limits(runs) {
+        return Some(super::log_finding::cut_off(&limits, heard, runs, sample_time_s, unit));
+    }
+    // A sensor that folds is looked for with what it reads: `missing_curve`.
+    let lowest = reading_fold(runs).filter(|_| heard == Some(false))?;
+    Some(super::log_finding::folded(lowest, runs, unit))
+}
+
+/// The low-pass between controller and log, where that explains a failing replay far better than a shift or a factor.
+fn filter(law: &Law, failing: &[&Run], replay: &Replay) -> Option<LogFilter> {
+    let with: Vec<(&Run, &[f64])> = failing.iter().filter_map(|r| Some((*r, r.reference.as_deref()?))).collect();
+    let else_left = replay.error.min(replay.error_shifted).min(replay.error_scaled);
+    LogFilter::of(law, &with).filter(|f| f.error < FILTER_HELPS * else_left)
 }
 
 /// The given plant's answer to each record's command, its free motions fitted to the position: the motion without the noise.

@@ -3,8 +3,13 @@
 use super::finding::{Estimate, Finding, Where};
 use super::naming::{everywhere, plain};
 use crate::diagnose::data::checks::{Replay, SampleFault};
+use crate::diagnose::data::log_filter::{LogFilter, Numerator};
+use crate::diagnose::data::reading_limits::ReadingLimits;
 use crate::diagnose::data::run::Run;
-use crate::physics::{Facts, controller_mismatch, linear_parameters, lost_samples, misalignment};
+use crate::numeric::digits::said;
+use crate::physics::{
+    Facts, controller_mismatch, linear_parameters, lost_samples, misalignment, sensor_curve, sensor_lag,
+};
 use std::collections::BTreeMap;
 
 /// The position log is shifted: the documented controller says by how much.
@@ -38,6 +43,83 @@ fn slipped(samples: f64, off: f64, sample_time_s: f64, why: &str, runs: &[&Run])
         p_value: 1e-300,
         says: format!("In the log {says}: {why}."),
         parameters,
+        place: everywhere(runs),
+    }
+}
+
+/// The readings end at limits; `heard` says whether the controller got no more than the log, where that is known.
+pub(super) fn cut_off(
+    limits: &ReadingLimits,
+    heard: Option<bool>,
+    runs: &[Run],
+    sample_time_s: f64,
+    unit: &str,
+) -> Finding {
+    let &Facts { name: effect, port, .. } = &sensor_curve::FACTS;
+    let named = [("lowest_reading", limits.ends[0]), ("highest_reading", limits.ends[1])];
+    let known: Vec<(&str, f64)> = named.iter().filter_map(|(name, v)| Some((*name, (*v)?))).collect();
+    let at: Vec<String> = known.iter().map(|(_, v)| said(*v, 4)).collect();
+    let who = match heard {
+        Some(true) => "the controller heard no more: the sensor ends there",
+        Some(false) => "the controller heard more: the log is cut off there",
+        None => "sensor or log is cut off there",
+    };
+    let mut records: Vec<String> = limits.stretches.iter().map(|(i, _)| runs[*i].name.clone()).collect();
+    records.dedup();
+    let time_s = limits.stretches.iter().map(|(_, ends)| ends.map(|k| k as f64 * sample_time_s)).collect();
+    Finding {
+        effect: effect.into(),
+        family: vec![effect.into()],
+        port,
+        p_value: 1e-300,
+        says: format!(
+            "The positions end at {} {unit}: {} of {} readings lie there to the last digit, met and left at full speed; {who}.",
+            at.join(" and "),
+            limits.samples,
+            limits.of
+        ),
+        parameters: known.iter().map(|(name, v)| ((*name).to_owned(), plain(*v, unit))).collect(),
+        place: Where { records, time_s, velocity_sign: "both", ..Where::default() },
+    }
+}
+
+/// The readings fold at their lowest one, and the controller heard the sign.
+pub(super) fn folded(lowest: f64, runs: &[Run], unit: &str) -> Finding {
+    let &Facts { name: effect, port, .. } = &sensor_curve::FACTS;
+    let all: Vec<&Run> = runs.iter().collect();
+    Finding {
+        effect: effect.into(),
+        family: vec![effect.into()],
+        port,
+        p_value: 1e-300,
+        says: format!(
+            "The positions fold at {} {unit}: they turn round there in a corner, at full speed, and nowhere else; the controller heard the sign: the log has lost it.",
+            said(lowest, 4)
+        ),
+        parameters: [("lowest_reading".to_owned(), plain(lowest, unit))].into(),
+        place: everywhere(&all),
+    }
+}
+
+/// The position was filtered behind the controller's reading, before it was logged.
+pub(super) fn filtered(filter: &LogFilter, sample_time_s: f64, runs: &[&Run]) -> Finding {
+    let &Facts { name: effect, port, .. } = &sensor_lag::FACTS;
+    let (bandwidth, delay) = (filter.bandwidth_hz(sample_time_s), filter.delay_s(sample_time_s));
+    let what = match filter.numerator {
+        Numerator::Zeros(_) => "a low-pass".to_owned(),
+        Numerator::Mean(n) => format!("a mean of {n} samples, a low-pass"),
+    };
+    let parameters = [("bandwidth_hz", bandwidth, "Hz"), ("time_constant_s", delay, "s")];
+    Finding {
+        effect: effect.into(),
+        family: vec![effect.into()],
+        port,
+        p_value: 1e-300,
+        says: format!(
+            "The log holds a filtered position: with {what} of {} Hz undone, the documented controller gives the recorded command again; it heard the position before that filter.",
+            said(bandwidth, 3)
+        ),
+        parameters: parameters.map(|(name, v, unit)| (name.to_owned(), plain(v, unit))).into(),
         place: everywhere(runs),
     }
 }
