@@ -47,6 +47,9 @@ fn slipped(samples: f64, off: f64, sample_time_s: f64, why: &str, runs: &[&Run])
     }
 }
 
+/// Most stretches on a limit that are told, the longest ones.
+const SHOWN: usize = 12;
+
 /// The readings end at limits; `heard` says whether the controller got no more than the log, where that is known.
 pub(super) fn cut_off(
     limits: &ReadingLimits,
@@ -66,7 +69,12 @@ pub(super) fn cut_off(
     };
     let mut records: Vec<String> = limits.stretches.iter().map(|(i, _)| runs[*i].name.clone()).collect();
     records.dedup();
-    let time_s = limits.stretches.iter().map(|(_, ends)| ends.map(|k| k as f64 * sample_time_s)).collect();
+    // A fast motion meets a limit hundreds of times.
+    let mut longest = limits.stretches.clone();
+    longest.sort_by_key(|(_, [first, last])| std::cmp::Reverse(last - first));
+    longest.truncate(SHOWN);
+    longest.sort();
+    let time_s = longest.iter().map(|(_, ends)| ends.map(|k| k as f64 * sample_time_s)).collect();
     Finding {
         effect: effect.into(),
         family: vec![effect.into()],
