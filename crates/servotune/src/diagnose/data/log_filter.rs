@@ -193,8 +193,9 @@ fn mean_of(x: &[f64], count: usize) -> Vec<f64> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::super::run::tests::run_at;
     use super::*;
     use crate::numeric::random::Random;

@@ -68,8 +68,9 @@ fn turns(y: Vec<f64>, range: f64) -> Vec<[f64; 2]> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::super::run::tests::run_at;
     use super::*;
     use crate::numeric::random::Random;

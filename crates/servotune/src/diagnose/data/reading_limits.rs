@@ -81,8 +81,9 @@ pub fn reading_limits(runs: &[Run]) -> Option<ReadingLimits> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::super::run::tests::run_at;
     use super::*;
     use crate::numeric::random::Random;

@@ -82,8 +82,9 @@ fn lay(run: &mut Run, lap: f64, span: f64) {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::super::run::tests::run_at;
     use super::*;
     use crate::numeric::random::Random;

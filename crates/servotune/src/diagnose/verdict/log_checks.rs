@@ -59,6 +59,8 @@ pub(in crate::diagnose) fn check(
     if let Some(finding) = bent_reading(runs, heard, given, sample_time_s) {
         (log_checks.finding, log_checks.lossy) = (Some(finding), true);
         log_checks.closed = log_checks.closed && heard == Some(true);
+        // A value on a limit is not stuck; rows that the clock lacks are lost all the same.
+        log_checks.faults = faults.into_iter().filter(|f| !f.stuck).collect();
         return Ok(log_checks);
     }
     if let (Some(r), Some(law)) = (&log_checks.replay, law)
