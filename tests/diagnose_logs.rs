@@ -241,6 +241,8 @@ fn a_log_that_was_filtered_says_by_what_and_the_model_is_judged_without_it() {
     assert_eq!((d.verdict, f.effect.as_str()), (Verdict::DataFault, "sensor_lag"), "{:?}", d.findings);
     let corner = (1.0f64 - 0.09 / 1.4).acos() / std::f64::consts::TAU / T;
     assert!((f.parameters["bandwidth_hz"].value / corner - 1.0).abs() < 0.01, "{f:?} {corner}");
+    // The reference moves: no controller without a low-pass makes these commands.
+    assert_eq!(f.family, ["sensor_lag"]);
     // Undone, it is the sound log again.
     let sound = logged(&<[f64]>::to_vec).fit.fit;
     assert!((d.fit.fit.rms_before / sound.rms_before - 1.0).abs() < 1e-3, "{:?} {sound:?}", d.fit.fit);

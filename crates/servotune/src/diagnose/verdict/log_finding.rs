@@ -118,15 +118,25 @@ pub(super) fn filtered(filter: &LogFilter, sample_time_s: f64, runs: &[&Run]) ->
         Numerator::Mean(n) => format!("a mean of {n} samples, a low-pass"),
     };
     let parameters = [("bandwidth_hz", bandwidth, "Hz"), ("time_constant_s", delay, "s")];
+    let says = format!(
+        "The log holds a filtered position: with {what} of {} Hz undone, the documented controller gives the recorded command again; it heard the position before that filter.",
+        said(bandwidth, 3)
+    );
+    // The reference takes no such way: where it moves, it tells the two apart.
+    let moves = |r: &&Run| r.reference.as_ref().is_some_and(|r| r.iter().any(|v| *v != r[0]));
+    let (other, doubt) = match runs.iter().any(moves) {
+        true => (None, ""),
+        false => (
+            Some(controller_mismatch::FACTS.name),
+            " No reference moves here: a controller without a low-pass that it is documented to have looks the same.",
+        ),
+    };
     Finding {
         effect: effect.into(),
-        family: vec![effect.into()],
+        family: std::iter::once(effect).chain(other).map(Into::into).collect(),
         port,
         p_value: 1e-300,
-        says: format!(
-            "The log holds a filtered position: with {what} of {} Hz undone, the documented controller gives the recorded command again; it heard the position before that filter.",
-            said(bandwidth, 3)
-        ),
+        says: says + doubt,
         parameters: parameters.map(|(name, v, unit)| (name.to_owned(), plain(v, unit))).into(),
         place: everywhere(runs),
     }
