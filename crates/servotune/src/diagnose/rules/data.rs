@@ -28,6 +28,22 @@ rules! {
     JUMP_STEPS: f64 = 1.5, "counts",
         "jump of the position behind such a stretch, in steps of the encoder, from which it was stuck",
         "an arm that stands goes on by one count";
+    SLIP_TAKEN: f64 = 0.7, "share",
+        "squares of the error that one slip may leave",
+        "judgement: each slip must earn its place";
+    SLIPS_LEFT: f64 = 0.1, "share",
+        "squares of the first error that all slips together may leave",
+        "a machine with another gain, delay and clock leaves more";
+
+    [Refusal]
+    BEYOND_MOTION: f64 = 1e8, "ratio",
+        "simulated motion over recorded motion above which a case is refused",
+        "beyond it the numbers of a fit lose their digits (16 digits, half of them squared)";
+
+    [Untried]
+    LAP_DIGITS: f64 = 1e-7, "share",
+        "difference between two laps of one drive up to which they are repeats",
+        "digits that are printed";
     LIMIT_SAMPLES: usize = 3, "samples",
         "equal readings in a row at the lowest or the highest of all from which they lie on a limit",
         "judgement: noise above the last digit makes no two equal";
@@ -73,22 +89,6 @@ rules! {
     FILTER_GAIN: f64 = 0.02, "share",
         "deviation of that low-pass from 1 at rest up to which it is one",
         "a filter of a log keeps what stands; 2 % leave room for rounding";
-    SLIP_TAKEN: f64 = 0.7, "share",
-        "squares of the error that one slip may leave",
-        "judgement: each slip must earn its place";
-    SLIPS_LEFT: f64 = 0.1, "share",
-        "squares of the first error that all slips together may leave",
-        "a machine with another gain, delay and clock leaves more";
-
-    [Refusal]
-    BEYOND_MOTION: f64 = 1e8, "ratio",
-        "simulated motion over recorded motion above which a case is refused",
-        "beyond it the numbers of a fit lose their digits (16 digits, half of them squared)";
-
-    [Untried]
-    LAP_DIGITS: f64 = 1e-7, "share",
-        "difference between two laps of one drive up to which they are repeats",
-        "digits that are printed";
 
     [Words]
     REPLAY_HELPS: f64 = 0.3, "share",
