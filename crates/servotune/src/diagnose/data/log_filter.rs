@@ -8,15 +8,16 @@ use super::run::Run;
 use super::stacked_records::NuisanceBasis;
 use super::time_shift::shifted;
 use crate::controller::Law;
-use crate::diagnose::rules::FILTER_GAIN;
+use crate::diagnose::rules::{FILTER_GAIN, FILTER_RAISES, FILTER_WEAKENS};
 use crate::lti::step_chain;
 use crate::numeric::least_squares::{Qr, dot};
+use crate::numeric::statistics::{line, mean};
 use nalgebra::Complex;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// A low-pass between the controller's reading and the log.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LogFilter {
     /// Its numerator.
     pub numerator: Numerator,
@@ -27,7 +28,7 @@ pub struct LogFilter {
 }
 
 /// Numerators of low-passes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Numerator {
     /// So many zeros at half of the sample rate.
     Zeros(usize),
@@ -35,11 +36,23 @@ pub enum Numerator {
     Mean(usize),
 }
 
+impl Numerator {
+    /// Samples before the present one that it takes in; half of them is its delay.
+    fn reach(self) -> usize {
+        match self {
+            Numerator::Zeros(m) => m,
+            Numerator::Mean(n) => n - 1,
+        }
+    }
+}
+
 /// Zeros and poles that are tried, and the longest mean (samples).
 const SHAPES: [(usize, usize); 5] = [(0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 const LONGEST: usize = 32;
 /// Frequencies up to half of the sample rate at which a low-pass is looked at.
 const POINTS: usize = 2000;
+/// Share of half of the sample rate near which a low-pass must weaken; at half itself one with zeros there passes nothing.
+const NEAR_HALF: f64 = 0.98;
 
 impl LogFilter {
     /// The low-pass under which the recorded commands of some runs, each with its reference, follow best from the documented law.
@@ -68,7 +81,7 @@ impl LogFilter {
         let stable = c(2).abs() < 1.0 && c(1).abs() < 1.0 + c(2);
         let at_rest = (self.response(0.0) - 1.0).norm() < FILTER_GAIN;
         let most = (0..=POINTS).map(|i| self.response(PI * i as f64 / POINTS as f64).norm()).fold(0.0, f64::max);
-        stable && at_rest && most < 1.5 && self.response(0.98 * PI).norm() < 0.7
+        stable && at_rest && most < FILTER_RAISES && self.response(NEAR_HALF * PI).norm() < FILTER_WEAKENS
     }
 
     /// Frequency at which it passes half of the power (Hz).
@@ -82,11 +95,7 @@ impl LogFilter {
     pub fn delay_s(&self, sample_time_s: f64) -> f64 {
         let sum: f64 = self.inverse.iter().sum();
         let first: f64 = self.inverse.iter().enumerate().map(|(j, c)| j as f64 * c).sum();
-        let zeros = match self.numerator {
-            Numerator::Zeros(m) => m,
-            Numerator::Mean(n) => n - 1,
-        };
-        (0.5 * zeros as f64 - first / sum) * sample_time_s
+        (0.5 * self.numerator.reach() as f64 - first / sum) * sample_time_s
     }
 
     /// What the controller heard, from what is in the log. Of a mean only the delay can be undone: what it took out is lost.
@@ -118,23 +127,15 @@ fn without_alternation(y: &mut [f64], zeros: usize) {
         return;
     }
     let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
-    let middle = |k: usize| 2.0 * k as f64 / n as f64 - 1.0;
-    let each = (1..n - 1).map(|k| (middle(k), sign(k) * 0.25 * (2.0 * y[k] - y[k - 1] - y[k + 1])));
-    let (mut s0, mut s1, mut s2, mut t0, mut t1) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (x, v) in each {
-        (s0, s1, s2, t0, t1) = (s0 + 1.0, s1 + x, s2 + x * x, t0 + v, t1 + x * v);
-    }
-    let slope = if zeros > 1 { (s0 * t1 - s1 * t0) / (s0 * s2 - s1 * s1) } else { 0.0 };
-    let mean = (t0 - slope * s1) / s0;
-    y.iter_mut().enumerate().for_each(|(k, v)| *v -= sign(k) * (mean + slope * middle(k)));
+    let at: Vec<f64> = (1..n - 1).map(|k| k as f64).collect();
+    let share: Vec<f64> = (1..n - 1).map(|k| sign(k) * 0.25 * (2.0 * y[k] - y[k - 1] - y[k + 1])).collect();
+    let (first, slope) = if zeros > 1 { line(&at, &share, 0.0) } else { (mean(&share), 0.0) };
+    y.iter_mut().enumerate().for_each(|(k, v)| *v -= sign(k) * (first + slope * k as f64));
 }
 
 /// The filter of one shape under which the commands follow best, the law's memory free in each record.
 fn fitted(law: &Law, with: &[(&Run, &[f64])], numerator: Numerator, poles: usize) -> Option<LogFilter> {
-    let reach = match numerator {
-        Numerator::Zeros(m) => m,
-        Numerator::Mean(n) => n - 1,
-    };
+    let reach = numerator.reach();
     let (mut columns, mut right, mut all) = (vec![Vec::new(); poles + 1], Vec::new(), 0.0);
     for (run, reference) in with {
         let n = run.len();
@@ -203,14 +204,16 @@ mod tests {
 
     const SAMPLES: usize = 3000;
 
-    /// Positions, and the commands of the controller that hears them.
-    fn heard(law: &Law) -> Run {
+    /// Does something with a law and a run whose commands it made from its positions, under a reference that stands still.
+    fn heard(of: impl Fn(&Law, &Run, &[f64])) {
+        let controller = nominal_controller().unwrap();
+        let law = Law::new(&controller).unwrap();
         let mut random = Random::new(4);
         let at = |k: usize| 3.0 * (k as f64 * 0.01).sin() + 0.2 * (k as f64 * 0.23).cos();
         let position: Vec<f64> = (0..SAMPLES).map(|k| at(k) + 0.003 * random.normal()).collect();
         let mut memory = law.rest();
         let command = position.iter().map(|y| step_chain(&law.chain, &mut memory, -y)).collect();
-        Run { reference: Some(vec![0.0; SAMPLES]), command, ..run_at(position) }
+        of(&law, &Run { command, ..run_at(position) }, &[0.0; SAMPLES]);
     }
 
     /// A filter by its difference equation: a0 y = b x - a y before.
@@ -227,39 +230,34 @@ mod tests {
 
     #[test]
     fn a_low_pass_in_front_of_the_log_is_told_and_undone() {
-        let controller = nominal_controller().unwrap();
-        let law = Law::new(&controller).unwrap();
-        let heard = heard(&law);
-        let reference = vec![0.0; SAMPLES];
         // One pole; Butterworth of second order at an eighth of the sample rate (tan(pi/8)), by the bilinear transform.
         let w = (PI / 8.0).tan();
         let (b0, a) = (w * w, [1.0 + 2f64.sqrt() * w + w * w, 2.0 * (w * w - 1.0), 1.0 - 2f64.sqrt() * w + w * w]);
-        for (b, a, corner) in [
-            (vec![0.2], vec![1.0, -0.8], (1.0f64 - 0.02 / 0.8).acos() / PI),
-            (vec![b0, 2.0 * b0, b0], a.to_vec(), 0.25),
-        ] {
-            let log = Run { position: filtered(&heard.position, &b, &a), ..heard.clone() };
-            let found = LogFilter::of(&law, &[(&log, &reference)]).unwrap();
-            assert!(found.error < 1e-6, "{found:?}");
-            assert!((found.bandwidth_hz(1.0) - 0.5 * corner).abs() < 0.001, "{} {corner}", found.bandwidth_hz(1.0));
-            let undone = found.undone(&log.position);
-            for (k, (u, y)) in undone.iter().zip(&heard.position).enumerate().skip(20) {
-                assert!((u - y).abs() < 1e-3, "{k}: {u} {y}");
+        let one_pole = (vec![0.2], vec![1.0, -0.8], (1.0f64 - 0.02 / 0.8).acos() / PI);
+        let filters = [one_pole, (vec![b0, 2.0 * b0, b0], a.to_vec(), 0.25)];
+        heard(|law, heard, reference| {
+            for (b, a, corner) in &filters {
+                let log = Run { position: filtered(&heard.position, b, a), ..heard.clone() };
+                let found = LogFilter::of(law, &[(&log, reference)]).unwrap();
+                assert!(found.error < 1e-6, "{found:?}");
+                assert!((found.bandwidth_hz(1.0) - 0.5 * corner).abs() < 0.001, "{} {corner}", found.bandwidth_hz(1.0));
+                for (k, (u, y)) in found.undone(&log.position).iter().zip(&heard.position).enumerate().skip(20) {
+                    // A third of the noise.
+                    assert!((u - y).abs() < 1e-3, "{k}: {u} {y}");
+                }
             }
-        }
+        });
     }
 
     #[test]
     fn a_mean_is_told_and_a_sound_log_is_no_low_pass() {
-        let controller = nominal_controller().unwrap();
-        let law = Law::new(&controller).unwrap();
-        let heard = heard(&law);
-        let reference = vec![0.0; SAMPLES];
-        let log = Run { position: mean_of(&heard.position, 5), ..heard.clone() };
-        let found = LogFilter::of(&law, &[(&log, &reference)]).unwrap();
-        assert_eq!(found.numerator, Numerator::Mean(5));
-        assert!((found.delay_s(1.0) - 2.0).abs() < 1e-3, "{found:?}");
-        let sound = LogFilter::of(&law, &[(&heard, &reference)]);
-        assert!(sound.is_none_or(|f| f.error > 0.01));
+        heard(|law, heard, reference| {
+            let log = Run { position: mean_of(&heard.position, 5), ..heard.clone() };
+            let found = LogFilter::of(law, &[(&log, reference)]).unwrap();
+            assert_eq!(found.numerator, Numerator::Mean(5));
+            assert!((found.delay_s(1.0) - 2.0).abs() < 1e-3, "{found:?}");
+            let sound = LogFilter::of(law, &[(heard, reference)]);
+            assert!(sound.is_none_or(|f| f.error > 0.01));
+        });
     }
 }

@@ -67,12 +67,17 @@ impl End {
 /// The limits at which the readings end; none where they do not.
 pub fn reading_limits(runs: &[Run]) -> Option<ReadingLimits> {
     let all = || runs.iter().flat_map(|r| &r.position).copied();
+    let ends = [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)];
+    let still = ends.map(|value| End::of(runs, value));
+    // Most logs stand on neither end, and their count is not asked for.
+    if still.iter().all(|e| e.stretches.is_empty()) {
+        return None;
+    }
     let steps = runs.iter().flat_map(|r| r.position.windows(2).map(|w| w[1] - w[0]));
     let count = quantum(&all().collect::<Vec<_>>()).map_or(0.0, |g| g.step);
     // Where it stands between two counts, noise takes it from one to the other and back.
     let speed = (LIMIT_SPEED * rms_of(steps.filter(|s| *s != 0.0))).max(LIMIT_COUNTS * count);
-    let ends = [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)];
-    let found = ends.map(|value| Some(End::of(runs, value)).filter(|e| e.is_limit(runs, speed)));
+    let found = still.map(|e| Some(e).filter(|e| e.is_limit(runs, speed)));
     let ends = [0, 1].map(|i| found[i].as_ref().map(|e| e.value));
     let mut stretches: Vec<_> = found.into_iter().flatten().flat_map(|e| e.stretches).collect();
     stretches.sort();

@@ -131,6 +131,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::diagnose::data::run::Run;
+    use crate::diagnose::data::run::tests::run_at;
     use crate::diagnose::fit::diagnosis_data::DiagnosisData;
     use crate::diagnose::fit::regressors::drive;
     use crate::diagnose::fit::selected_effect::SelectedEffect;
@@ -139,7 +140,6 @@ mod tests {
     use crate::physics::offset_drift::OffsetDrift;
     use crate::physics::pivot_friction::{Loading, PivotFriction};
     use crate::physics::{AnyLaw, Setting};
-    use crate::recording::Role;
     use crate::twin::recording::{multisine, record, scene, stroke};
     use crate::twin::{MachineClass, nominal_controller, paper_machine};
 
@@ -156,26 +156,13 @@ mod tests {
         let column = |i: usize| -> Vec<f64> { rows.iter().map(|r| r[i]).collect() };
         let (command, excitation) = (column(2), column(1));
         Run {
-            from_s: 0.0,
-            turned: vec![],
             name: format!("r{seed}"),
-            role: Role::Fit,
-            began_s: 0.0,
             group,
             reference: Some(column(0)),
             input: command.iter().zip(&excitation).map(|(u, d)| u + d).collect(),
             command,
             excitation,
-            position: column(3),
-            before: 0.0,
-            origin: 0.0,
-            rested: true,
-            shocked: false,
-            pes: None,
-            spindle_rad: None,
-            temperature: None,
-            further: vec![],
-            coupled: vec![],
+            ..run_at(column(3))
         }
     }
 

@@ -89,6 +89,12 @@ rules! {
     FILTER_GAIN: f64 = 0.02, "share",
         "deviation of that low-pass from 1 at rest up to which it is one",
         "a filter of a log keeps what stands; 2 % leave room for rounding";
+    FILTER_RAISES: f64 = 1.5, "ratio",
+        "largest gain of that low-pass up to which it is one",
+        "judgement: two poles of damping 0.36 raise as much, and filters of a log are damped better";
+    FILTER_WEAKENS: f64 = 0.7, "ratio",
+        "its gain just below half of the sample rate, up to which it is one",
+        "half of the power: a filter that passes more than that filters nothing that is logged";
 
     [Words]
     REPLAY_HELPS: f64 = 0.3, "share",

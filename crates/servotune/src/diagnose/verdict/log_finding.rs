@@ -12,6 +12,12 @@ use crate::physics::{
 };
 use std::collections::BTreeMap;
 
+/// What log checks find is exact: no chance is left.
+fn fault(facts: &Facts, says: String, parameters: BTreeMap<String, Estimate>, place: Where) -> Finding {
+    let effect = facts.name.to_owned();
+    Finding { family: vec![effect.clone()], effect, port: facts.port, p_value: 1e-300, says, parameters, place }
+}
+
 /// The position log is shifted: the documented controller says by how much.
 pub(super) fn misalignment(r: &Replay, sample_time_s: f64, runs: &[&Run]) -> Finding {
     let why = format!(
@@ -32,19 +38,11 @@ pub(in crate::diagnose) fn early(shift_samples: f64, sample_time_s: f64, runs: &
 
 /// The position log is off by so many samples, known to `off`.
 fn slipped(samples: f64, off: f64, sample_time_s: f64, why: &str, runs: &[&Run]) -> Finding {
-    let &Facts { name: effect, says, port, .. } = &misalignment::FACTS;
     let shift = Estimate { value: samples, low: samples - off, high: samples + off, unit: "samples".into() };
     let parameters =
         BTreeMap::from([("samples".to_owned(), shift), ("shift_s".to_owned(), plain(samples * sample_time_s, "s"))]);
-    Finding {
-        effect: effect.into(),
-        family: vec![effect.into()],
-        port,
-        p_value: 1e-300,
-        says: format!("In the log {says}: {why}."),
-        parameters,
-        place: everywhere(runs),
-    }
+    let facts = &misalignment::FACTS;
+    fault(facts, format!("In the log {}: {why}.", facts.says), parameters, everywhere(runs))
 }
 
 /// Most stretches on a limit that are told, the longest ones.
@@ -58,7 +56,6 @@ pub(super) fn cut_off(
     sample_time_s: f64,
     unit: &str,
 ) -> Finding {
-    let &Facts { name: effect, port, .. } = &sensor_curve::FACTS;
     let named = [("lowest_reading", limits.ends[0]), ("highest_reading", limits.ends[1])];
     let known: Vec<(&str, f64)> = named.iter().filter_map(|(name, v)| Some((*name, (*v)?))).collect();
     let at: Vec<String> = known.iter().map(|(_, v)| said(*v, 4)).collect();
@@ -75,43 +72,28 @@ pub(super) fn cut_off(
     longest.truncate(SHOWN);
     longest.sort();
     let time_s = longest.iter().map(|(_, ends)| ends.map(|k| k as f64 * sample_time_s)).collect();
-    Finding {
-        effect: effect.into(),
-        family: vec![effect.into()],
-        port,
-        p_value: 1e-300,
-        says: format!(
-            "The positions end at {} {unit}: {} of {} readings lie there to the last digit, met and left at full speed; {who}.",
-            at.join(" and "),
-            limits.samples,
-            limits.of
-        ),
-        parameters: known.iter().map(|(name, v)| ((*name).to_owned(), plain(*v, unit))).collect(),
-        place: Where { records, time_s, velocity_sign: "both", ..Where::default() },
-    }
+    let says = format!(
+        "The positions end at {} {unit}: {} of {} readings lie there to the last digit, met and left at full speed; {who}.",
+        at.join(" and "),
+        limits.samples,
+        limits.of
+    );
+    let parameters = known.iter().map(|(name, v)| ((*name).to_owned(), plain(*v, unit))).collect();
+    fault(&sensor_curve::FACTS, says, parameters, Where { records, time_s, velocity_sign: "both", ..Where::default() })
 }
 
 /// The readings fold at their lowest one, and the controller heard the sign.
 pub(super) fn folded(lowest: f64, runs: &[Run], unit: &str) -> Finding {
-    let &Facts { name: effect, port, .. } = &sensor_curve::FACTS;
-    let all: Vec<&Run> = runs.iter().collect();
-    Finding {
-        effect: effect.into(),
-        family: vec![effect.into()],
-        port,
-        p_value: 1e-300,
-        says: format!(
-            "The positions fold at {} {unit}: they turn round there in a corner, at full speed, and nowhere else; the controller heard the sign: the log has lost it.",
-            said(lowest, 4)
-        ),
-        parameters: [("lowest_reading".to_owned(), plain(lowest, unit))].into(),
-        place: everywhere(&all),
-    }
+    let says = format!(
+        "The positions fold at {} {unit}: they turn round there in a corner, at full speed, and nowhere else; the controller heard the sign: the log has lost it.",
+        said(lowest, 4)
+    );
+    let parameters = [("lowest_reading".to_owned(), plain(lowest, unit))].into();
+    fault(&sensor_curve::FACTS, says, parameters, everywhere(&runs.iter().collect::<Vec<_>>()))
 }
 
 /// The position was filtered behind the controller's reading, before it was logged.
 pub(super) fn filtered(filter: &LogFilter, sample_time_s: f64, runs: &[&Run]) -> Finding {
-    let &Facts { name: effect, port, .. } = &sensor_lag::FACTS;
     let (bandwidth, delay) = (filter.bandwidth_hz(sample_time_s), filter.delay_s(sample_time_s));
     let what = match filter.numerator {
         Numerator::Zeros(_) => "a low-pass".to_owned(),
@@ -124,22 +106,14 @@ pub(super) fn filtered(filter: &LogFilter, sample_time_s: f64, runs: &[&Run]) ->
     );
     // The reference takes no such way: where it moves, it tells the two apart.
     let moves = |r: &&Run| r.reference.as_ref().is_some_and(|r| r.iter().any(|v| *v != r[0]));
-    let (other, doubt) = match runs.iter().any(moves) {
-        true => (None, ""),
-        false => (
-            Some(controller_mismatch::FACTS.name),
-            " No reference moves here: a controller without a low-pass that it is documented to have looks the same.",
-        ),
-    };
-    Finding {
-        effect: effect.into(),
-        family: std::iter::once(effect).chain(other).map(Into::into).collect(),
-        port,
-        p_value: 1e-300,
-        says: says + doubt,
-        parameters: parameters.map(|(name, v, unit)| (name.to_owned(), plain(v, unit))).into(),
-        place: everywhere(runs),
+    let parameters = parameters.map(|(name, v, unit)| (name.to_owned(), plain(v, unit))).into();
+    let mut found = fault(&sensor_lag::FACTS, says, parameters, everywhere(runs));
+    if !runs.iter().any(moves) {
+        found.family.push(controller_mismatch::FACTS.name.into());
+        found.says +=
+            " No reference moves here: a controller without a low-pass that it is documented to have looks the same.";
     }
+    found
 }
 
 /// Position or command is logged in other units, or with the other sign: the documented controller says so.
@@ -175,24 +149,18 @@ fn scaled(sign: &str, why: &str, parameters: BTreeMap<String, Estimate>, runs: &
 
 /// The command does not follow from the documented law.
 pub(super) fn controller_mismatch(r: &Replay, runs: &[&Run]) -> Finding {
-    let &Facts { name: effect, says, port, .. } = &controller_mismatch::FACTS;
-    Finding {
-        effect: effect.into(),
-        family: vec![effect.into()],
-        port,
-        p_value: 1e-300,
-        says: format!(
-            "{says}: replayed over the log, the documented law misses the recorded command by {:.2} % rms.",
-            100.0 * r.error
-        ),
-        parameters: BTreeMap::from([("replay_error".to_owned(), plain(r.error, "1"))]),
-        place: everywhere(runs),
-    }
+    let facts = &controller_mismatch::FACTS;
+    let says = format!(
+        "{}: replayed over the log, the documented law misses the recorded command by {:.2} % rms.",
+        facts.says,
+        100.0 * r.error
+    );
+    fault(facts, says, BTreeMap::from([("replay_error".to_owned(), plain(r.error, "1"))]), everywhere(runs))
 }
 
 /// Samples are missing, doubled or stuck.
 pub(in crate::diagnose) fn samples(faults: &[SampleFault]) -> Finding {
-    let &Facts { name: effect, says: out_of_step, port, .. } = &lost_samples::FACTS;
+    let out_of_step = lost_samples::FACTS.says;
     let first = &faults[0];
     let (says, what) = match (first.stuck, first.samples > 0.0) {
         (true, _) => ("the position stands still in the log while the arm moves on", "samples"),
@@ -200,18 +168,8 @@ pub(in crate::diagnose) fn samples(faults: &[SampleFault]) -> Finding {
         (false, false) => (out_of_step, "samples too many"),
     };
     let records: Vec<String> = faults.iter().map(|f| f.record.clone()).collect();
-    Finding {
-        effect: effect.into(),
-        family: vec![effect.into()],
-        port,
-        p_value: 1e-300,
-        says: format!("{says}: record {} at {:.6} s, {} {what}.", first.record, first.time_s, first.samples.abs()),
-        parameters: BTreeMap::from([("samples".to_owned(), plain(first.samples, "samples"))]),
-        place: Where {
-            records,
-            time_s: faults.iter().map(|f| [f.time_s, f.time_s]).collect(),
-            velocity_sign: "both",
-            ..Where::default()
-        },
-    }
+    let says = format!("{says}: record {} at {:.6} s, {} {what}.", first.record, first.time_s, first.samples.abs());
+    let parameters = BTreeMap::from([("samples".to_owned(), plain(first.samples, "samples"))]);
+    let time_s = faults.iter().map(|f| [f.time_s, f.time_s]).collect();
+    fault(&lost_samples::FACTS, says, parameters, Where { records, time_s, velocity_sign: "both", ..Where::default() })
 }
