@@ -9,7 +9,7 @@
 use servotune::diagnose::{DiagnoseSettings, diagnose};
 use servotune::document::write_text;
 use servotune::numeric::random::Random;
-use servotune::physics::Setting;
+use servotune::physics::LawSetting;
 use servotune::physics::encoder_cyclic_error::{EncoderCyclicError, Harmonics};
 use servotune::physics::pivot_friction::{Loading, PivotFriction};
 use servotune::physics::torque_factor_rolloff::{Shape, TorqueFactorRolloff};
@@ -52,7 +52,7 @@ const TEN: &Records = &[
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
 /// Writes the case of the paper's tunable machine with these effects.
-fn write_case(folder: &Path, effects: &[Setting], samples: usize, records: &Records) -> Outcome<()> {
+fn write_case(folder: &Path, effects: &[LawSetting], samples: usize, records: &Records) -> Outcome<()> {
     let plant = paper_machine(MachineClass::Tunable)?;
     let controller = nominal_controller()?;
     let t = controller.sample_time_s;
@@ -60,7 +60,7 @@ fn write_case(folder: &Path, effects: &[Setting], samples: usize, records: &Reco
     write_text(&folder.join("controller.toml"), &toml::to_string(&controller)?)?;
     let mut case = "id = \"speed\"\nplant = \"plant.toml\"\ncontroller = \"controller.toml\"\n".to_owned();
     let scene = scene(&plant, t, 15.0, samples, NOISE);
-    let effects: Vec<&Setting> = effects.iter().collect();
+    let effects: Vec<&LawSetting> = effects.iter().collect();
     let mut draw = 0;
     for (name, rms, distance, repeats, held) in records {
         let period = if *rms > 0.0 { multisine(SAMPLES, 220, *rms) } else { vec![0.0; SAMPLES] };
@@ -110,12 +110,12 @@ fn run() -> Outcome<()> {
     let out = option("--out").map(PathBuf::from);
     let only: Option<usize> = option("--row").map(|n| n.parse()).transpose()?;
     let keep = option("--keep").map(PathBuf::from);
-    let friction = || Setting::new(PivotFriction::of(2.5, Loading::Dahl), vec![0.012]);
+    let friction = || LawSetting::new(PivotFriction::of(2.5, Loading::Dahl), vec![0.012]);
     // 8 % less torque at the ends of the travel.
-    let rolloff = || Setting::new(TorqueFactorRolloff { shape: Shape::Parabola }, vec![0.0, 0.08, 0.0, 0.0]);
+    let rolloff = || LawSetting::new(TorqueFactorRolloff { shape: Shape::Parabola }, vec![0.0, 0.08, 0.0, 0.0]);
     let grating =
-        || Setting::new(EncoderCyclicError { period: 1.0, harmonics: Harmonics::First }, vec![0.02, 0.01, 0.0, 0.0]);
-    let machines: [(&str, Vec<Setting>, usize, &Records); 7] = [
+        || LawSetting::new(EncoderCyclicError { period: 1.0, harmonics: Harmonics::First }, vec![0.02, 0.01, 0.0, 0.0]);
+    let machines: [(&str, Vec<LawSetting>, usize, &Records); 7] = [
         ("nothing missing", vec![], SAMPLES, SHORT_RECORDS),
         ("bearing that sticks", vec![friction()], SAMPLES, SHORT_RECORDS),
         ("bearing that sticks, torque factor that falls off", vec![friction(), rolloff()], SAMPLES, SHORT_RECORDS),

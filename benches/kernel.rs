@@ -6,8 +6,8 @@ use servotune::controller::{Controller, Lowpass, Notch, Pid};
 use servotune::feedback::{LoopOnGrid, SampledPlant};
 use servotune::lti::{Body, DiscretePlant, Mode, Plant, PlantFile, Section};
 use servotune::pes::{
-    Asked, Figure, Noise, NoisePower, NoisePowerWork, PesClock, Profile, QuickScene, QuickWork, Record, Spiral,
-    StepScene, StepWork, WindowDft,
+    Asked, Figure, Noise, NoisePower, NoisePowerWork, PesClock, Profile, QuickScene, QuickWork, Spiral, StepScene,
+    StepWork, WindowDft, WriteRecord,
 };
 use std::path::Path;
 
@@ -141,9 +141,9 @@ fn backward(b: Bencher, name: &str, figures: usize) {
     let scene = QuickScene::new(&profile(plant.sample_time_s()), &plant).unwrap();
     let mut work = QuickWork::default();
     scene.run(&chain, None, Some(1e3), Asked { whole: false, ..Asked::all() }, &mut work);
-    let weights = [Record::Still, Record::Drawn].map(|r| work.window(r).to_vec());
+    let weights = [WriteRecord::Still, WriteRecord::Drawn].map(|r| work.window(r).to_vec());
     let of = |record, w| Figure { record, window: w, command: (0, &[]) };
-    let all = [of(Record::Still, weights[0].as_slice()), of(Record::Drawn, &weights[1])];
+    let all = [of(WriteRecord::Still, weights[0].as_slice()), of(WriteRecord::Drawn, &weights[1])];
     let mut out = Vec::new();
     b.bench_local(|| scene.backward(black_box(&chain), &all[..figures], &mut work, &mut out));
 }

@@ -7,9 +7,9 @@ use servotune::diagnose::Diagnosis;
 use servotune::document::write_text;
 use servotune::lti::{Plant, PlantFile};
 use servotune::numeric::random::Random;
-use servotune::physics::Setting;
+use servotune::physics::LawSetting;
 use servotune::physics::pivot_friction::{Loading, PivotFriction};
-use servotune::twin::recording::{Row, multisine, record, scene, stroke};
+use servotune::twin::recording::{TwinRow, multisine, record, scene, stroke};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ const RECORDS: [(&str, f64, f64, usize, bool); 6] = [
     ("held_move", 0.0, 15.0, 1, true),
 ];
 
-fn csv(rows: &[Row], sample_time_s: f64) -> String {
+fn csv(rows: &[TwinRow], sample_time_s: f64) -> String {
     let mut text = "time_s,reference,excitation,command,position\n".to_owned();
     for (k, [r, d, u, y]) in rows.iter().enumerate() {
         // Writing to a String cannot fail.
@@ -50,7 +50,7 @@ fn write_case(folder: &Path, plant: &Plant, controller: &Controller) -> Result<(
     let t = controller.sample_time_s;
     let scene = scene(plant, t, RECORDS[5].2, SAMPLES, NOISE);
     let bearing = PivotFriction::of(LENGTH, Loading::Dahl);
-    let friction = Setting::new(bearing, vec![LEVEL]);
+    let friction = LawSetting::new(bearing, vec![LEVEL]);
     let mut draw = 0;
     for (name, rms, distance, repeats, held) in RECORDS {
         let excitation = if rms > 0.0 { multisine(SAMPLES, LINES, rms) } else { vec![0.0; SAMPLES] };

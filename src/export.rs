@@ -7,7 +7,7 @@ use super::outputs::Outputs;
 use super::start_arguments::{ExportArguments, ExportForm};
 use super::{Ending, Failure, Screen, export_c, export_matlab, export_plant, export_st, load};
 use serde::Serialize;
-use servotune::controller::Law;
+use servotune::controller::ControlLaw;
 use servotune::document::{read_text, sha256_hex, write_text};
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ pub(super) fn run(a: &ExportArguments, screen: &mut Screen) -> Result<Ending, Fa
         return plant(a, &outputs, screen);
     }
     let controller = load::controller(&a.gains)?;
-    let law = Law::new(&controller).map_err(|source| Failure::Controller { file: a.gains.clone(), source })?;
+    let law = ControlLaw::new(&controller).map_err(|source| Failure::Controller { file: a.gains.clone(), source })?;
     let exported = Exported {
         name: a.name.as_deref().unwrap_or("servo"),
         controller: &controller,

@@ -1,11 +1,11 @@
 //! The controller as a C99 header in double precision.
 
 use super::exported::{Exported, numbers};
-use servotune::controller::{Feedforward, Law};
+use servotune::controller::{ControlLaw, Feedforward};
 use std::fmt::Write;
 
 /// The header. Operations stand in the order in which the library does them, so that the last bit agrees where the compiler fuses nothing.
-pub(super) fn header(x: &Exported<'_>, law: &Law<'_>) -> String {
+pub(super) fn header(x: &Exported<'_>, law: &ControlLaw<'_>) -> String {
     let (n, big) = (x.name, x.name.to_uppercase());
     let count = law.chain.len();
     let rows = law.chain.iter().map(|s| format!("    {{{:e}, {:e}, {:e}, {:e}, {:e}}}", s.b0, s.b1, s.b2, s.a1, s.a2));

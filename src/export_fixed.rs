@@ -6,7 +6,7 @@
 use super::Failure;
 use super::exported::{Exported, numbers};
 use serde::Serialize;
-use servotune::controller::Law;
+use servotune::controller::ControlLaw;
 use servotune::feedback::{Margins, ModelLoop, confirmed_margins};
 use servotune::lti::{DiscretePlant, FrequencyResponse, Plant, Section, Sections};
 use std::f64::consts::PI;
@@ -51,7 +51,7 @@ pub(super) struct Effect {
 }
 
 impl FixedLaw {
-    pub(super) fn of(x: &Exported<'_>, law: &Law<'_>, word_length: u32) -> FixedLaw {
+    pub(super) fn of(x: &Exported<'_>, law: &ControlLaw<'_>, word_length: u32) -> FixedLaw {
         let sections: Vec<FixedSection> = law.chain.iter().map(|s| FixedSection::of(s, word_length)).collect();
         let bits = peak(law, &x.test.error).log2().ceil() as i32;
         let signal_fraction = (SIGNAL_BITS - HEADROOM_BITS - bits).clamp(-30, 60);
@@ -84,7 +84,12 @@ impl FixedLaw {
         errors.iter().map(step).collect()
     }
 
-    pub(super) fn effect(&self, x: &Exported<'_>, law: &Law<'_>, plant: Option<&Plant>) -> Result<Effect, Failure> {
+    pub(super) fn effect(
+        &self,
+        x: &Exported<'_>,
+        law: &ControlLaw<'_>,
+        plant: Option<&Plant>,
+    ) -> Result<Effect, Failure> {
         let exact = Sections { chain: law.chain.clone(), sample_time_s: self.sample_time_s };
         let chain = self.sections.iter().map(FixedSection::section).collect();
         let rounded = Sections { chain, sample_time_s: self.sample_time_s };
@@ -186,7 +191,7 @@ impl FixedSection {
 }
 
 /// Largest signal anywhere in the chain over these errors.
-fn peak(law: &Law<'_>, error: &[f64]) -> f64 {
+fn peak(law: &ControlLaw<'_>, error: &[f64]) -> f64 {
     let still = vec![0.0; error.len()];
     let outputs = (1..=law.chain.len()).flat_map(|count| {
         let mut part = law.clone();

@@ -1,10 +1,10 @@
 //! The controller as a MATLAB function, which Octave runs too.
 
 use super::exported::{Exported, numbers};
-use servotune::controller::Law;
+use servotune::controller::ControlLaw;
 
 /// The function: sections, sample time, and its own test.
-pub(super) fn function(x: &Exported<'_>, law: &Law<'_>) -> String {
+pub(super) fn function(x: &Exported<'_>, law: &ControlLaw<'_>) -> String {
     let n = x.name;
     let rows = law.chain.iter().map(|s| format!("  {:e}, {:e}, {:e}, 1, {:e}, {:e}", s.b0, s.b1, s.b2, s.a1, s.a2));
     let rows = rows.collect::<Vec<_>>().join("\n");

@@ -1,10 +1,10 @@
 //! The controller as a function block in structured text (IEC 61131-3).
 
 use super::exported::Exported;
-use servotune::controller::Law;
+use servotune::controller::ControlLaw;
 
 /// The block, its test vector in a comment.
-pub(super) fn block(x: &Exported<'_>, law: &Law<'_>) -> String {
+pub(super) fn block(x: &Exported<'_>, law: &ControlLaw<'_>) -> String {
     let name = x.name;
     // Every LREAL literal has a point.
     let real = |v: f64| {

@@ -2,7 +2,7 @@
 //!
 //! In: a controller. Out: errors, references and commands, as text too. Spec: `specs/files.md`.
 
-use servotune::controller::{Controller, Law};
+use servotune::controller::{ControlLaw, Controller};
 use servotune::numeric::random::Random;
 
 /// What is written out.
@@ -28,7 +28,7 @@ pub(super) const SEED: u64 = 7;
 
 impl TestVector {
     /// A jump, then noise: every coefficient takes part. Where the command is limited the size is one that reaches the limit.
-    pub fn of(law: &Law<'_>) -> TestVector {
+    pub fn of(law: &ControlLaw<'_>) -> TestVector {
         let mut random = Random::new(SEED);
         let mut error: Vec<f64> = (0..SAMPLES).map(|k| if k < 8 { 1.0 } else { random.between(-1.0, 1.0) }).collect();
         let mut free = law.clone();

@@ -5,7 +5,7 @@ use super::{Failure, Screen};
 use servotune::controller::Controller;
 use servotune::document::read_text;
 use servotune::document::size_limits::SWEEP_BYTES;
-use servotune::frf::{Ground, Hold, Measured, Note, ReadSettings, Sweep, read_bytes, read_file};
+use servotune::frf::{Basis, Hold, Measured, Note, ReadSettings, Sweep, read_bytes, read_file};
 use servotune::lti::Plant;
 use servotune::pes::Profile;
 use servotune_answer::{self as answer, Ran, adjusted, opened};
@@ -65,10 +65,10 @@ fn doubtful(file: &Path, sweep: &Sweep, screen: &mut Screen) -> Result<(), Failu
     let shows_margin = name.ends_with(".bod") || name.ends_with(".bod.gz");
     for note in &sweep.notes {
         match note {
-            Note::PhaseMargin { ground: Ground::GainPhase(evidence) } if !shows_margin => {
+            Note::PhaseMargin { ground: Basis::GainPhase(evidence) } if !shows_margin => {
                 return Err(Failure::HalfTurn { file: file.into(), evidence: evidence.to_string() });
             }
-            Note::Frequency { ground: Ground::Contract, .. } => {
+            Note::Frequency { ground: Basis::Contract, .. } => {
                 let w = sweep.frf.w_rad_s();
                 let [low, high] = [w[0] / TAU, w[w.len() - 1] / TAU];
                 if !(round(low) || round(high)) {
@@ -98,7 +98,7 @@ fn stated(note: &Note) -> bool {
         Note::PhaseMargin { ground } | Note::PhaseResponse { ground } => ground,
         _ => return false,
     };
-    matches!(ground, Ground::Header(_) | Ground::Format)
+    matches!(ground, Basis::Header(_) | Basis::Format)
 }
 
 /// The plant's sweep, opened out of its loop where it was taken in one; what was decided is said.

@@ -9,7 +9,7 @@ use servotune::document::FileSet;
 use servotune::frf::Sweep;
 use servotune::lti::Plant;
 use servotune::tune::{GainTable, InputDigest, Machine, SearchStep, Spec, TuneError, TuneSettings};
-use servotune::verify::{Assurance, Assured, Certificate, Ground, Source, Uncertainty, Watched, tune_assured};
+use servotune::verify::{Assurance, Assured, Certificate, ProvedOn, SourceFile, Uncertainty, Watched, tune_assured};
 use servotune_answer::Proof;
 use std::path::Path;
 
@@ -57,12 +57,12 @@ pub(super) struct OnSweep<'a> {
 impl OnSweep<'_> {
     /// Tunes on the sweep, with as much room as its intervals ask for.
     pub fn tune(&self, settings: &TuneSettings, screen: &mut Screen) -> Result<Assured, Failure> {
-        let spec_source = Source::read(self.spec_file)?;
+        let spec_source = SourceFile::read(self.spec_file)?;
         let profile = Spec::profile_path(self.spec_file).map_err(TuneError::from)?;
-        let profile = profile.map(|p| Source::read(&p)).transpose()?;
+        let profile = profile.map(|p| SourceFile::read(&p)).transpose()?;
         let machine = Machine::Response { frf: &self.sweep.frf, continuation: Some(self.plant) };
         let job = Assurance {
-            ground: Ground::Sweep { sweep: self.sweep, machine },
+            ground: ProvedOn::Sweep { sweep: self.sweep, machine },
             spec: self.spec,
             spec_source: &spec_source,
             profile: profile.as_ref(),

@@ -6,7 +6,7 @@
 use super::start_arguments::SchemaArguments;
 use super::{Ending, Failure, Screen, schema_page};
 use serde_json::{Map, Value, json};
-use servotune::document::{End, FileKey, KeyFile, KeyTable, Kind, Need, Range};
+use servotune::document::{End, FileKey, KeyFile, KeyKind, KeyTable, Need, Range};
 use servotune::{controller, lti, pes, recording, tune};
 
 /// The lists of keys, in the order of the page and of `SchemaFile`.
@@ -116,23 +116,23 @@ fn described(key: &FileKey) -> Value {
     let plain = || number("number", key.range);
     let two = |items: Value| json!({ "type": "array", "items": items, "minItems": 2, "maxItems": 2 });
     let mut value = match key.kind {
-        Kind::Number => plain(),
-        Kind::Integer => number("integer", key.range),
-        Kind::Bool => json!({ "type": "boolean" }),
-        Kind::Text | Kind::Path => json!({ "type": "string" }),
-        Kind::Choice(words) => json!({ "enum": words }),
-        Kind::Numbers => list(plain()),
-        Kind::Texts => list(json!({ "type": "string" })),
-        Kind::Pair => two(plain()),
-        Kind::Pairs => list(two(plain())),
-        Kind::Integers => two(number("integer", key.range)),
-        Kind::NumberOrPair => json!({ "anyOf": [plain(), two(plain())] }),
-        Kind::Roots => list(json!({ "anyOf": [plain(), two(plain())] })),
-        Kind::Vector => list(json!({ "anyOf": [plain(), list(plain())] })),
-        Kind::Matrix => list(list(plain())),
-        Kind::NumberOrMatrix => json!({ "type": ["number", "array"] }),
-        Kind::Table => json!({ "type": "object" }),
-        Kind::Tables => list(json!({ "type": "object" })),
+        KeyKind::Number => plain(),
+        KeyKind::Integer => number("integer", key.range),
+        KeyKind::Bool => json!({ "type": "boolean" }),
+        KeyKind::Text | KeyKind::Path => json!({ "type": "string" }),
+        KeyKind::Choice(words) => json!({ "enum": words }),
+        KeyKind::Numbers => list(plain()),
+        KeyKind::Texts => list(json!({ "type": "string" })),
+        KeyKind::Pair => two(plain()),
+        KeyKind::Pairs => list(two(plain())),
+        KeyKind::Integers => two(number("integer", key.range)),
+        KeyKind::NumberOrPair => json!({ "anyOf": [plain(), two(plain())] }),
+        KeyKind::Roots => list(json!({ "anyOf": [plain(), two(plain())] })),
+        KeyKind::Vector => list(json!({ "anyOf": [plain(), list(plain())] })),
+        KeyKind::Matrix => list(list(plain())),
+        KeyKind::NumberOrMatrix => json!({ "type": ["number", "array"] }),
+        KeyKind::Table => json!({ "type": "object" }),
+        KeyKind::Tables => list(json!({ "type": "object" })),
     };
     for (at_an_end, name, count) in
         [(key.items[0] > 0, "minItems", key.items[0]), (key.items[1] < usize::MAX, "maxItems", key.items[1])]
@@ -151,7 +151,7 @@ fn described(key: &FileKey) -> Value {
 /// The default, where it is a value.
 fn default(key: &FileKey) -> Option<Value> {
     match key.need {
-        Need::Or(number) if key.kind == Kind::Integer => Some(json!(number as i64)),
+        Need::Or(number) if key.kind == KeyKind::Integer => Some(json!(number as i64)),
         Need::Or(number) => Some(json!(number)),
         Need::OrToml(text) => {
             let table: toml::Table = format!("x = {text}").parse().ok()?;

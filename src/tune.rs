@@ -7,7 +7,7 @@ use super::{Ending, Failure, Screen, load, proof, tune_machines, verify};
 use servotune::controller::Controller;
 use servotune::document::{FileSet, check_target, read_text, sha256_hex};
 use servotune::tune::{InputDigest, Machine, SearchStep, Spec, TuneError, TuneSettings, sample_time_s, tune};
-use servotune::verify::{Source, Watched};
+use servotune::verify::{SourceFile, Watched};
 use servotune_answer::slot::{self, Slot};
 use servotune_answer::{Asked, Given, Named, Proof, Reached, TunedDocument, given_model, given_sweep, tuned};
 use std::path::PathBuf;
@@ -30,13 +30,13 @@ pub(super) fn run(a: &TuneArguments, screen: &mut Screen) -> Result<Ending, Fail
     if let Some(file) = &a.controller {
         inputs.push(InputDigest { role: "controller".into(), sha256: sha256_hex(read_text(file)?.as_bytes()) });
     }
-    let profile = Spec::profile_path(&a.spec).map_err(TuneError::from)?.map(|p| Source::read(&p)).transpose()?;
+    let profile = Spec::profile_path(&a.spec).map_err(TuneError::from)?.map(|p| SourceFile::read(&p)).transpose()?;
     let pace = screen.pace();
     let search = |s: &SearchStep| pace.search(s);
     let proof = |done, of| pace.part("proof of the write, boxes", done, of);
     let asked = Asked {
         spec: &spec,
-        spec_source: &Source::read(&a.spec)?,
+        spec_source: &SourceFile::read(&a.spec)?,
         profile: profile.as_ref(),
         start: start.as_ref(),
         settings: &settings,
@@ -100,7 +100,7 @@ fn given(
         (Some(file), _) => {
             let plant = load::plant(file)?;
             let named = Named { file, value: &plant };
-            Ok(given_model(named, Source::read(file)?, spec, start, clock, &mut |words| screen.say(words))?)
+            Ok(given_model(named, SourceFile::read(file)?, spec, start, clock, &mut |words| screen.say(words))?)
         }
         (None, Some(file)) => {
             let taken = load::Taken {

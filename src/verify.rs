@@ -7,7 +7,7 @@ use servotune::document::{check_target, read_text, write_text};
 use servotune::frf::{Hold, Sweep};
 use servotune::tune::{GainTable, Spec};
 use servotune::verify::{
-    Certificate, Inputs, Source, VerifyError, VerifySettings, certify_watched, choices, table_clock_s,
+    Certificate, Inputs, SourceFile, VerifyError, VerifySettings, certify_watched, choices, table_clock_s,
 };
 use servotune_report::certificate::certificate_text;
 use servotune_report::certificate_page::{CertificateView, certificate_page};
@@ -31,8 +31,8 @@ pub(super) fn run(a: &VerifyArguments, screen: &mut Screen) -> Result<Ending, Fa
         Some((file, text)) => choices(file, text)?,
         None => Default::default(),
     };
-    let plants = a.plant.iter().map(|p| Source::read(p)).collect::<Result<Vec<Source>, VerifyError>>()?;
-    let gains = Source::read(&a.gains)?;
+    let plants = a.plant.iter().map(|p| SourceFile::read(p)).collect::<Result<Vec<SourceFile>, VerifyError>>()?;
+    let gains = SourceFile::read(&a.gains)?;
     let hold = if a.hold_included { Hold::of(Some(table_clock_s(&gains)?)) } else { Hold::NotIncluded };
     let taken =
         load::Taken { how: &a.taken, unstable_poles: a.unstable_poles, hold, controller: a.controller.as_deref() };
@@ -42,13 +42,13 @@ pub(super) fn run(a: &VerifyArguments, screen: &mut Screen) -> Result<Ending, Fa
     let sweeps =
         a.frf.iter().map(|f| load::sweep(f, &a.reading, &taken, screen)).collect::<Result<Vec<Sweep>, Failure>>()?;
     let profile = Spec::profile_path(&a.spec).map_err(VerifyError::from)?;
-    let profile = profile.map(|p| Source::read(&p)).transpose()?;
+    let profile = profile.map(|p| SourceFile::read(&p)).transpose()?;
     let inputs = Inputs {
         gains: &gains,
         plants: &plants,
         sweeps: &sweeps,
         least_damping: a.min_damping,
-        spec: &Source::read(&a.spec)?,
+        spec: &SourceFile::read(&a.spec)?,
         profile: profile.as_ref(),
         word: a.word().unwrap_or(word),
         uncertainty: a.uncertainty.unwrap_or(uncertainty),

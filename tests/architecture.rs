@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::architecture_imports::{House, place};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Rooms of the library by rank; a room uses lower ranks only (`specs/decisions/rooms.md`). Between crates the manifests hold the direction.
@@ -190,6 +191,28 @@ fn a_floor_of_the_diagnosis_uses_lower_floors_only() {
     });
     assert!(arrows > 400, "{arrows} imports seen");
     assert!(wrong.is_empty(), "arrows upward:\n{}", wrong.join("\n"));
+}
+
+/// The name of a public type that a line begins.
+fn public_type(line: &str) -> Option<&str> {
+    let rest =
+        ["pub struct ", "pub enum ", "pub trait ", "pub type "].iter().find_map(|head| line.strip_prefix(head))?;
+    rest.split(|c: char| !c.is_alphanumeric() && c != '_').next()
+}
+
+#[test]
+fn a_public_type_of_the_library_has_its_name_alone() {
+    let mut homes: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    each_source(|path, text| {
+        if path.starts_with("crates/servotune/src") {
+            for name in text.lines().filter_map(public_type) {
+                homes.entry(name.to_owned()).or_default().push(path.to_owned());
+            }
+        }
+    });
+    assert!(homes.len() > 300, "only {} types were found", homes.len());
+    homes.retain(|_, files| files.len() > 1);
+    assert!(homes.is_empty(), "{homes:?}");
 }
 
 #[test]

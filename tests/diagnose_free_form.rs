@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 use nalgebra::{DMatrix, DVector};
-use servotune::diagnose::{DiagnoseSettings, Diagnosed, FreeForm, Verdict, diagnose, missing_curve};
+use servotune::diagnose::{DiagnoseSettings, Diagnosed, FreeFormFound, Verdict, diagnose, missing_curve};
 use servotune::lti::{Body, Plant};
 use servotune::numeric::random::Random;
 use servotune::recording::{Case, Record, RecordEntry, Role};
@@ -119,7 +119,7 @@ fn plant() -> Plant {
 }
 
 /// Share of the knots in the middle nine tenths whose band holds the truth, and the largest miss over the curve's size; what a linear plant could hold, a line through both, is taken out of the difference.
-fn recovered(curve: &FreeForm, truth: impl Fn(f64) -> f64) -> (f64, f64) {
+fn recovered(curve: &FreeFormFound, truth: impl Fn(f64) -> f64) -> (f64, f64) {
     let knots = &curve.knots[1..curve.knots.len() - 1];
     let (n, mean) =
         (knots.len() as f64, |f: &dyn Fn(usize) -> f64| (0..knots.len()).map(f).sum::<f64>() / knots.len() as f64);
@@ -133,7 +133,7 @@ fn recovered(curve: &FreeForm, truth: impl Fn(f64) -> f64) -> (f64, f64) {
     (inside as f64 / n, (0..knots.len()).map(|i| left(i).abs() / size).fold(0.0, f64::max))
 }
 
-fn curve(machine: &Machine) -> FreeForm {
+fn curve(machine: &Machine) -> FreeFormFound {
     let made = machine.diagnosed();
     let missing = || missing_curve(&made.data, &made.selection).unwrap().curve;
     made.diagnosis.free_form.clone().unwrap_or_else(missing)

@@ -60,12 +60,12 @@ fn the_c_header_gives_the_library_s_commands_to_the_last_bit() {
 /// Not against the vector in the header, which the same program wrote, but against the closed loop of the library's own law.
 #[test]
 fn the_c_code_runs_a_long_record_as_the_library_does() {
-    use servotune::controller::{Controller, Law};
+    use servotune::controller::{ControlLaw, Controller};
     let dir = folder("export_long");
     let header = dir.join("controller.h");
     export(NOMINAL, "c", &header, &[]);
     let controller: Controller = toml::from_str(&std::fs::read_to_string(root(NOMINAL)).unwrap()).unwrap();
-    let law = Law::new(&controller).unwrap();
+    let law = ControlLaw::new(&controller).unwrap();
     let error: Vec<f64> = (0..5000).map(|k| 0.02 * (f64::from(k) * 0.01).sin() + 0.5 / (1.0 + f64::from(k))).collect();
     let command = law.replay_from(law.rest(), &vec![0.0; error.len()], &error);
     let main = "#include \"controller.h\"\n#include <stdio.h>\n#include <math.h>\nint main(void) { servo_state s = {{{0.0}}}; double e; \

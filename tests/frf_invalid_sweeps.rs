@@ -35,7 +35,7 @@ macro_rules! refuses {
 fn the_good_file_beside_them_is_read() {
     let sweep = read_file(&path("good.bod"), &ReadSettings::default()).unwrap();
     assert_eq!((sweep.frf.len(), sweep.rows_read), (30, 30));
-    assert!(sweep.notes.iter().any(|n| matches!(n, Note::PhaseResponse { ground: Ground::GainPhase(_) })));
+    assert!(sweep.notes.iter().any(|n| matches!(n, Note::PhaseResponse { ground: Basis::GainPhase(_) })));
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn cut_sweeps_are_seen() {
     assert!(
         matches!(refused_with("good.bod", &settings), E::SweepCut { declared_high_hz, .. } if declared_high_hz == 2000.0)
     );
-    refuses!("short.bod", E::Ambiguous { question: Question::Phase, doubt: Doubt::TooShort, .. });
+    refuses!("short.bod", E::Ambiguous { question: Question::Phase, doubt: SweepDoubt::TooShort, .. });
 }
 
 #[test]

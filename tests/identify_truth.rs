@@ -7,7 +7,7 @@ use servotune::identify::{
     BodyChoice, BodyEvidence, Identified, IdentifyError, IdentifySettings, OrderChoice, identify,
 };
 use servotune::lti::{Body, FrequencyResponse, Mode, Plant};
-use servotune::numeric::golden::Bound;
+use servotune::numeric::golden::IntervalEnd;
 use servotune::numeric::random::Random;
 use servotune::twin::plants::{log_grid, measure, random_plant};
 use std::f64::consts::TAU;
@@ -174,11 +174,11 @@ fn a_delay_outside_the_first_interval_is_found_and_bounds_are_flagged() {
     let found = identify(&noisy(&truth, 5), &IdentifySettings::default()).unwrap();
     assert!((found.plant.delay_s - 150e-6).abs() < 1e-6);
     let (delay, _) = found.stepwise_bounds.unwrap();
-    assert_eq!(delay, Bound::Inside);
+    assert_eq!(delay, IntervalEnd::Inside);
     // A free order would make up the missing dead time with pairs.
     let tight = IdentifySettings { delay_limit_s: 100e-6, ..fixed(0) };
     let found = identify(&noisy(&truth, 5), &tight).unwrap();
-    assert_eq!(found.delay_bound, Bound::High);
+    assert_eq!(found.delay_bound, IntervalEnd::High);
     assert!(found.at_bound.contains(&"plant.delay_s".to_string()), "{:?}", found.at_bound);
 }
 

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::key_samples::{FILES, judge, samples};
-use servotune::document::{End, FileKey, Kind, Need, Range};
+use servotune::document::{End, FileKey, KeyKind, Need, Range};
 use toml::{Table, Value};
 
 /// Keys whose range depends on other keys, so that a value within their own may be refused. What lies beyond is refused all the same.
@@ -139,8 +139,8 @@ fn every() -> Vec<Place> {
     all
 }
 
-fn number(kind: Kind, x: f64) -> Value {
-    if matches!(kind, Kind::Integer | Kind::Integers) { Value::Integer(x as i64) } else { Value::Float(x) }
+fn number(kind: KeyKind, x: f64) -> Value {
+    if matches!(kind, KeyKind::Integer | KeyKind::Integers) { Value::Integer(x as i64) } else { Value::Float(x) }
 }
 
 /// Values of the key's type with `x` as one of their numbers.
@@ -154,12 +154,12 @@ fn holding(place: &Place, x: f64) -> Vec<Value> {
         Value::Array(all)
     };
     match place.key.kind {
-        Kind::Number | Kind::Integer | Kind::NumberOrMatrix | Kind::NumberOrPair => vec![n],
-        Kind::Numbers | Kind::Vector => vec![first(&own)],
-        Kind::Pair | Kind::Integers => vec![pair(&n, &n)],
-        Kind::Pairs => vec![Value::Array(vec![pair(&n, &n)])],
-        Kind::Roots => vec![first(&own), Value::Array(vec![pair(&n, &Value::Float(1.0))])],
-        Kind::Matrix => {
+        KeyKind::Number | KeyKind::Integer | KeyKind::NumberOrMatrix | KeyKind::NumberOrPair => vec![n],
+        KeyKind::Numbers | KeyKind::Vector => vec![first(&own)],
+        KeyKind::Pair | KeyKind::Integers => vec![pair(&n, &n)],
+        KeyKind::Pairs => vec![Value::Array(vec![pair(&n, &n)])],
+        KeyKind::Roots => vec![first(&own), Value::Array(vec![pair(&n, &Value::Float(1.0))])],
+        KeyKind::Matrix => {
             let mut rows = own.as_array().unwrap().clone();
             rows[0] = first(&rows[0]);
             vec![Value::Array(rows)]
@@ -201,8 +201,8 @@ fn a_key_left_out_is_asked_for_by_name_or_is_its_default() {
 }
 
 /// The nearest numbers on this side of an end and beyond it.
-fn beside(kind: Kind, x: f64, up: bool) -> f64 {
-    let step = if kind == Kind::Integer { 1.0 } else { (1e-6 * x.abs()).max(1e-300) };
+fn beside(kind: KeyKind, x: f64, up: bool) -> f64 {
+    let step = if kind == KeyKind::Integer { 1.0 } else { (1e-6 * x.abs()).max(1e-300) };
     if up { x + step } else { x - step }
 }
 
@@ -254,7 +254,7 @@ fn the_ends_of_a_range_are_those_of_the_reader() {
 /// Numbers far beyond, where the list names no end.
 fn far(key: &FileKey) -> &'static [f64] {
     match key.range {
-        _ if key.kind != Kind::Number => &[],
+        _ if key.kind != KeyKind::Number => &[],
         Range::Any | Range::NotZero => &[1e200, -1e200],
         Range::Between(_, End::Open) => &[1e200],
         _ => &[],
@@ -288,7 +288,7 @@ fn every_exception_is_a_key_and_is_needed() {
 #[test]
 fn what_is_no_finite_number_is_refused_by_name() {
     walk(|place| {
-        let whole = matches!(place.key.kind, Kind::Integer | Kind::Integers);
+        let whole = matches!(place.key.kind, KeyKind::Integer | KeyKind::Integers);
         if !place.key.kind.of_numbers() || whole || place.made_by_the_program() {
             return vec![];
         }
@@ -302,15 +302,17 @@ fn a_value_of_another_type_is_refused() {
     walk(|place| {
         let text = |t: &str| Value::String(t.into());
         let other = match place.key.kind {
-            kind if kind.of_text() || matches!(kind, Kind::Table | Kind::Texts | Kind::Bool) => Value::Integer(1),
+            kind if kind.of_text() || matches!(kind, KeyKind::Table | KeyKind::Texts | KeyKind::Bool) => {
+                Value::Integer(1)
+            }
             _ => text("text"),
         };
         let mut wrong = vec![other];
-        if matches!(place.key.kind, Kind::Integer | Kind::Integers) {
+        if matches!(place.key.kind, KeyKind::Integer | KeyKind::Integers) {
             wrong.extend(holding(place, 0.0).into_iter().map(|_| Value::Float(1.5)));
         }
         let mut found = Vec::new();
-        if let Kind::Choice(words) = place.key.kind {
+        if let KeyKind::Choice(words) = place.key.kind {
             wrong.push(text("no_such_word"));
             found.extend(words.iter().filter_map(|w| place.taken(text(w))));
         }
@@ -326,9 +328,9 @@ fn a_list_has_as_many_as_it_may() {
         let many = |n: usize| {
             Value::Array(match place.key.kind {
                 // Names and points differ; all else may repeat.
-                Kind::Texts => (1..=n).map(|i| Value::String(format!("x{i}"))).collect(),
-                Kind::Roots => (1..=n).map(|i| Value::Float(-(i as f64))).collect(),
-                Kind::Numbers => (1..=n).map(|i| Value::Float(i as f64)).collect(),
+                KeyKind::Texts => (1..=n).map(|i| Value::String(format!("x{i}"))).collect(),
+                KeyKind::Roots => (1..=n).map(|i| Value::Float(-(i as f64))).collect(),
+                KeyKind::Numbers => (1..=n).map(|i| Value::Float(i as f64)).collect(),
                 _ => vec![place.value().as_array().unwrap()[0].clone(); n],
             })
         };
@@ -350,8 +352,8 @@ fn a_range_that_falls_is_refused() {
     walk(|place| {
         let falling = Value::Array(vec![number(place.key.kind, 20.0), number(place.key.kind, 10.0)]);
         let refused = match place.key.kind {
-            Kind::Pair | Kind::Integers | Kind::NumberOrPair => place.refused(falling),
-            Kind::Pairs => place.refused(Value::Array(vec![falling])),
+            KeyKind::Pair | KeyKind::Integers | KeyKind::NumberOrPair => place.refused(falling),
+            KeyKind::Pairs => place.refused(Value::Array(vec![falling])),
             _ => None,
         };
         refused.into_iter().collect()

@@ -3,7 +3,7 @@
 
 use servotune::feedback::{PlanSettings, sweep_plan};
 use servotune::numeric::random::Random;
-use servotune::pes::{PredictSettings, Runout, Source, budget, figures, predict, simulate};
+use servotune::pes::{PesSource, PredictSettings, Runout, budget, figures, predict, simulate};
 use servotune::tune::{Machine, ParetoSettings, Spec, TuneError, TuneSettings, pareto};
 use servotune::twin::plants::{log_grid, measure};
 use servotune::twin::{MachineClass, nominal_controller, paper_machine, paper_profile};
@@ -45,10 +45,10 @@ fn the_sources_add_up_to_what_records_show() {
         assert!((sum - 1.0).abs() < 1e-12);
     }
     // Run-out of 1e-3 at 1080 Hz is 0.5e-3 by |X|/N, spread over the neighbours: nothing of it is lost in the window's deviation.
-    let runout = b.sources.iter().find(|s| s.source == Source::Runout).unwrap();
+    let runout = b.sources.iter().find(|s| s.source == PesSource::Runout).unwrap();
     assert!((runout.pes_std - 1e-3 / 2f64.sqrt()).abs() < 0.03e-3, "{runout:?}");
     // Without cross terms of move and run-out the energies add; 100 draws leave a tenth.
-    let encoder = b.sources.iter().find(|s| s.source == Source::Encoder).unwrap();
+    let encoder = b.sources.iter().find(|s| s.source == PesSource::Encoder).unwrap();
     assert!(encoder.dft_low < b.dft_low * 1.1);
 }
 

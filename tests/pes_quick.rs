@@ -6,8 +6,8 @@ use servotune::controller::{Controller, Feedforward, Lowpass, Notch, Pid};
 use servotune::lti::{DiscretePlant, ModalForm, ModalTerm, Section};
 use servotune::numeric::random::Random;
 use servotune::pes::{
-    Asked, Figure, Noise, PesClock, Profile, QuickScene, QuickWork, Record, Runout, Scene, Slopes, Spiral, StepScene,
-    StepWork,
+    Asked, Figure, Noise, PesClock, Profile, QuickScene, QuickWork, Runout, Slopes, Spiral, StepScene, StepWork,
+    WriteRecord, WriteScene,
 };
 
 const T: f64 = 39.6e-6;
@@ -96,10 +96,10 @@ fn both_records_are_the_plain_ones_up_to_rounding() {
             let quick = QuickScene::new(&profile, &sampled).unwrap();
             let mut work = QuickWork::default();
             let all = Asked { slopes: false, ..Asked::all() };
-            let mut check = |asked: Asked, records: &[(Record, Profile)]| {
+            let mut check = |asked: Asked, records: &[(WriteRecord, Profile)]| {
                 quick.run(&chain, c.feedforward.as_ref(), limit, asked, &mut work);
                 for (record, profile) in records {
-                    let scene = Scene::new(profile, &sampled).unwrap();
+                    let scene = WriteScene::new(profile, &sampled).unwrap();
                     let mut plain = scene.workspace(&sampled, chain.len());
                     scene.run(&sampled, &chain, c.feedforward.as_ref(), limit, &mut plain);
                     let expected = scene.window(&plain);
@@ -122,7 +122,7 @@ fn both_records_are_the_plain_ones_up_to_rounding() {
                     }
                 }
             };
-            let (drawn, quiet) = ((Record::Drawn, profile.clone()), (Record::Still, still(&profile)));
+            let (drawn, quiet) = ((WriteRecord::Drawn, profile.clone()), (WriteRecord::Still, still(&profile)));
             check(all, &[drawn.clone(), quiet.clone()]);
             check(Asked { still: false, whole: false, ..all }, &[drawn]);
             check(Asked { drawn: false, whole: false, ..all }, &[quiet]);
@@ -132,7 +132,7 @@ fn both_records_are_the_plain_ones_up_to_rounding() {
 
 /// A straight figure of the plain simulation: weights on the window and on the command.
 fn plain_figure(
-    scene: &Scene,
+    scene: &WriteScene,
     sampled: &DiscretePlant,
     law: (&[Section], [f64; 2], Option<f64>),
     weights: (&[f64], &[f64]),
@@ -187,24 +187,24 @@ fn slopes_are_those_of_differences_of_the_plain_simulation() {
             let feedforward = Feedforward { factor: 0.5, velocity_s: 2e-5, acceleration_s2: 1e-7, ahead_samples: 0 };
             // Every other loop meets its limit on the way.
             quick.run(&chain, Some(&feedforward), None, Asked::all(), &mut work);
-            let limit = ((i + filters) % 2 == 0).then(|| 0.8 * work.peak(Record::Drawn).1);
+            let limit = ((i + filters) % 2 == 0).then(|| 0.8 * work.peak(WriteRecord::Drawn).1);
             quick.run(&chain, Some(&feedforward), limit, Asked::all(), &mut work);
-            let samples = work.command(Record::Drawn).len();
+            let samples = work.command(WriteRecord::Drawn).len();
             let mut weights = |n: usize| -> Vec<f64> { (0..n).map(|_| random.normal()).collect() };
             let (a, b, c) = (weights(200), weights(200), weights(samples));
-            let peak = work.peak(Record::Drawn).0;
+            let peak = work.peak(WriteRecord::Drawn).0;
             let figures = [
-                Figure { record: Record::Still, window: &a, command: (0, &[]) },
-                Figure { record: Record::Drawn, window: &b, command: (0, &[]) },
-                Figure { record: Record::Drawn, window: &[], command: (peak, &[1.0]) },
-                Figure { record: Record::Still, window: &b, command: (0, &c) },
-                Figure { record: Record::Drawn, window: &a, command: (100, &c[100..300]) },
+                Figure { record: WriteRecord::Still, window: &a, command: (0, &[]) },
+                Figure { record: WriteRecord::Drawn, window: &b, command: (0, &[]) },
+                Figure { record: WriteRecord::Drawn, window: &[], command: (peak, &[1.0]) },
+                Figure { record: WriteRecord::Still, window: &b, command: (0, &c) },
+                Figure { record: WriteRecord::Drawn, window: &a, command: (100, &c[100..300]) },
             ];
             let mut slopes = Vec::new();
             quick.backward(&chain, &figures, &mut work, &mut slopes);
             for (figure, slopes) in figures.iter().zip(&slopes) {
-                let of = if figure.record == Record::Still { still(&profile) } else { profile.clone() };
-                let scene = Scene::new(&of, &sampled).unwrap();
+                let of = if figure.record == WriteRecord::Still { still(&profile) } else { profile.clone() };
+                let scene = WriteScene::new(&of, &sampled).unwrap();
                 let mut command = vec![0.0; samples];
                 command[figure.command.0..][..figure.command.1.len()].copy_from_slice(figure.command.1);
                 let value = |chain: &[Section], ahead: [f64; 2]| {
@@ -220,7 +220,7 @@ fn slopes_are_those_of_differences_of_the_plain_simulation() {
                 near(slopes, &expected, forward, &format!("{body:?}, {filters} filters, {figure:?}"));
             }
             if let Some(limit) = limit {
-                clipped += work.command(Record::Drawn).iter().filter(|u| u.abs() == limit).count();
+                clipped += work.command(WriteRecord::Drawn).iter().filter(|u| u.abs() == limit).count();
             }
         }
     }
@@ -242,7 +242,7 @@ fn records_run_apart_have_the_slopes_of_records_run_together() {
         quick.run(&chain, None, None, asked, &mut apart);
     }
     let (mut a, mut b) = (Vec::new(), Vec::new());
-    let both = [figure(Record::Still), figure(Record::Drawn)];
+    let both = [figure(WriteRecord::Still), figure(WriteRecord::Drawn)];
     quick.backward(&chain, &both, &mut together, &mut a);
     quick.backward(&chain, &both[..1], &mut apart, &mut b);
     let scale = a[0].sections.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
@@ -255,7 +255,7 @@ fn records_run_apart_have_the_slopes_of_records_run_together() {
     (silent.noise.encoder_rms, silent.noise.windage_rms) = (0.0, 0.0);
     let silent = QuickScene::new(&silent, &sampled).unwrap();
     silent.run(&chain, None, None, Asked { still: false, ..Asked::all() }, &mut apart);
-    assert!(!silent.has_noise() && apart.window(Record::Still) == apart.window(Record::Drawn));
+    assert!(!silent.has_noise() && apart.window(WriteRecord::Still) == apart.window(WriteRecord::Drawn));
 }
 
 #[test]

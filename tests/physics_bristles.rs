@@ -7,7 +7,7 @@ use servotune::document::parse_toml;
 use servotune::lti::{Plant, PlantFile};
 use servotune::physics::coulomb_friction::{CoulombFriction, Stribeck};
 use servotune::physics::pivot_friction::{Loading, PivotFriction};
-use servotune::physics::{AnyLaw, Context, Given, Machine, PhysicsError, Restored, Sample, effect};
+use servotune::physics::{AnyLaw, Context, Given, PhysicsError, Restored, Sample, SimulatedMachine, effect};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -115,7 +115,7 @@ fn restored(bristles: &str) -> Result<Restored, PhysicsError> {
 
 /// Positions that a plant file's machine goes through under a command.
 fn simulated(r: &Restored, u: &[f64]) -> Vec<f64> {
-    let mut machine = Machine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
+    let mut machine = SimulatedMachine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
     let step = |u: &f64| {
         let y = machine.measure(0.0, 0.0);
         machine.command(*u);

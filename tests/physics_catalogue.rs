@@ -6,7 +6,7 @@ use crate::program_common::{root, servotune};
 use serde_json::Value;
 use servotune::lti::Body;
 use servotune::physics::{
-    Effect, Facts, Given, Key, Need, PhysicsError, Prior, Restored, Setting, Takes, curves, data_facts, library,
+    Effect, Facts, Given, Key, LawSetting, Need, PhysicsError, Prior, Restored, Takes, curves, data_facts, library,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -54,7 +54,7 @@ fn needed(key: &Key, given: &BTreeMap<String, f64>) -> bool {
 }
 
 /// What the commands say to an entry.
-fn read(f: &Facts, given: &BTreeMap<String, f64>) -> Result<Setting, PhysicsError> {
+fn read(f: &Facts, given: &BTreeMap<String, f64>) -> Result<LawSetting, PhysicsError> {
     let mut plant = scene().plant;
     plant.physics =
         vec![servotune::lti::PhysicsEntry { effect: f.name.into(), parameters: given.clone(), curve: None }];
@@ -180,7 +180,7 @@ fn the_ranges_are_those_of_the_grids() {
         for scene in [&bound, &free] {
             for law in e.grid(scene) {
                 let strengths = vec![1.0; e.facts().columns];
-                for p in Setting::new(law, strengths).parameters(scene) {
+                for p in LawSetting::new(law, strengths).parameters(scene) {
                     found.entry(p.name).or_default().push(p.value.abs());
                 }
             }

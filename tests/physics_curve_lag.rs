@@ -4,7 +4,7 @@
 use crate::physics_common::runge_kutta;
 use servotune::document::parse_toml;
 use servotune::lti::{Plant, PlantFile};
-use servotune::physics::{Context, Machine, Restored};
+use servotune::physics::{Context, Restored, SimulatedMachine};
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -42,7 +42,7 @@ fn the_lag_follows_the_curve() {
     let u: Vec<f64> = (0..2000).map(|k| 0.7 * (TAU * 45.0 * T * f64::from(k)).sin()).collect();
     let truth = truth(&u);
     let r = restored("amplifier", "command").unwrap();
-    let mut machine = Machine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
+    let mut machine = SimulatedMachine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
     let (mut worst, mut size) = (0.0f64, 0.0f64);
     for (u, y) in u.iter().zip(&truth) {
         worst = worst.max((machine.measure(0.0, 0.0) - y).abs());

@@ -5,7 +5,7 @@
 use servotune::document::parse_toml;
 use servotune::feedback::DescribedPlant;
 use servotune::lti::{Body, FrequencyResponse, Plant, PlantFile};
-use servotune::physics::{Context, CurvePort, Machine, Restored, describing};
+use servotune::physics::{Context, CurvePort, Restored, SimulatedMachine, describing};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
@@ -158,7 +158,7 @@ fn the_machine_with_a_curve_agrees_with_an_independent_simulation() {
     for (text, law, tolerance) in cases {
         let truth = runge_kutta(&u, law);
         let r = restored(&text).unwrap();
-        let mut machine = Machine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
+        let mut machine = SimulatedMachine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
         let (mut worst, mut size) = (0.0f64, 0.0f64);
         for (u, y) in u.iter().zip(&truth) {
             worst = worst.max((machine.measure(0.0, 0.0) - y).abs());
@@ -205,7 +205,7 @@ fn a_reading_that_folds_closes_no_loop_and_one_that_is_limited_does() {
 fn every_port_has_a_curve_that_changes_nothing() {
     let u: Vec<f64> = (0..400).map(|k| 0.2 * (TAU * 60.0 * T * f64::from(k)).sin()).collect();
     let run = |r: &Restored| -> Vec<f64> {
-        let mut machine = Machine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
+        let mut machine = SimulatedMachine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
         u.iter()
             .map(|u| {
                 let y = machine.measure(0.0, 0.0);

@@ -7,7 +7,7 @@ use nalgebra::Complex;
 use servotune::diagnose::Verdict;
 use servotune::lti::{PhysicsEntry, Plant};
 use servotune::physics::dead_band::DeadBand;
-use servotune::physics::{Context, Machine, PhysicsError, Restored, Sample};
+use servotune::physics::{Context, PhysicsError, Restored, Sample, SimulatedMachine};
 use servotune::recording::Role;
 use std::f64::consts::{PI, TAU};
 
@@ -93,7 +93,7 @@ fn the_simulation_is_that_of_another_integrator() {
     let of = entry(&[("half_width", half_width), ("gain_inside", gain)]);
     let of = Plant { delay_s: late as f64 * T, ..of };
     let restored = Restored::of(&of, &Context { sample_time_s: T, ..Context::default() }).unwrap();
-    let mut machine = Machine::new(&restored.scene.plant, &restored.effects(), &restored.scene).unwrap();
+    let mut machine = SimulatedMachine::new(&restored.scene.plant, &restored.effects(), &restored.scene).unwrap();
     let u = excitation(0.03, 3);
     let acting: Vec<f64> = (0..N).map(|k| if k < late { 0.0 } else { lossy(u[k - late]) }).collect();
     let all = runge_kutta(&acting, T, 16, |i, [x, v]| [v, GIVEN.b * i - GIVEN.k * x - GIVEN.c * v]);

@@ -6,7 +6,7 @@ use servotune::lti::Body;
 use servotune::physics::coulomb_friction::CoulombFriction;
 use servotune::physics::encoder_cyclic_error::Harmonics;
 use servotune::physics::torque_factor_rolloff::Shape;
-use servotune::physics::{AnyLaw, COLUMNS, Entry, Given, Sample, Setting, facts, library};
+use servotune::physics::{AnyLaw, COLUMNS, Entry, Given, LawSetting, Sample, facts, library};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -48,7 +48,7 @@ fn parameters_and_restore_are_inverse_at_every_point_of_every_grid() {
                 let fixed = law.facts().fixed;
                 let strengths: Vec<f64> =
                     (0..facts.columns).map(|c| if fixed { 1.0 } else { 0.03 * (c as f64 - 1.4) }).collect();
-                let mut setting = Setting { law, strengths };
+                let mut setting = LawSetting { law, strengths };
                 // What a simpler form of a law leaves out has no strength.
                 let unused = |law: &AnyLaw, c: usize| match law {
                     AnyLaw::EncoderCyclicError(wave) => wave.harmonics == Harmonics::First && c >= 2,
@@ -61,7 +61,7 @@ fn parameters_and_restore_are_inverse_at_every_point_of_every_grid() {
                     setting.parameters(&scene).iter().map(|p| (p.name.to_string(), p.value)).collect();
                 let back = e.setting_of(&Given::new(facts.name, &named), &scene).unwrap();
                 assert!(setting.law.same_class(&back.law), "{}: {setting:?} {back:?}", facts.name);
-                let strengths = |s: &Setting| s.strengths.iter().map(|s| Some(*s)).collect::<Vec<_>>();
+                let strengths = |s: &LawSetting| s.strengths.iter().map(|s| Some(*s)).collect::<Vec<_>>();
                 for (a, b) in [(setting.law.numbers(), back.law.numbers()), (strengths(&setting), strengths(&back))] {
                     assert_eq!(a.len(), b.len(), "{}", facts.name);
                     for (x, y) in a.into_iter().zip(b) {

@@ -99,7 +99,7 @@ fn rms(x: &[f64]) -> f64 {
 fn simulated(plant: &Plant, u: &[f64]) -> Vec<f64> {
     let context = servotune::physics::Context { sample_time_s: T, ..Default::default() };
     let r = Restored::of(plant, &context).unwrap();
-    let mut machine = servotune::physics::Machine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
+    let mut machine = servotune::physics::SimulatedMachine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
     u.iter()
         .map(|u| {
             let y = machine.measure(0.0, 0.0);

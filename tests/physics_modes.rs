@@ -5,7 +5,7 @@ use crate::physics_common::{T, scene};
 use nalgebra::Complex;
 use servotune::physics::modal_damping::ModalDamping;
 use servotune::physics::mode_shift::{ModeForm, ModeShift, ShiftGoes};
-use servotune::physics::{AnyLaw, Parametric, Sample, Scene};
+use servotune::physics::{AnyLaw, MotionScene, Parametric, Sample};
 
 #[test]
 fn a_mode_that_moves_rings_at_its_new_frequency() {
@@ -32,9 +32,16 @@ fn a_mode_that_moves_rings_at_its_new_frequency() {
 }
 
 /// Holds what a law at a place adds to the answer to a tone against a response, over the last cycles of `count` fine steps.
-fn settles(scene: &Scene, moving: impl Into<AnyLaw>, x: f64, count: usize, s: Complex<f64>, response: Complex<f64>) {
+fn settles(
+    scene: &MotionScene,
+    moving: impl Into<AnyLaw>,
+    x: f64,
+    count: usize,
+    s: Complex<f64>,
+    response: Complex<f64>,
+) {
     let fine = T / 25.0;
-    let small = Scene { sample_time_s: fine, ..scene.clone() };
+    let small = MotionScene { sample_time_s: fine, ..scene.clone() };
     let moving = moving.into();
     let mut law = moving.in_motion(&small);
     let at = |k: usize| {

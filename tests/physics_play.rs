@@ -5,7 +5,7 @@ use crate::physics_common::runge_kutta;
 use servotune::document::parse_toml;
 use servotune::lti::{Plant, PlantFile};
 use servotune::numeric::random::Random;
-use servotune::physics::{Context, Machine, PlayObserver, Readings, Restored};
+use servotune::physics::{Context, PlayObserver, Readings, Restored, SimulatedMachine};
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -25,7 +25,7 @@ fn restored(effect: &str) -> Restored {
 }
 
 fn simulated(r: &Restored, u: &[f64]) -> Vec<f64> {
-    let mut machine = Machine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
+    let mut machine = SimulatedMachine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
     u.iter()
         .map(|u| {
             let y = machine.measure(0.0, 0.0);

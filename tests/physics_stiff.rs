@@ -4,7 +4,7 @@
 use crate::physics_common::runge_kutta;
 use servotune::document::parse_toml;
 use servotune::lti::{Plant, PlantFile};
-use servotune::physics::{Context, Machine, Restored};
+use servotune::physics::{Context, Restored, SimulatedMachine};
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -47,7 +47,7 @@ fn an_arm_that_sticks_and_slides_is_simulated_far_below_the_bristles_length() {
         })
         .collect();
     let (truth, r) = (truth(&u), restored());
-    let mut machine = Machine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
+    let mut machine = SimulatedMachine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
     let mut square = 0.0;
     for (u, y) in u.iter().zip(&truth) {
         square += (machine.measure(0.0, 0.0) - y).powi(2);
@@ -61,7 +61,7 @@ fn an_arm_that_sticks_and_slides_is_simulated_far_below_the_bristles_length() {
 #[test]
 fn a_position_between_two_samples_lies_between_the_steps() {
     let r = restored();
-    let mut machine = Machine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
+    let mut machine = SimulatedMachine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
     let offsets = [0.0, 0.25, 0.5, 0.75, 0.999_999].map(|s| machine.reading(s * T));
     for k in 0..200 {
         let here = machine.measure(0.0, 0.0);

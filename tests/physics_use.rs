@@ -7,7 +7,7 @@ use servotune::document::read_toml;
 use servotune::feedback::{Amplitudes, DescribedPlant, ModelLoop, described_margins, linear_crossover_hz, margins};
 use servotune::lti::{Body, DiscretePlant, FrequencyResponse, PhysicsEntry, Plant, PlantFile};
 use servotune::pes::{Profile, context, simulate, simulate_physical};
-use servotune::physics::{Context, Machine, PhysicsError, Restored};
+use servotune::physics::{Context, PhysicsError, Restored, SimulatedMachine};
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 
@@ -111,7 +111,7 @@ fn off(law: Law, physics: &PhysicsEntry, finer: usize) -> f64 {
     let with = Plant { physics: vec![physics.clone()], ..plant };
     let context = Context { sample_time_s: T / finer as f64, ..Context::default() };
     let r = Restored::of(&with, &context).unwrap();
-    let mut machine = Machine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
+    let mut machine = SimulatedMachine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
     let (mut worst, mut size) = (0.0f64, 0.0f64);
     for k in 0..u.len() * finer {
         let y = machine.measure(0.0, 0.0);
@@ -143,7 +143,7 @@ fn the_machine_agrees_with_an_independent_simulation() {
 
 /// Response of a machine to a tone, by least squares over its last samples.
 fn tone(r: &Restored, amplitude: f64, w: f64, settle: usize) -> Complex<f64> {
-    let mut machine = Machine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
+    let mut machine = SimulatedMachine::new(&r.scene.plant, &r.effects(), &r.scene).unwrap();
     let periods = 40.0;
     let count = (periods * TAU / w / T).round() as usize;
     let (mut a, mut b) = (nalgebra::Matrix2::zeros(), nalgebra::Vector2::zeros());
@@ -291,13 +291,13 @@ fn what_cannot_be_used_is_refused_by_name() {
 fn what_an_effect_reports_it_takes_back() {
     let plant = healthy();
     let scene = restored(&plant, &[]).scene;
-    let scene = servotune::physics::Scene { spindle_hz: Some(120.0), duration_s: 0.5, ..scene };
+    let scene = servotune::physics::MotionScene { spindle_hz: Some(120.0), duration_s: 0.5, ..scene };
     for effect in servotune::physics::library() {
         // The plainest form, and the fullest of most laws.
         let grid = effect.grid(&scene);
         for law in grid.first().into_iter().chain(grid.last()) {
             let columns = effect.facts().columns;
-            let of = |s: f64| servotune::physics::Setting { law: law.clone(), strengths: vec![s; columns] };
+            let of = |s: f64| servotune::physics::LawSetting { law: law.clone(), strengths: vec![s; columns] };
             let whole = effect.facts().fixed && of(1.0).is_possible(&[]);
             let setting = of(if whole { 1.0 } else { 0.1 });
             let parameters: Vec<(&str, f64)> = setting.parameters(&scene).iter().map(|p| (p.name, p.value)).collect();

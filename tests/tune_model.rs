@@ -7,8 +7,8 @@ use servotune::feedback::{LoopOnGrid, ModelLoop, SampledPlant, margins};
 use servotune::lti::{Body, DiscretePlant, Plant};
 use servotune::numeric::random::Random;
 use servotune::tune::{
-    GainTable, GainTableError, InputDigest, Machine, Minimise, Objective, Outcome, Parameter, Spec, TuneError,
-    TuneSettings, TuningProblem, What, judge, tune, tune_jointly,
+    GainTable, GainTableError, InputDigest, Machine, Minimise, Objective, Outcome, Spec, TuneError, TuneSettings,
+    TunedNumber, TuningProblem, What, judge, tune, tune_jointly,
 };
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -85,7 +85,7 @@ fn an_optimum_on_a_bound_is_flagged() {
     for (t, bound) in [(&narrow, 0.165), (&wide, 0.175)] {
         assert_eq!(t.at_bounds.len(), 1, "{:?}", t.at_bounds);
         let flag = t.at_bounds[0];
-        assert!(flag.parameter == Parameter::Kp && flag.upper && (flag.value / bound - 1.0).abs() < 1e-3);
+        assert!(flag.parameter == TunedNumber::Kp && flag.upper && (flag.value / bound - 1.0).abs() < 1e-3);
     }
     let sum = |t: &servotune::tune::Tuned| t.after[0].judged.found.dft();
     assert!(sum(&wide) < sum(&narrow));
@@ -149,7 +149,7 @@ fn enumeration_of_two_gains_finds_nothing_better() {
     let settings = TuneSettings::default();
     let Outcome::Tuned(t) = tune(&machine, &spec, Some(&start), &settings).unwrap() else { panic!("feasible") };
     let problem = TuningProblem::around(&[machine], &spec, &start).unwrap();
-    assert_eq!(problem.parameters().free(), [Parameter::Kp, Parameter::Kd]);
+    assert_eq!(problem.parameters().free(), [TunedNumber::Kp, TunedNumber::Kd]);
     let mut work = problem.work();
     let found = problem.score(&problem.parameters().vector(&t.controller), &mut work);
     let (mut best, mut at) = (f64::INFINITY, (0.0, 0.0));

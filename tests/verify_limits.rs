@@ -11,7 +11,8 @@ use servotune::numeric::random::Random;
 use servotune::tune::{GainTable, Machine, Provenance, Route, Spec, Summary, judge};
 use servotune::twin::plants::random_plant;
 use servotune::verify::{
-    Certificate, Inputs, LEAST_DAMPING, LimitVerdict, ProvenLimit, Source, Uncertainty, VerifySettings, Word, certify,
+    Certificate, Inputs, LEAST_DAMPING, LimitVerdict, ProvenLimit, SourceFile, Uncertainty, VerifySettings, Word,
+    certify,
 };
 use std::f64::consts::TAU;
 
@@ -61,7 +62,7 @@ fn proof_of_write(
         inputs: vec![],
     };
     let table = GainTable::new(c, None, Summary::of(&judged), provenance).unwrap();
-    let source = |file: &str, text: String| Source { file: file.into(), text };
+    let source = |file: &str, text: String| SourceFile { file: file.into(), text };
     let profile = profile.map(|text| source("profile.toml", text.into()));
     let inputs = Inputs {
         gains: &source("gains.toml", table.text().unwrap()),

@@ -21,7 +21,7 @@ fn agree(plant: &Plant, c: &Controller, name: &str) {
     let outside = closed_loop_poles(&l).unwrap().iter().filter(|z| z.norm() > 1.0).count() as i64;
     assert_eq!(b.unstable_poles, Some(outside), "{name}");
     // The margins are refined to some nine digits.
-    let holds = |what: &str, b: servotune::verify::Bounded, x: f64| {
+    let holds = |what: &str, b: servotune::verify::BoundedFigure, x: f64| {
         let (low, high) = (b.low.unwrap(), b.high.unwrap());
         assert!(low <= x * (1.0 + 1e-7) && x * (1.0 - 1e-7) <= high, "{name}: {what} {low} {x} {high}");
         // Relative widths asked for, and the width asked of angles: 0.003 deg on each side of the crossing, as an angle or as a delay.
@@ -192,7 +192,7 @@ fn a_loop_whose_gain_at_rest_is_near_1_is_decided() {
         }
         stable += 1;
         let m = margins(&l);
-        let low = |b: servotune::verify::Bounded| b.low.unwrap_or(f64::INFINITY) * (1.0 - 1e-7);
+        let low = |b: servotune::verify::BoundedFigure| b.low.unwrap_or(f64::INFINITY) * (1.0 - 1e-7);
         assert!(m.max_sensitivity <= b.max_sensitivity.high.unwrap() * (1.0 + 1e-7), "loop {i}");
         assert!(m.phase_margin_deg.is_none_or(|x| x.abs() >= low(b.phase_margin_deg)), "loop {i}: {m:?} {b:?}");
         assert!(m.delay_margin_s.is_none_or(|x| x >= low(b.delay_margin_s)), "loop {i}: {m:?} {b:?}");

@@ -18,7 +18,7 @@ use servotune::frf::{Hold, Sweep, read_bytes};
 use servotune::identify::identify;
 use servotune::lti::PlantFile;
 use servotune::tune::{Outcome, TuneSettings};
-use servotune::verify::{Inputs, LEAST_DAMPING, Source, VerifySettings, Word, certify};
+use servotune::verify::{Inputs, LEAST_DAMPING, SourceFile, VerifySettings, Word, certify};
 use servotune_answer::{self as answer, IdentifiedDocument, Named, Proof, TunedDocument, adjusted, model_margins};
 use std::fmt::Write;
 use std::path::Path;
@@ -313,7 +313,7 @@ pub fn batch_verify(
         let source = |what: &str, text: Option<&String>| {
             let text =
                 text.ok_or_else(|| format!("{slot}: no {what}; expected its TOML text in the column `{what}`"))?;
-            Ok::<_, String>(Source { file: format!("{what} of {slot}").into(), text: text.clone() })
+            Ok::<_, String>(SourceFile { file: format!("{what} of {slot}").into(), text: text.clone() })
         };
         let plant = source("plant", plants[i].as_ref())?;
         let inputs = Inputs {

@@ -4,7 +4,7 @@ use crate::refusal::raise;
 use crate::settings::named;
 use pyo3::prelude::*;
 use servotune::tune;
-use servotune::verify::Source;
+use servotune::verify::SourceFile;
 use std::path::PathBuf;
 
 /// A spec with the profile that it names.
@@ -13,9 +13,9 @@ pub struct Spec {
     /// What is asked.
     pub spec: tune::Spec,
     /// Its file.
-    pub source: Source,
+    pub source: SourceFile,
     /// The profile's file.
-    pub profile: Option<Source>,
+    pub profile: Option<SourceFile>,
 }
 
 #[pymethods]
@@ -25,8 +25,8 @@ impl Spec {
     fn read(path: PathBuf) -> PyResult<Spec> {
         let spec = tune::Spec::read(&path).map_err(raise)?;
         let profile = tune::Spec::profile_path(&path).map_err(raise)?;
-        let profile = profile.map(|p| Source::read(&p)).transpose().map_err(raise)?;
-        Ok(Spec { spec, source: Source::read(&path).map_err(raise)?, profile })
+        let profile = profile.map(|p| SourceFile::read(&p)).transpose().map_err(raise)?;
+        Ok(Spec { spec, source: SourceFile::read(&path).map_err(raise)?, profile })
     }
 
     /// The spec in a text, with the text of the profile that it names.
@@ -34,8 +34,8 @@ impl Spec {
     #[pyo3(signature = (text, profile = None))]
     fn parse(text: String, profile: Option<String>) -> PyResult<Spec> {
         let spec = tune::Spec::parse(&text, profile.as_deref()).map_err(raise)?;
-        let profile = profile.map(|text| Source { file: "profile".into(), text });
-        Ok(Spec { spec, source: Source { file: "spec".into(), text }, profile })
+        let profile = profile.map(|text| SourceFile { file: "profile".into(), text });
+        Ok(Spec { spec, source: SourceFile { file: "spec".into(), text }, profile })
     }
 
     /// The text of its file.

@@ -94,7 +94,7 @@ pub fn run(
     let clock = sample_time_s(spec, controller, &job.settings)?;
     let (given, digest) = match machine {
         Machine::Model(p) => {
-            let source = servotune::verify::Source { file: p.file.clone(), text: p.text.clone() };
+            let source = servotune::verify::SourceFile { file: p.file.clone(), text: p.text.clone() };
             given_model(Named { file: &p.file, value: &p.plant }, source, spec, controller, clock, say)?
         }
         Machine::Sweep(file, mut sweep, model, held) => {

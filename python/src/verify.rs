@@ -9,7 +9,7 @@ use crate::spec::Spec;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use servotune::frf::{Hold, Sweep};
-use servotune::verify::{Inputs, Source, VerifySettings, Word, certify, table_clock_s};
+use servotune::verify::{Inputs, SourceFile, VerifySettings, Word, certify, table_clock_s};
 use servotune_report::certificate::certificate_text;
 
 /// The certificate of the gain table in a text, on plants and sweeps that must all pass, and what it says in words.
@@ -28,13 +28,13 @@ pub fn verify(
     fixed_point: Option<(u32, u32)>,
     single: bool,
 ) -> PyResult<(Answer, String)> {
-    let plants: Vec<Source> = plants.iter().map(|p| Source { file: p.file.clone(), text: p.text.clone() }).collect();
+    let plants: Vec<SourceFile> = plants.iter().map(|p| SourceFile { file: p.file.clone(), text: p.text.clone() }).collect();
     let word = match (single, fixed_point) {
         (true, _) => Word::Single,
         (false, Some((bits, fraction))) => Word::Fixed { bits, fraction },
         (false, None) => Word::default(),
     };
-    let gains = Source { file: name.into(), text: gains };
+    let gains = SourceFile { file: name.into(), text: gains };
     let clock_s = if hold_included { Some(table_clock_s(&gains).map_err(raise)?) } else { None };
     let taken = |f: &PyRef<'_, Frf>| {
         let mut sweep = f.sweep.as_ref().clone();

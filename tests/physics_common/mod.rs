@@ -3,11 +3,11 @@
 
 use nalgebra::Complex;
 use servotune::lti::{Body, Mode, Plant};
-use servotune::physics::{AnyLaw, COLUMNS, Law, Sample, Scene, Setting, describing};
+use servotune::physics::{AnyLaw, COLUMNS, Law, LawSetting, MotionScene, Sample, describing};
 
 pub const T: f64 = 39.6e-6;
 
-pub fn scene() -> Scene {
+pub fn scene() -> MotionScene {
     let mode = Mode { zero_rad_s: 7483.0, zero_damping_ratio: 0.038, pole_rad_s: 7681.0, pole_damping_ratio: 0.037 };
     let body = Body::SecondOrder { dc_gain: 75.0, natural_frequency_rad_s: 369.0, damping_ratio: 0.22 };
     let plant = Plant {
@@ -19,7 +19,7 @@ pub fn scene() -> Scene {
         modes: vec![mode],
         physics: vec![],
     };
-    Scene {
+    MotionScene {
         plant,
         sample_time_s: T,
         spindle_hz: Some(120.0),
@@ -57,7 +57,7 @@ pub fn law(of: impl Into<AnyLaw>) -> Box<dyn Law> {
 }
 
 pub fn df(of: impl Into<AnyLaw>, strength: f64, amplitude: f64, w: f64) -> Complex<f64> {
-    describing(&Setting::new(of, vec![strength]), &scene(), amplitude, w).unwrap()
+    describing(&LawSetting::new(of, vec![strength]), &scene(), amplitude, w).unwrap()
 }
 
 pub fn close(found: Complex<f64>, expected: Complex<f64>, tolerance: f64) {

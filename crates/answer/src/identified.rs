@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use servotune::frf::Sweep;
-use servotune::identify::{FitWork, HeldOut, Identified, Intervals, LadderRung, TrustedBand};
+use servotune::identify::{FitWork, Identified, Intervals, LadderRung, OrderScore, TrustedBand};
 use servotune::lti::PlantFile;
 
 /// A model with what is known of its quality.
@@ -16,7 +16,7 @@ pub struct IdentifiedDocument<'a> {
     rms_relative_error: f64,
     p95_relative_error: f64,
     trusted: &'a TrustedBand,
-    held_out: &'a [HeldOut],
+    held_out: &'a [OrderScore],
     at_bound: &'a [String],
     converged: bool,
     chi_square: f64,

@@ -2,7 +2,7 @@
 
 use super::{AnswerError, Named, Say};
 use servotune::lti::Plant;
-use servotune::physics::{Context, Restored, Setting, Share};
+use servotune::physics::{Context, LawSetting, Restored, Share};
 
 /// The physics of a plant, and its linear part. None where no entry acts.
 pub fn restored(plant: Named<'_, Plant>, context: &Context, say: Say<'_>) -> Result<Option<Restored>, AnswerError> {
@@ -29,6 +29,6 @@ pub fn for_a_loop(plant: Named<'_, Plant>, context: &Context, say: Say<'_>) -> R
 
 /// Effects without a part in the loop's response: disturbances.
 pub fn outside(physics: &Restored) -> Vec<&'static str> {
-    let acts_from_outside = |s: &&Setting| s.response_share(&physics.scene, 1.0) == Share::Outside;
+    let acts_from_outside = |s: &&LawSetting| s.response_share(&physics.scene, 1.0) == Share::Outside;
     physics.parts.iter().filter(acts_from_outside).map(|s| s.facts().name).collect()
 }

@@ -7,7 +7,7 @@ use servotune::controller::Controller;
 use servotune::feedback::{DescribedLoop, DescribedPlant, ModelLoop, confirmed_margins, linear_crossover_hz, margins};
 use servotune::lti::{DiscretePlant, Plant};
 use servotune::pes::{ClosedLoop, PesFigures, Profile, WindowDft, context, figures, simulate, simulate_physical};
-use servotune::tune::{Found, Judged, Limits, MarginLimits, Requirement, Spec, TuneError};
+use servotune::tune::{FoundFigures, Judged, Limits, MarginLimits, Requirement, Spec, TuneError};
 use servotune_report::page::Page;
 use servotune_report::simulated::{SimulatedView, simulated_page};
 use servotune_report::write::{NamedWrite, WriteView};
@@ -95,13 +95,13 @@ fn judged(run: &ClosedLoop, profile: &Profile, spec: &Spec) -> Result<Judged, An
     let norm = |i: usize| spec.objective.bands_hz.get(i).map(|band| dft.band(&amplitude, *band));
     let of = |k: usize| dft.bins().iter().position(|b| *b == k).map_or(f64::NAN, |i| amplitude[i]);
     let power = run.command.iter().map(|u| u * u).sum::<f64>() / run.command.len().max(1) as f64;
-    let found = Found {
+    let found = FoundFigures {
         dft_low: norm(0),
         dft_high: norm(1),
         harmonics: limits.harmonics.iter().map(|h| of(h.k)).collect(),
         command_peak: Some(run.command.iter().fold(0.0, |a, u| u.abs().max(a))),
         command_rms: Some(power.sqrt()),
-        ..Found::default()
+        ..FoundFigures::default()
     };
     Ok(Judged::of(&Requirement::list(&MarginLimits::default(), &limits), found))
 }

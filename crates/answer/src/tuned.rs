@@ -8,7 +8,7 @@ use servotune::identify::{IdentifySettings, identify};
 use servotune::lti::Plant;
 use servotune::pes::context;
 use servotune::tune::{InputDigest, Outcome, PhysicalJudgement, Spec, TuneError};
-use servotune::verify::Source;
+use servotune::verify::SourceFile;
 use servotune_report::workflow::{Asked, Given, Reached, tune_and_verify};
 use std::path::Path;
 
@@ -51,7 +51,7 @@ struct Physics<'a> {
 /// A plant model to be tuned, with the digest of its file; `clock` is the controller's sample time (s).
 pub fn given_model(
     plant: Named<'_, Plant>,
-    source: Source,
+    source: SourceFile,
     spec: &Spec,
     start: Option<&Controller>,
     clock: f64,

@@ -4,7 +4,7 @@
 
 use super::Evidence;
 use servotune::controller::Controller;
-use servotune::tune::{Found, Spec, TuneError, TuningProblem, TuningWork, polish_table};
+use servotune::tune::{FoundFigures, Spec, TuneError, TuningProblem, TuningWork, polish_table};
 
 /// The cases of a slot as a tuning problem.
 pub struct Ready<'a> {
@@ -107,7 +107,7 @@ impl<'a> Ready<'a> {
     }
 
     /// The write's figures of every case; none where a case is unstable.
-    pub(super) fn writes(&mut self, gains: &Controller) -> Option<Vec<Found>> {
+    pub(super) fn writes(&mut self, gains: &Controller) -> Option<Vec<FoundFigures>> {
         (self.quick(gains).violation < NO_WRITE)
             .then(|| (0..self.evidence.count()).map(|i| self.problem.found(i, &self.work)).collect())
     }

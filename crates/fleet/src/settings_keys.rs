@@ -1,7 +1,7 @@
 //! The keys of FLEET.toml. Reader: [`super::FleetFile`].
 
 use super::MOST_CANDIDATES;
-use servotune::document::{End, FileKey as Key, KeyFile, KeyTable, Kind, Need, Range};
+use servotune::document::{End, FileKey as Key, KeyFile, KeyKind, KeyTable, Need, Range};
 
 const TOP: &[Key] = &[
     Key::table("input", "where the slots are"),
@@ -19,7 +19,7 @@ const INPUT: &[Key] = &[
     Key::path("tree", "folders T001/slots/S01").need(Need::Unless(&["table", "twin"])),
     Key::path("table", "CSV or Parquet").need(Need::Unless(&["tree", "twin"])),
     Key::table("twin", "made-up slots").need(Need::Unless(&["tree", "table"])),
-    Key::new("hold_included", Kind::Bool, "", "whether the sweeps contain the hold").or_toml("false"),
+    Key::new("hold_included", KeyKind::Bool, "", "whether the sweeps contain the hold").or_toml("false"),
 ];
 
 const TWIN: &[Key] = &[
@@ -39,7 +39,7 @@ const ROBUST: &[Key] = &[
 const RELATIVE: Range = Range::Size(0.0, 0.02);
 
 const TEMPERATURE: &[Key] = &[
-    Key::new("cases_c", Kind::Numbers, "deg C", "temperatures of the base").or_toml("[]").within(-100.0, 200.0),
+    Key::new("cases_c", KeyKind::Numbers, "deg C", "temperatures of the base").or_toml("[]").within(-100.0, 200.0),
     Key::number("measured_c", "deg C", "where a slot names none").or(24.0).within(-100.0, 200.0),
     Key::number("gain_per_c", "1/K", "relative change of the gain").or(0.0).takes(RELATIVE),
     Key::number("frequency_per_c", "1/K", "relative change of every natural frequency").or(0.0).takes(RELATIVE),

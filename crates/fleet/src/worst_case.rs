@@ -7,7 +7,7 @@ use super::Ready;
 use serde::{Deserialize, Serialize};
 use servotune::controller::Controller;
 use servotune::feedback::{MeasuredLoop, margins};
-use servotune::tune::{Found, Judged, Judgement, Machine, Requirement, Spec, Summary, TuneError, What, judge};
+use servotune::tune::{FoundFigures, Judged, Judgement, Machine, Requirement, Spec, Summary, TuneError, What, judge};
 
 /// A table judged in every case of a slot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -68,9 +68,9 @@ pub fn worst_case(ready: &mut Ready<'_>, controller: &Controller) -> Result<Wors
 }
 
 /// The judgement of a measured loop whose write is known.
-fn measured(l: &MeasuredLoop<'_>, write: Found, wanted: &[Requirement]) -> Judgement {
+fn measured(l: &MeasuredLoop<'_>, write: FoundFigures, wanted: &[Requirement]) -> Judgement {
     let margins = margins(l);
-    let found = Found {
+    let found = FoundFigures {
         unstable_poles: margins.unstable_poles,
         phase_margin_deg: margins.phase_margin_deg,
         gain_margin_db: margins.gain_margin_db,

@@ -10,7 +10,7 @@ use servotune::feedback::{ModelLoop, OpenLoop, closed_loop_poles, margins};
 use servotune::lti::{DiscretePlant, FrequencyResponse, Mode, Plant, Section};
 use servotune::numeric::random::Random;
 use servotune::twin::plants::random_plant;
-use servotune::verify::{Bounded, Stability, Uncertainty, VerifySettings, prove_loop};
+use servotune::verify::{BoundedFigure, Stability, Uncertainty, VerifySettings, prove_loop};
 use std::f64::consts::{PI, TAU};
 
 /// Controller's sample time (s).
@@ -153,7 +153,7 @@ fn judge(seed: u64) -> Result<(LoopCase, LoopRow), StudyError> {
     let mut r = Random::stream(seed, 72);
     let mut good = stable;
     let mut passed = case.proved_stable;
-    let mut limit = |truth: Option<f64>, proven: Bounded, at_least: bool| {
+    let mut limit = |truth: Option<f64>, proven: BoundedFigure, at_least: bool| {
         let by = 1.0 + r.between(-AROUND, AROUND);
         let Some(truth) = truth else { return };
         // No lower end of a margin says that no crossing limits it; of a loop whose stability is open it says nothing.

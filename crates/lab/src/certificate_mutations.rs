@@ -7,15 +7,15 @@ use servotune::lti::{Plant, PlantFile};
 use servotune::numeric::random::Random;
 use servotune::tune::{GainTable, InputDigest, Machine, Spec, TuneSettings, tune};
 use servotune::twin::{MachineClass, nominal_controller};
-use servotune::verify::{Certificate, Inputs, Source, Uncertainty, VerifyError, VerifySettings, Word, certify};
+use servotune::verify::{Certificate, Inputs, SourceFile, Uncertainty, VerifyError, VerifySettings, Word, certify};
 use std::path::Path;
 
 /// One machine with its table and certificate.
 pub(super) struct Certified {
     pub class: MachineClass,
     pub tuned: bool,
-    plant: Source,
-    pub gains: Source,
+    plant: SourceFile,
+    pub gains: SourceFile,
     pub certificate: Certificate,
     /// How far the certificate's DFT norms lie from those of the search's own simulation, as a share of the travel.
     pub dft_apart: f64,
@@ -37,18 +37,23 @@ pub(super) struct Caught {
 /// Box of the study: what temperature and wear do to such a machine.
 pub(super) const BOX: Uncertainty = Uncertainty { gain: 0.02, frequency: 0.01, damping: 0.1, delay: 0.02 };
 
-fn source(file: &str, text: &str) -> Source {
-    Source { file: file.into(), text: text.into() }
+fn source(file: &str, text: &str) -> SourceFile {
+    SourceFile { file: file.into(), text: text.into() }
 }
 
-fn spec() -> (Source, Source) {
+fn spec() -> (SourceFile, SourceFile) {
     (
         source("paper.toml", include_str!("../../../specs/limits/paper.toml")),
         source("spiral.toml", include_str!("../../../specs/profiles/spiral.toml")),
     )
 }
 
-fn prove(plant: &Source, gains: &Source, word: Word, uncertainty: Uncertainty) -> Result<Certificate, VerifyError> {
+fn prove(
+    plant: &SourceFile,
+    gains: &SourceFile,
+    word: Word,
+    uncertainty: Uncertainty,
+) -> Result<Certificate, VerifyError> {
     let (spec, profile) = spec();
     let plants = [plant.clone()];
     let least_damping = 0.005;
@@ -108,7 +113,7 @@ pub(super) fn machines() -> Result<Vec<Certified>, StudyError> {
 }
 
 /// A certificate as it would be found beside a changed table.
-fn caught(m: &Certified, gains: &Source, plant: &Source) -> Result<[bool; 2], StudyError> {
+fn caught(m: &Certified, gains: &SourceFile, plant: &SourceFile) -> Result<[bool; 2], StudyError> {
     match prove(plant, gains, Word::Double, Uncertainty::default()) {
         // A refusal to read it is as good.
         Err(_) => Ok([true, true]),

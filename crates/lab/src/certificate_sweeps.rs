@@ -9,7 +9,7 @@ use servotune::frf::{Frf, Hold};
 use servotune::lti::{DiscretePlant, FrequencyResponse};
 use servotune::tune::Spec;
 use servotune::twin::plants::log_grid;
-use servotune::verify::{Bounded, Stability, Uncertainty, VerifySettings, prove_sweep};
+use servotune::verify::{BoundedFigure, Stability, Uncertainty, VerifySettings, prove_sweep};
 use std::path::Path;
 
 /// Least damping taken of the benchmark: its modes have 0.016 and more; the one above half the rate shows up four times wider.
@@ -47,7 +47,7 @@ pub(super) fn benchmark(data: &Path) -> Result<String, StudyError> {
             away,
             &VerifySettings::default(),
         )?;
-        let at_least = |b: Bounded, limit: Option<f64>| limit.is_none_or(|l| b.low.is_none_or(|x| x >= l));
+        let at_least = |b: BoundedFigure, limit: Option<f64>| limit.is_none_or(|l| b.low.is_none_or(|x| x >= l));
         let good = b.stability == Stability::Stable
             && at_least(b.phase_margin_deg, m.phase_margin_deg)
             && at_least(b.gain_margin_db, m.gain_margin_db)

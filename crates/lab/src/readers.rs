@@ -19,7 +19,7 @@ use servotune::recording::{Case, RecordSettings, gzip, read_columns};
 use servotune::tune::{GainTable, InputDigest, Machine, Spec, TuneSettings, tune};
 use servotune::twin::plants::{log_grid, measure};
 use servotune::twin::{MachineClass, nominal_controller, paper_machine};
-use servotune::verify::{Certificate, Inputs, Source, Uncertainty, VerifySettings, Word, certify};
+use servotune::verify::{Certificate, Inputs, SourceFile, Uncertainty, VerifySettings, Word, certify};
 use servotune_fleet::{FileSource, Fleet, SlotSource};
 use std::path::Path;
 
@@ -213,7 +213,8 @@ fn certified(_: &Plant) -> Result<Files, StudyError> {
 }
 
 fn proof(files: &Files) -> Result<Certificate, servotune::verify::VerifyError> {
-    let source = |i: usize| Source { file: files[i].0.into(), text: String::from_utf8_lossy(&files[i].1).into_owned() };
+    let source =
+        |i: usize| SourceFile { file: files[i].0.into(), text: String::from_utf8_lossy(&files[i].1).into_owned() };
     let (gains, plant, spec, profile) = (source(0), source(1), source(2), source(3));
     let inputs = Inputs {
         gains: &gains,

@@ -4,15 +4,15 @@ use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Column, Table};
 use servotune::feedback::{Interval, SweepPlan};
-use servotune::pes::{Budget, PredictedRange, Prediction, Source};
+use servotune::pes::{Budget, PesSource, PredictedRange, Prediction};
 
 /// A source in words.
-pub(super) fn source_name(s: Source) -> &'static str {
+pub(super) fn source_name(s: PesSource) -> &'static str {
     match s {
-        Source::Move => "the move itself",
-        Source::Runout => "run-out",
-        Source::Encoder => "encoder noise",
-        Source::Windage => "windage",
+        PesSource::Move => "the move itself",
+        PesSource::Runout => "run-out",
+        PesSource::Encoder => "encoder noise",
+        PesSource::Windage => "windage",
     }
 }
 

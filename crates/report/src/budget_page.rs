@@ -11,7 +11,7 @@ use super::limit_cards::first_upper;
 use super::number::NumberFormat;
 use super::page::{Block, Card, Page, Section};
 use super::table::Verdict;
-use servotune::pes::{Budget, Harmonic, Prediction, Source};
+use servotune::pes::{Budget, Harmonic, PesSource, Prediction};
 
 /// What a budget came to.
 #[derive(Clone, Debug)]
@@ -31,12 +31,12 @@ pub struct BudgetView<'a> {
 }
 
 /// A source keeps its colour wherever it stands.
-fn ink(s: Source) -> Ink {
+fn ink(s: PesSource) -> Ink {
     match s {
-        Source::Move => Ink::Data(0),
-        Source::Runout => Ink::Data(1),
-        Source::Encoder => Ink::Data(2),
-        Source::Windage => Ink::Data(3),
+        PesSource::Move => Ink::Data(0),
+        PesSource::Runout => Ink::Data(1),
+        PesSource::Encoder => Ink::Data(2),
+        PesSource::Windage => Ink::Data(3),
     }
 }
 

@@ -4,7 +4,7 @@ use super::ReportError;
 use super::number::NumberFormat;
 use super::table::{Column, Table};
 use servotune::verify::{
-    Bounded, CaseProof, Certificate, Finding, LimitVerdict, ProvenLimit, Stability, WriteBox, WriteOpen,
+    BoundedFigure, CaseProof, Certificate, LimitVerdict, ProvenLimit, Stability, TableFinding, WriteBox, WriteOpen,
 };
 
 /// Columns of a table of limits with what is proved of each.
@@ -52,7 +52,8 @@ pub fn certificate_text(c: &Certificate) -> Result<String, ReportError> {
             ])?;
         }
         let b = &case.bounds;
-        let us = |x: Bounded| Bounded { low: x.low.map(|s| s * 1e6), high: x.high.map(|s| s * 1e6), hz: x.hz };
+        let us =
+            |x: BoundedFigure| BoundedFigure { low: x.low.map(|s| s * 1e6), high: x.high.map(|s| s * 1e6), hz: x.hz };
         for (name, x, unit) in [
             ("modulus margin", b.modulus_margin, "ratio"),
             ("delay margin", us(b.delay_margin_s), "us"),
@@ -166,9 +167,9 @@ pub(super) fn write_line(w: &WriteBox) -> String {
 }
 
 /// Findings in words. Figures found on other files differ for that reason alone, and are counted in one sentence.
-pub fn sentences(findings: &[Finding]) -> Vec<String> {
-    let others = findings.iter().any(|f| matches!(f, Finding::Digest { .. }));
-    let kept = |f: &&Finding| !(others && matches!(f, Finding::Figure { .. }));
+pub fn sentences(findings: &[TableFinding]) -> Vec<String> {
+    let others = findings.iter().any(|f| matches!(f, TableFinding::Digest { .. }));
+    let kept = |f: &&TableFinding| !(others && matches!(f, TableFinding::Figure { .. }));
     let mut said: Vec<String> = findings.iter().filter(kept).map(sentence).collect();
     let left = findings.len() - said.len();
     if left > 0 {
@@ -178,25 +179,25 @@ pub fn sentences(findings: &[Finding]) -> Vec<String> {
 }
 
 /// A finding in words.
-pub fn sentence(f: &Finding) -> String {
+pub fn sentence(f: &TableFinding) -> String {
     let number = |x: &Option<f64>| x.map_or("none".to_owned(), |x| x.to_string());
     match f {
-        Finding::Count { found, expected } => {
+        TableFinding::Count { found, expected } => {
             format!("Changed: {found} [[section]] rows, but the gains make {expected}.")
         }
-        Finding::Section { index, key, found, expected } => {
+        TableFinding::Section { index, key, found, expected } => {
             format!("Changed: [[section]] {index}: {key} = {found}, but the gains make {expected}.")
         }
-        Finding::Figure { name, stated, proven } => format!(
+        TableFinding::Figure { name, stated, proven } => format!(
             "Changed: [after] {name} = {}, but {} to {} is proved.",
             number(stated),
             number(&proven.low),
             number(&proven.high)
         ),
-        Finding::Digest { role, stated } => {
+        TableFinding::Digest { role, stated } => {
             format!("Another {role}: the table was made from the one with SHA-256 {stated}.")
         }
-        Finding::Certificate { path, stated, proven } => {
+        TableFinding::Certificate { path, stated, proven } => {
             format!("The certificate does not hold: {path} = {stated}, the proof gives {proven}.")
         }
     }

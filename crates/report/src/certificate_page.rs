@@ -12,7 +12,7 @@ use super::proven_limit::{in_words, name, word};
 use super::proven_room::{room, room_figure};
 use super::table::{Cell, Column, Table, Verdict};
 use super::tuned::Units;
-use servotune::verify::{Bounded, CaseProof, Certificate, LimitVerdict as Proven, ProvenLimit, Stability, Word};
+use servotune::verify::{BoundedFigure, CaseProof, Certificate, LimitVerdict as Proven, ProvenLimit, Stability, Word};
 
 /// A certificate with the names that it does not hold itself.
 #[derive(Clone, Debug)]
@@ -176,7 +176,7 @@ fn side_by_side(v: &CertificateView<'_>) -> Result<Table, ReportError> {
     Ok(table)
 }
 
-fn interval(b: Bounded) -> String {
+fn interval(b: BoundedFigure) -> String {
     match (b.low, b.high) {
         (Some(low), Some(high)) if DIGITS.text(low) == DIGITS.text(high) => DIGITS.page(low),
         (Some(low), Some(high)) => format!("{} to {}", DIGITS.page(low), DIGITS.page(high)),
@@ -218,7 +218,7 @@ fn case_blocks(v: &CertificateView<'_>, case: &CaseProof) -> Result<Vec<Block>, 
         row.extend(some_open.then(|| open.as_str().into()));
         table.push(row)?;
     }
-    let us = |x: Bounded| Bounded { low: x.low.map(|s| s * 1e6), high: x.high.map(|s| s * 1e6), hz: x.hz };
+    let us = |x: BoundedFigure| BoundedFigure { low: x.low.map(|s| s * 1e6), high: x.high.map(|s| s * 1e6), hz: x.hz };
     for (name, x, unit) in [
         ("modulus margin", b.modulus_margin, "ratio"),
         ("delay margin", us(b.delay_margin_s), "us"),

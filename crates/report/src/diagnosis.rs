@@ -78,8 +78,11 @@ fn verdict(made: &Diagnosed, unit: &str) -> (Badge, String) {
     let f = figures(made);
     let which = if d.fit.holdout.is_some() { "records never used for the fit" } else { "the fitted records" };
     let [before, after, floor] = [f.rms_before, f.rms_after, f.noise_floor].map(short);
-    let falls =
-        format!("On {which} the error goes from {before} to {after} {unit} rms; the noise alone is {floor} {unit}.");
+    let goes = match f.rms_after == f.rms_before {
+        true => format!("the error stays {after} {unit} rms, no part of the model being changed"),
+        false => format!("the error goes from {before} to {after} {unit} rms"),
+    };
+    let falls = format!("On {which} {goes}; the noise alone is {floor} {unit}.");
     let names: Vec<String> = d.findings.iter().map(|f| words(&f.effect)).collect();
     match d.verdict {
         Verdict::NoMismatch => {

@@ -8,7 +8,7 @@ use super::ReportError;
 use super::diagnosis_shown::short;
 use super::figure::{Axis, Figure, Ink, Kind, Panel, Series};
 use super::page::{Block, Section};
-use servotune::diagnose::{FreeForm, curve_title};
+use servotune::diagnose::{FreeFormFound, curve_title};
 use servotune::lti::CurveKnot;
 use servotune::numeric::spline::Spline;
 use servotune::physics::CurvePort;
@@ -17,7 +17,7 @@ use servotune::physics::CurvePort;
 const POINTS: usize = 241;
 
 /// The section of a curve; none where a diagnosis has none.
-pub(super) fn curve_section(curve: Option<&FreeForm>) -> Result<Option<Section>, ReportError> {
+pub(super) fn curve_section(curve: Option<&FreeFormFound>) -> Result<Option<Section>, ReportError> {
     let Some(curve) = curve else { return Ok(None) };
     let [linear, with] = curve.left_out.map(short);
     let foretold = format!(
@@ -29,7 +29,7 @@ pub(super) fn curve_section(curve: Option<&FreeForm>) -> Result<Option<Section>,
 }
 
 /// The curve over its argument.
-pub fn curve_figure(curve: &FreeForm) -> Result<Figure, ReportError> {
+pub fn curve_figure(curve: &FreeFormFound) -> Result<Figure, ReportError> {
     let knots = &curve.knots;
     if knots.iter().all(|k| k.velocity.is_some()) {
         return surface_figure(curve);
@@ -93,7 +93,7 @@ pub fn curve_figure(curve: &FreeForm) -> Result<Figure, ReportError> {
 const DRAWN: usize = 5;
 
 /// A torque over the velocity, a line a position.
-fn surface_figure(curve: &FreeForm) -> Result<Figure, ReportError> {
+fn surface_figure(curve: &FreeFormFound) -> Result<Figure, ReportError> {
     let mut at: Vec<f64> = curve.knots.iter().map(|k| k.at).collect();
     at.dedup();
     let speed_unit = format!("{}/s", curve.argument_unit);

@@ -9,7 +9,7 @@ use super::figure::{Axis, Figure, Ink, Kind, Panel, RuleLine, Scale, Series};
 use super::time::{CurveKind, TimeCurve, TimePanel, time};
 use servotune::diagnose::{SelectedEffect, Trajectory};
 use servotune::lti::{Body, Plant};
-use servotune::physics::{AnyLaw, COLUMNS, Entry, Sample, Scene, Setting, ShownOver, describing};
+use servotune::physics::{AnyLaw, COLUMNS, Entry, LawSetting, MotionScene, Sample, ShownOver, describing};
 use std::f64::consts::TAU;
 
 /// Points of a curve that is no function of time and so is not thinned when drawn.
@@ -18,7 +18,7 @@ const POINTS: usize = 5000;
 const ENOUGH: f64 = 0.15;
 
 /// What an effect adds along a trajectory, strengths applied, at its place of entry.
-pub(super) fn added(law: &AnyLaw, strengths: &[f64], scene: &Scene, motion: &Trajectory) -> Vec<f64> {
+pub(super) fn added(law: &AnyLaw, strengths: &[f64], scene: &MotionScene, motion: &Trajectory) -> Vec<f64> {
     let facts = law.facts();
     let samples = &motion.samples;
     let mut law = law.in_motion(scene);
@@ -157,7 +157,7 @@ fn numbers(plant: &Plant) -> [f64; 3] {
 
 /// Natural frequency (Hz) and damping ratio of the body with its torque effects at one amplitude (position_unit): the
 /// frequency at which the describing function's stiffness balances the inertia.
-fn at_amplitude(plant: &Plant, effects: &[&Setting], scene: &Scene, amplitude: f64) -> Option<(f64, f64)> {
+fn at_amplitude(plant: &Plant, effects: &[&LawSetting], scene: &MotionScene, amplitude: f64) -> Option<(f64, f64)> {
     let [b, k, c] = numbers(plant);
     let mut w = if k > 0.0 { k.sqrt() } else { TAU };
     for _ in 0..40 {
@@ -185,7 +185,7 @@ fn at_amplitude(plant: &Plant, effects: &[&Setting], scene: &Scene, amplitude: f
 /// Natural frequency and damping over amplitude; none where nothing that was found changes them.
 pub(super) fn amplitude_figure(s: &Shown) -> Result<Option<Figure>, ReportError> {
     let (fixed, scene) = (&s.made.corrected, &s.made.data.scene);
-    let effects: Vec<&Setting> = fixed.effects.iter().filter(|s| s.law.effect().acts_on_body()).collect();
+    let effects: Vec<&LawSetting> = fixed.effects.iter().filter(|s| s.law.effect().acts_on_body()).collect();
     if !effects.iter().any(|s| s.law.effect().changes_with_amplitude()) {
         return Ok(None);
     }

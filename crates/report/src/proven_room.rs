@@ -90,7 +90,7 @@ pub(super) fn room_figure(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use servotune::verify::Bounded;
+    use servotune::verify::BoundedFigure;
 
     fn limit(side: &str, low: Option<f64>, high: Option<f64>, verdict: Proven) -> ProvenLimit {
         ProvenLimit {
@@ -98,7 +98,7 @@ mod tests {
             side: side.into(),
             required: 40.0,
             unit: "deg".into(),
-            proven: Bounded { low, high, hz: None },
+            proven: BoundedFigure { low, high, hz: None },
             verdict,
         }
     }

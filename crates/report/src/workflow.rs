@@ -14,7 +14,9 @@ use servotune::tune::{
     GainTable, GainTableError, InputDigest, Machine, Outcome, PhysicalTuning, Spec, TuneError, TuneSettings,
     tune_physical, tune_watched,
 };
-use servotune::verify::{Assurance, Certificate, Ground, Source, Uncertainty, VerifyError, Watched, tune_assured};
+use servotune::verify::{
+    Assurance, Certificate, ProvedOn, SourceFile, Uncertainty, VerifyError, Watched, tune_assured,
+};
 use std::path::Path;
 use thiserror::Error;
 
@@ -43,7 +45,7 @@ pub enum Given {
         /// Its linear part.
         plant: Box<Plant>,
         /// The file that a certificate names.
-        source: Box<Source>,
+        source: Box<SourceFile>,
         /// Its physics, where it has any.
         physics: Option<Box<Restored>>,
     },
@@ -62,9 +64,9 @@ pub struct Asked<'a> {
     /// Limits and objective.
     pub spec: &'a Spec,
     /// The spec's file, and the profile's.
-    pub spec_source: &'a Source,
+    pub spec_source: &'a SourceFile,
     /// See above.
-    pub profile: Option<&'a Source>,
+    pub profile: Option<&'a SourceFile>,
     /// Controller to start from.
     pub start: Option<&'a Controller>,
     /// The search.
@@ -167,8 +169,8 @@ fn reach(given: &Given, asked: &Asked<'_>, say: Say<'_>) -> Result<Reached, Work
         return Ok(Reached { outcome, table, tuned, certificate: None, physics: None });
     }
     let ground = match given {
-        Given::Model { plant, source, .. } => Ground::Plant { plant, source },
-        Given::Response { sweep, .. } => Ground::Sweep { sweep, machine: given.machine() },
+        Given::Model { plant, source, .. } => ProvedOn::Plant { plant, source },
+        Given::Response { sweep, .. } => ProvedOn::Sweep { sweep, machine: given.machine() },
     };
     let job = Assurance {
         ground,

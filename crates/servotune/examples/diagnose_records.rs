@@ -6,7 +6,7 @@
 use servotune::diagnose::Verdict;
 use servotune::document::read_toml;
 use servotune::numeric::random::Random;
-use servotune::physics::Setting;
+use servotune::physics::LawSetting;
 use servotune::physics::pivot_friction::{Loading, PivotFriction};
 use servotune::recording::{RecordColumns, RecordEntry, Role};
 use servotune::twin::recording::{multisine, record, scene, stroke};
@@ -27,7 +27,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
 
     let scene = scene(&plant, controller.sample_time_s, 15.0, SAMPLES, 3e-3);
     let bearing = PivotFriction::of(0.5, Loading::Dahl);
-    let friction = Setting::new(bearing, vec![0.02]);
+    let friction = LawSetting::new(bearing, vec![0.02]);
     let mut records = Vec::new();
     // Excitation (V rms), length of the move (track), role.
     let moves = [(0.02, 0.0, Role::Fit), (0.08, 0.0, Role::Fit), (0.0, 12.0, Role::Fit), (0.04, 6.0, Role::Holdout)];

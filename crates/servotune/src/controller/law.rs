@@ -16,7 +16,7 @@ const SEEN: f64 = 1e-9;
 
 /// A controller made ready for recorded signals.
 #[derive(Clone, Debug)]
-pub struct Law<'a> {
+pub struct ControlLaw<'a> {
     controller: &'a Controller,
     /// Its sections.
     pub chain: Vec<Section>,
@@ -24,11 +24,11 @@ pub struct Law<'a> {
     pub limit: f64,
 }
 
-impl<'a> Law<'a> {
+impl<'a> ControlLaw<'a> {
     /// Checks the controller and makes its sections.
-    pub fn new(controller: &'a Controller) -> Result<Law<'a>, ControllerError> {
+    pub fn new(controller: &'a Controller) -> Result<ControlLaw<'a>, ControllerError> {
         let chain = controller.sections()?.chain;
-        Ok(Law { controller, chain, limit: controller.output_limit.unwrap_or(f64::INFINITY) })
+        Ok(ControlLaw { controller, chain, limit: controller.output_limit.unwrap_or(f64::INFINITY) })
     }
 
     /// Memory at rest.
@@ -109,7 +109,7 @@ mod tests {
             biquad: vec![],
             feedforward: None,
         };
-        let law = Law::new(&controller).unwrap();
+        let law = ControlLaw::new(&controller).unwrap();
         let error: Vec<f64> =
             (0..3000).map(|k| 0.4 * (k as f64 * 0.01).sin() + 0.2 * (k as f64 * 0.37).cos()).collect();
         let reference = vec![0.0; 3000];

@@ -11,6 +11,6 @@ mod settings;
 
 pub use controller_keys::CONTROLLER_KEYS;
 pub use filters::{Feedforward, Lowpass, Notch};
-pub use law::Law;
+pub use law::ControlLaw;
 pub use pid::Pid;
 pub use settings::{Controller, ControllerError};

@@ -3,10 +3,10 @@
 use super::diagnose_error::DiagnoseError;
 use super::preconditions;
 use super::progress::{AGAIN, Pace};
-use super::rules::{MEASURED_COMMAND, RUN_OUT_HELPS, asked};
+use super::rules::{Answer, CURVE_NAMED, MEASURED_COMMAND, RUN_OUT_HELPS, asked};
 use super::settings::DiagnoseSettings;
 use super::trial::Trial;
-use crate::controller::{Controller, Law};
+use crate::controller::{ControlLaw, Controller};
 use crate::diagnose::data::excerpt::excerpts;
 use crate::diagnose::data::run::{Run, runs};
 use crate::diagnose::fit::coupling::Decoupled;
@@ -14,7 +14,7 @@ use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
 use crate::diagnose::fit::shock::set_aside;
 use crate::diagnose::fit::simulation::rms;
-use crate::diagnose::search::cleared_plant::cleared;
+use crate::diagnose::search::cleared_plant::{Cleared, cleared};
 use crate::diagnose::verdict::diagnosed::Diagnosed;
 use crate::diagnose::verdict::log_checks::{LogChecks, check};
 use crate::diagnose::verdict::outcome::Outcome;
@@ -44,7 +44,7 @@ pub fn diagnose(
     // Digits of the printed clock do not matter once a controller says what the sample time is.
     let sample_time_s = controller.map_or(sample_time_s, |c| c.sample_time_s);
     progress("checking the logs");
-    let law = controller.map(Law::new).transpose()?;
+    let law = controller.map(ControlLaw::new).transpose()?;
     let log_checks = check(case, &mut all, given, law.as_ref(), sample_time_s)?;
     let mut decoupled = decoupled(all, case, given, &log_checks, sample_time_s, &mut progress);
     let remarks = std::mem::take(&mut decoupled.remarks);
@@ -79,7 +79,7 @@ struct Ground<'a> {
     case: &'a Case,
     given: &'a Plant,
     controller: Option<&'a Controller>,
-    law: Option<&'a Law<'a>>,
+    law: Option<&'a ControlLaw<'a>>,
     settings: &'a DiagnoseSettings,
     log_checks: LogChecks,
     sample_time_s: f64,
@@ -92,7 +92,7 @@ impl Ground<'_> {
     }
 
     /// The controller, where records are shown in closed loop.
-    fn closed(&self) -> Option<&Law<'_>> {
+    fn closed(&self) -> Option<&ControlLaw<'_>> {
         self.law.filter(|_| self.log_checks.closed)
     }
 
@@ -114,17 +114,37 @@ impl Ground<'_> {
         Ok(None)
     }
 
-    /// The search on some runs, from a plant cleared of what bends it where the given one conceals that.
+    /// The search on some runs, from a plant cleared of what bends it where the given one conceals that; and once more from the plant beside a curve,
+    /// where that is like a law: a law that the first search did not find from its plant may be found from there.
     fn searched(
         &self,
+        data: DiagnosisData,
+        whole: Vec<Run>,
+        decoupled: &Decoupled,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Outcome, DiagnoseError> {
+        let sound = self.log_checks.finding.is_none();
+        let start = sound.then(|| cleared(&data, self.settings.select.iterations, progress)).flatten();
+        let cut = data.runs.clone();
+        let first = self.begun(start, data, whole.clone(), decoupled, progress)?;
+        let Some((law, beside)) = first.like_a_law() else { return Ok(first) };
+        progress(&format!("{AGAIN}, from the plant beside a curve like that of {law}"));
+        let second = self.begun(Some(beside), self.data(self.given, cut)?, whole, decoupled, progress)?;
+        let left = second.judged() / second.figures().noise_floor;
+        let holds = Answer::from(second.names(law)) & asked!(left, CURVE_NAMED: left <= CURVE_NAMED);
+        Ok(if holds.yes { second.by(holds) } else { first })
+    }
+
+    /// The search that sets out from a plant, the given one unless told.
+    fn begun(
+        &self,
+        start: Option<Cleared>,
         mut data: DiagnosisData,
         mut whole: Vec<Run>,
         decoupled: &Decoupled,
         progress: &mut dyn FnMut(&str),
     ) -> Result<Outcome, DiagnoseError> {
         let (iterations, mut remarks) = (self.settings.select.iterations, self.remarks.clone());
-        let sound = self.log_checks.finding.is_none();
-        let start = sound.then(|| cleared(&data, iterations, progress)).flatten();
         if let Some(start) = start {
             remarks.push(start.says().into());
             data = self.data(&start.plant, data.runs)?;

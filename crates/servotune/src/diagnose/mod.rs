@@ -36,7 +36,7 @@ pub use fit::model::Model;
 pub use fit::selected_effect::SelectedEffect;
 pub use fit::simulation::Simulation;
 pub use fit::trajectory::Trajectory;
-pub use free_form::curve::FreeForm;
+pub use free_form::curve::FreeFormFound;
 pub use free_form::likeness::Likeness;
 pub use noise::whitening::{NoiseLevels, Whitener};
 pub use rules::{Consequence, Consulted, Counted, Floor, Rule, decision_rules};

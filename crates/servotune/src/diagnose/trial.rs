@@ -2,7 +2,7 @@
 
 use super::diagnose_error::DiagnoseError;
 use super::settings::DiagnoseSettings;
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, corrected};
 use crate::diagnose::fit::coupling::Decoupled;
@@ -43,7 +43,7 @@ pub(super) struct Trial<'a> {
     pub whole: &'a [Run],
     /// The same as recorded, and what further inputs move.
     pub decoupled: &'a Decoupled,
-    pub closed: Option<&'a Law<'a>>,
+    pub closed: Option<&'a ControlLaw<'a>>,
     pub settings: &'a DiagnoseSettings,
     pub log_checks: &'a LogChecks,
     pub shocks: &'a [DetectedShock],
@@ -123,7 +123,7 @@ impl Trial<'_> {
     /// What was found, with another model where that simulates the records that judge no worse than the one that is offered.
     fn offered(&self, made: Outcome, model: Corrected) -> Outcome {
         let every: Vec<&Run> = made.data.runs.iter().collect();
-        let simulated = |closed: Option<&Law>| errors(&model.alone(&made.data), &every, closed);
+        let simulated = |closed: Option<&ControlLaw>| errors(&model.alone(&made.data), &every, closed);
         let shown = simulated(self.closed);
         let (offered, after) = (made.judged(), judged(&made.data, &shown));
         let worse = after.is_nan() || after > offered;
@@ -189,6 +189,8 @@ impl Trial<'_> {
         let confirmed = confirm(&data, &selection, &fixed, &held_out, self.settings.select.iterations)?;
         let linear = SimulatedModel { plant: &refitted.plant, effects: Vec::new(), ..fixed.judged(&data, &selection) };
         let shocks = beyond(&data, self.shocks.to_vec(), &linear, &fixed.judged(&data, &selection));
+        let noise = noise_findings(&data, torque_noise.as_ref(), &self.settings.noise, fit.fit);
+        let noises: Vec<String> = noise.iter().map(|f| f.effect.clone()).collect();
         let judgement = decide(&Facts {
             given: self.given,
             data: &data,
@@ -200,7 +202,7 @@ impl Trial<'_> {
             whitened: mean(&held_out),
             confirmed: &confirmed,
             shocks: shocks.iter().map(|b| b.finding(&data.runs, &self.given.command_unit)).collect(),
-            noise: noise_findings(&data, torque_noise.as_ref(), &self.settings.noise, fit.fit),
+            noise,
             coupled: !self.decoupled.couplings.is_empty(),
         });
         let judgement = Judgement { remarks: before.chain(judgement.remarks).collect(), ..judgement };
@@ -209,7 +211,7 @@ impl Trial<'_> {
         let data = DiagnosisData { runs: self.whole.to_vec(), ..data };
         let (corrected, refitted) = (reported.fixed.made, reported.refitted.made.plant);
         let free_form = None;
-        Ok(Outcome {
+        let made = Outcome {
             judgement,
             next_experiment,
             free_form,
@@ -222,6 +224,10 @@ impl Trial<'_> {
             confirmed,
             data,
             selection,
-        })
+        };
+        // Laws that have no name do not stay in a model of which nothing but noise is said.
+        let unnamed = !made.judgement.findings.is_empty() || !made.selection.best().chosen.is_empty();
+        let linear = unnamed && self.decoupled.couplings.is_empty() && made.judgement.only(&noises);
+        Ok(if linear { made.linear(self.given, self.closed.is_some()) } else { made })
     }
 }

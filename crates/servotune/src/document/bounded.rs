@@ -26,7 +26,7 @@ impl OverLimit {
 }
 
 /// The reader.
-pub struct Bounded<R> {
+pub struct BoundedReader<R> {
     inner: R,
     left: u64,
     limit: u64,
@@ -34,10 +34,10 @@ pub struct Bounded<R> {
     row: Cell<usize>,
 }
 
-impl<R: Read> Bounded<R> {
-    /// At most `limit` bytes, and at most about `row_limit` between two calls of [`Bounded::row_ended`].
-    pub fn new(inner: R, limit: u64, row_limit: usize) -> Bounded<R> {
-        Bounded { inner, left: limit, limit, row_limit, row: Cell::new(0) }
+impl<R: Read> BoundedReader<R> {
+    /// At most `limit` bytes, and at most about `row_limit` between two calls of [`BoundedReader::row_ended`].
+    pub fn new(inner: R, limit: u64, row_limit: usize) -> BoundedReader<R> {
+        BoundedReader { inner, left: limit, limit, row_limit, row: Cell::new(0) }
     }
 
     /// A row has been taken out: the next may be as long again. What a buffer above has read ahead is not counted twice.
@@ -46,7 +46,7 @@ impl<R: Read> Bounded<R> {
     }
 }
 
-impl<R: Read> Read for Bounded<R> {
+impl<R: Read> Read for BoundedReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.row.get() > self.row_limit {
             return Err(io::Error::other(OverLimit::Row { limit: self.row_limit }));
@@ -71,10 +71,10 @@ mod tests {
     #[test]
     fn a_limit_is_reached_and_not_passed() {
         let mut all = Vec::new();
-        assert_eq!(Bounded::new(&[7u8; 100][..], 100, 1000).read_to_end(&mut all).unwrap(), 100);
-        let e = Bounded::new(&[7u8; 101][..], 100, 1000).read_to_end(&mut all).unwrap_err();
+        assert_eq!(BoundedReader::new(&[7u8; 100][..], 100, 1000).read_to_end(&mut all).unwrap(), 100);
+        let e = BoundedReader::new(&[7u8; 101][..], 100, 1000).read_to_end(&mut all).unwrap_err();
         assert_eq!(OverLimit::of(&e), Some(OverLimit::Whole { limit: 100 }));
-        let e = Bounded::new(io::repeat(7), u64::MAX, 1000).read_to_end(&mut all).unwrap_err();
+        let e = BoundedReader::new(io::repeat(7), u64::MAX, 1000).read_to_end(&mut all).unwrap_err();
         assert_eq!(OverLimit::of(&e), Some(OverLimit::Row { limit: 1000 }));
         assert!(all.len() < 100_000);
     }

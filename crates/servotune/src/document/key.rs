@@ -31,7 +31,7 @@ pub struct FileKey {
     /// Name.
     pub name: &'static str,
     /// Type.
-    pub kind: Kind,
+    pub kind: KeyKind,
     /// Unit; `pos` and `cmd` are the file's own.
     pub unit: &'static str,
     /// What happens where it is left out.
@@ -49,7 +49,7 @@ pub struct FileKey {
 /// Type of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the words of the page")]
-pub enum Kind {
+pub enum KeyKind {
     Number,
     Integer,
     Bool,
@@ -155,39 +155,39 @@ impl Range {
     }
 }
 
-impl Kind {
+impl KeyKind {
     /// Whether its values are numbers or lists of them.
     pub fn of_numbers(self) -> bool {
-        use Kind::{Bool, Choice, Path, Table, Tables, Text, Texts};
+        use KeyKind::{Bool, Choice, Path, Table, Tables, Text, Texts};
         !matches!(self, Bool | Text | Path | Choice(_) | Texts | Table | Tables)
     }
 
     /// Whether a text stands there.
     pub fn of_text(self) -> bool {
-        matches!(self, Kind::Text | Kind::Path | Kind::Choice(_))
+        matches!(self, KeyKind::Text | KeyKind::Path | KeyKind::Choice(_))
     }
 
     /// In words.
     pub fn text(self) -> String {
         match self {
-            Kind::Number => "number",
-            Kind::Integer => "integer",
-            Kind::Bool => "bool",
-            Kind::Text => "text",
-            Kind::Path => "path",
-            Kind::Choice(words) => return words.join(", "),
-            Kind::Numbers => "numbers",
-            Kind::Texts => "texts",
-            Kind::Pair => "range",
-            Kind::Pairs => "ranges",
-            Kind::Integers => "range of integers",
-            Kind::NumberOrPair => "number or range",
-            Kind::Roots => "roots",
-            Kind::Vector => "vector",
-            Kind::Matrix => "matrix",
-            Kind::NumberOrMatrix => "number or matrix",
-            Kind::Table => "table",
-            Kind::Tables => "tables",
+            KeyKind::Number => "number",
+            KeyKind::Integer => "integer",
+            KeyKind::Bool => "bool",
+            KeyKind::Text => "text",
+            KeyKind::Path => "path",
+            KeyKind::Choice(words) => return words.join(", "),
+            KeyKind::Numbers => "numbers",
+            KeyKind::Texts => "texts",
+            KeyKind::Pair => "range",
+            KeyKind::Pairs => "ranges",
+            KeyKind::Integers => "range of integers",
+            KeyKind::NumberOrPair => "number or range",
+            KeyKind::Roots => "roots",
+            KeyKind::Vector => "vector",
+            KeyKind::Matrix => "matrix",
+            KeyKind::NumberOrMatrix => "number or matrix",
+            KeyKind::Table => "table",
+            KeyKind::Tables => "tables",
         }
         .into()
     }
@@ -211,9 +211,9 @@ impl Need {
 
 impl FileKey {
     /// A key that a file must give.
-    pub const fn new(name: &'static str, kind: Kind, unit: &'static str, means: &'static str) -> FileKey {
+    pub const fn new(name: &'static str, kind: KeyKind, unit: &'static str, means: &'static str) -> FileKey {
         let range = match kind {
-            Kind::Integer | Kind::Integers => Range::Between(End::With(0.0), End::Open),
+            KeyKind::Integer | KeyKind::Integers => Range::Between(End::With(0.0), End::Open),
             _ => Range::Any,
         };
         FileKey { name, kind, unit, need: Need::Always, range, items: [0, usize::MAX], also: "", means }
@@ -221,32 +221,32 @@ impl FileKey {
 
     /// A number.
     pub const fn number(name: &'static str, unit: &'static str, means: &'static str) -> FileKey {
-        FileKey::new(name, Kind::Number, unit, means)
+        FileKey::new(name, KeyKind::Number, unit, means)
     }
 
     /// A whole number of at least 0.
     pub const fn integer(name: &'static str, unit: &'static str, means: &'static str) -> FileKey {
-        FileKey::new(name, Kind::Integer, unit, means)
+        FileKey::new(name, KeyKind::Integer, unit, means)
     }
 
     /// A text.
     pub const fn of_text(name: &'static str, means: &'static str) -> FileKey {
-        FileKey::new(name, Kind::Text, "", means)
+        FileKey::new(name, KeyKind::Text, "", means)
     }
 
     /// A path.
     pub const fn path(name: &'static str, means: &'static str) -> FileKey {
-        FileKey::new(name, Kind::Path, "", means)
+        FileKey::new(name, KeyKind::Path, "", means)
     }
 
     /// A table below this one.
     pub const fn table(name: &'static str, means: &'static str) -> FileKey {
-        FileKey::new(name, Kind::Table, "", means)
+        FileKey::new(name, KeyKind::Table, "", means)
     }
 
     /// A list of tables.
     pub const fn tables(name: &'static str, means: &'static str) -> FileKey {
-        FileKey::new(name, Kind::Tables, "", means)
+        FileKey::new(name, KeyKind::Tables, "", means)
     }
 
     /// The same, needed as this says.

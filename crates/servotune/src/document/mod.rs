@@ -12,9 +12,9 @@ mod read;
 pub mod size_limits;
 mod write;
 
-pub use bounded::{Bounded, OverLimit};
+pub use bounded::{BoundedReader, OverLimit};
 pub use digest::sha256_hex;
-pub use key::{End, FileKey, KeyFile, KeyTable, Kind, Need, Range};
+pub use key::{End, FileKey, KeyFile, KeyKind, KeyTable, Need, Range};
 pub use name::{A_NAME, LONGEST_NAME, NameError, check_name, printable};
 pub use read::{DocumentError, parse_toml, read_table, read_text, read_toml, way_on};
 pub use write::{FileSet, Temporary, below, check_target, clear_abandoned, write_text, write_whole};

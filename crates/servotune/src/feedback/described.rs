@@ -9,13 +9,13 @@
 use super::open_loop::{angle_from_rest, section_poles};
 use super::{FeedbackError, OpenLoop, Trace, frequency_grid, nyquist_count};
 use crate::lti::{DiscretePlant, FrequencyResponse, LtiError, ModalForm, Plant, Sections};
-use crate::physics::{Cycle, Entry, Motion, Restored, Scene, Setting, Share};
+use crate::physics::{Cycle, Entry, LawSetting, Motion, MotionScene, Restored, Share};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
 /// A plant with physics, its linear parts taken in; amplitudes come later.
 pub struct DescribedPlant<'a> {
-    scene: &'a Scene,
+    scene: &'a MotionScene,
     /// The linear plant with every delay, as the command meets it.
     delayed: DiscretePlant,
     /// Vibrations that the plant file adds.
@@ -29,7 +29,7 @@ pub struct DescribedPlant<'a> {
 }
 
 struct Part<'a> {
-    setting: &'a Setting,
+    setting: &'a LawSetting,
     entry: Entry,
     /// Whether the law is linear ([`Share::Ratio`]).
     linear: bool,

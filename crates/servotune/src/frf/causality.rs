@@ -9,7 +9,7 @@ use std::fmt;
 
 /// One way to read magnitude and phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reading {
+pub struct PhaseReading {
     /// Magnitude in dB (otherwise linear).
     pub decibels: bool,
     /// Phase in degrees (otherwise radians).
@@ -24,7 +24,7 @@ pub struct Reading {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misfit {
     /// The reading.
-    pub reading: Reading,
+    pub reading: PhaseReading,
     /// Root mean square over ln w of (phase read - minimum phase + w delay), wrapped (deg).
     pub rms_deg: f64,
     /// The delay, at least 0, that fits best (s, if the frequencies are in rad/s).
@@ -33,7 +33,7 @@ pub struct Misfit {
 
 /// The winner and the best of those that answer the question otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Evidence {
+pub struct PhaseEvidence {
     /// The best reading.
     pub best: Misfit,
     /// The best reading with the other answer.
@@ -61,7 +61,7 @@ impl Misfit {
     }
 }
 
-impl Evidence {
+impl PhaseEvidence {
     /// Whether the best reading explains the phase and the rival does clearly worse.
     pub fn is_clear(&self) -> bool {
         self.best.is_plausible()
@@ -70,7 +70,7 @@ impl Evidence {
     }
 }
 
-impl fmt::Display for Reading {
+impl fmt::Display for PhaseReading {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -83,7 +83,7 @@ impl fmt::Display for Reading {
     }
 }
 
-impl fmt::Display for Evidence {
+impl fmt::Display for PhaseEvidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -98,18 +98,18 @@ impl fmt::Display for Evidence {
 }
 
 /// The best misfit for which `answer` holds, and the best for which it does not; `None` where either is missing.
-pub(crate) fn evidence(misfits: &[Misfit], answer: impl Fn(&Reading) -> bool) -> Option<Evidence> {
+pub(crate) fn evidence(misfits: &[Misfit], answer: impl Fn(&PhaseReading) -> bool) -> Option<PhaseEvidence> {
     let best = *misfits.first()?;
     let side = answer(&best.reading);
     let rival = *misfits.iter().find(|m| answer(&m.reading) != side)?;
-    Some(Evidence { best, rival })
+    Some(PhaseEvidence { best, rival })
 }
 
 /// The misfit of each reading, best first (ties keep the order given); empty where the data are too few to tell.
 ///
 /// `w` ascending (rad/s), `magnitude` and `phase` as the file has them. A linear reading is left out
 /// where a magnitude is not positive.
-pub(crate) fn misfits(w: &[f64], magnitude: &[f64], phase: &[f64], readings: &[Reading]) -> Vec<Misfit> {
+pub(crate) fn misfits(w: &[f64], magnitude: &[f64], phase: &[f64], readings: &[PhaseReading]) -> Vec<Misfit> {
     let n = w.len();
     if n > INTEGRATED {
         let some = |x: &[f64]| x.iter().copied().step_by(n.div_ceil(INTEGRATED)).collect::<Vec<f64>>();
@@ -148,7 +148,7 @@ pub(crate) fn misfits(w: &[f64], magnitude: &[f64], phase: &[f64], readings: &[R
     out
 }
 
-impl Reading {
+impl PhaseReading {
     /// The response's phase (rad) from the number in the file.
     pub(crate) fn response_phase(&self, number: f64) -> f64 {
         let angle = if self.degrees { number * PI / 180.0 } else { number };

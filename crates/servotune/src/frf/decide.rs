@@ -1,12 +1,12 @@
 //! Units and convention of the columns: from the caller, the header, the data, in that order.
 //!
-//! In: ascending columns and what the header says. Out: the [`Reading`] and the notes. Spec: `specs/frf.md`, "Deciding".
+//! In: ascending columns and what the header says. Out: the [`PhaseReading`] and the notes. Spec: `specs/frf.md`, "Deciding".
 
-use super::causality::{Evidence, Misfit, Reading, evidence, misfits};
+use super::causality::{Misfit, PhaseEvidence, PhaseReading, evidence, misfits};
 use super::columns::{Columns, Pair};
-use super::error::{Doubt, FrfError, Question};
+use super::error::{FrfError, Question, SweepDoubt};
 use super::header::Unit;
-use super::note::{Ground, Note};
+use super::note::{Basis, Note};
 use super::settings::{AngleUnit, Conjugate, FrequencyUnit, MagnitudeScale, PhaseConvention, ReadSettings};
 use std::f64::consts::{PI, TAU};
 
@@ -29,7 +29,7 @@ pub(crate) fn frequency(
     let turned = as_hertz && !as_written;
     match columns.unit(0) {
         Some((Unit::RadPerSec, words)) => {
-            notes.push(Note::Frequency { unit: FrequencyUnit::RadPerSec, ground: Ground::Header(words.to_owned()) });
+            notes.push(Note::Frequency { unit: FrequencyUnit::RadPerSec, ground: Basis::Header(words.to_owned()) });
             Ok(1.0)
         }
         Some((unit, words)) => {
@@ -38,19 +38,19 @@ pub(crate) fn frequency(
                     file: file.to_owned(),
                     question: Question::Frequency,
                     says: words.to_owned(),
-                    doubt: Doubt::RoundEnds { low: low / TAU, high: high / TAU },
+                    doubt: SweepDoubt::RoundEnds { low: low / TAU, high: high / TAU },
                 });
             }
-            notes.push(Note::Frequency { unit: FrequencyUnit::Hertz, ground: Ground::Header(words.to_owned()) });
+            notes.push(Note::Frequency { unit: FrequencyUnit::Hertz, ground: Basis::Header(words.to_owned()) });
             Ok(if unit == Unit::Kilohertz { 1e3 * TAU } else { TAU })
         }
         None if turned => {
-            let ground = Ground::RoundEnds(tidy(low / TAU), tidy(high / TAU));
+            let ground = Basis::RoundEnds(tidy(low / TAU), tidy(high / TAU));
             notes.push(Note::Frequency { unit: FrequencyUnit::RadPerSec, ground });
             Ok(1.0)
         }
         None => {
-            notes.push(Note::Frequency { unit: FrequencyUnit::Hertz, ground: Ground::Contract });
+            notes.push(Note::Frequency { unit: FrequencyUnit::Hertz, ground: Basis::Contract });
             Ok(TAU)
         }
     }
@@ -86,14 +86,14 @@ pub(crate) fn reading(
     (w, first, second): (&[f64], &[f64], &[f64]),
     settings: &ReadSettings,
     notes: &mut Vec<Note>,
-) -> Result<Reading, FrfError> {
+) -> Result<PhaseReading, FrfError> {
     let decider = Decider { file, settings };
     if columns.pair == Pair::Cartesian {
         let magnitude: Vec<f64> = first.iter().zip(second).map(|(re, im)| re.hypot(*im)).collect();
         let phase: Vec<f64> = first.iter().zip(second).map(|(re, im)| im.atan2(*re)).collect();
-        let polar = Reading { decibels: false, degrees: false, margin: false, conjugated: false };
+        let polar = PhaseReading { decibels: false, degrees: false, margin: false, conjugated: false };
         let conjugated = decider.conjugate((w, &magnitude, &phase), polar, notes)?;
-        return Ok(Reading { conjugated, ..polar });
+        return Ok(PhaseReading { conjugated, ..polar });
     }
     let said = Said {
         decibels: columns.unit(1).map(|(u, _)| u == Unit::Decibels),
@@ -105,7 +105,7 @@ pub(crate) fn reading(
     let all: Vec<Misfit> = all.into_iter().filter(|m| m.reading.decibels == decibels).collect();
     let degrees = decider.angle(&all, said.degrees, columns, (first, second, decibels), notes)?;
     let all: Vec<Misfit> = all.into_iter().filter(|m| m.reading.degrees == degrees).collect();
-    let polar = Reading { decibels, degrees, margin: false, conjugated: false };
+    let polar = PhaseReading { decibels, degrees, margin: false, conjugated: false };
     let conjugated = decider.conjugate((w, first, second), polar, notes).map_err(|error| {
         // Radians under a header of degrees hardly turn at all, and what little they do looks conjugated.
         match (degrees, narrow_phase(first, second, decibels), columns.unit(2)) {
@@ -113,14 +113,14 @@ pub(crate) fn reading(
                 file: file.to_owned(),
                 question: Question::Angle,
                 says: words.to_owned(),
-                doubt: Doubt::PhaseRange { low, high },
+                doubt: SweepDoubt::PhaseRange { low, high },
             },
             _ => error,
         }
     })?;
     let all: Vec<Misfit> = all.into_iter().filter(|m| m.reading.conjugated == conjugated).collect();
     let margin = decider.margin(&all, said.margin, columns, notes)?;
-    Ok(Reading { decibels, degrees, margin, conjugated })
+    Ok(PhaseReading { decibels, degrees, margin, conjugated })
 }
 
 struct Decider<'a> {
@@ -137,7 +137,7 @@ impl Decider<'_> {
             for degrees in both(s.angle == AngleUnit::Radians, s.angle == AngleUnit::Degrees) {
                 for margin in both(s.phase == PhaseConvention::Response, s.phase == PhaseConvention::Margin) {
                     for conjugated in both(s.conjugate == Conjugate::No, s.conjugate == Conjugate::Yes) {
-                        readings.push(Reading { decibels, degrees, margin, conjugated });
+                        readings.push(PhaseReading { decibels, degrees, margin, conjugated });
                     }
                 }
             }
@@ -162,7 +162,7 @@ impl Decider<'_> {
         let sure = if said == Some(false) {
             None
         } else {
-            first.iter().copied().find(|m| *m <= 0.0).map(|m| (true, Ground::Value(m)))
+            first.iter().copied().find(|m| *m <= 0.0).map(|m| (true, Basis::Value(m)))
         };
         let (decibels, ground) = self.settle(all, (said, words), sure, Question::Magnitude, |r| r.decibels)?;
         let scale = if decibels { MagnitudeScale::Decibels } else { MagnitudeScale::Linear };
@@ -185,15 +185,15 @@ impl Decider<'_> {
         }
         let words = columns.unit(2).map_or("", |(_, words)| words);
         // Nobody unwraps beyond 16 turns; 100 rad is more than that.
-        let large = second.iter().copied().find(|p| p.abs() > 32.0 * PI).map(|p| (true, Ground::Value(p)));
+        let large = second.iter().copied().find(|p| p.abs() > 32.0 * PI).map(|p| (true, Basis::Value(p)));
         let narrow = narrow_phase(first, second, decibels);
         // A free inertia in the margin display stays near 0 deg; its noise does not fill two thirds of a circle's 6.28.
         let fills = |(low, high): &(f64, f64)| high - low > 4.2;
-        let sure = large.or_else(|| narrow.filter(fills).map(|(low, high)| (false, Ground::PhaseRange(low, high))));
+        let sure = large.or_else(|| narrow.filter(fills).map(|(low, high)| (false, Basis::PhaseRange(low, high))));
         let (degrees, ground) = self.settle(all, (said, words), sure, Question::Angle, |r| r.degrees)?;
         // Less than that may be either: degrees would have to be said.
         if let (true, None, Some((low, high))) = (degrees, said, narrow) {
-            let doubt = Doubt::PhaseRange { low, high };
+            let doubt = SweepDoubt::PhaseRange { low, high };
             return Err(FrfError::Ambiguous { file: self.file.to_owned(), question: Question::Angle, doubt });
         }
         let unit = if degrees { AngleUnit::Degrees } else { AngleUnit::Radians };
@@ -206,12 +206,12 @@ impl Decider<'_> {
         &self,
         all: &[Misfit],
         (said, words): (Option<bool>, &str),
-        sure: Option<(bool, Ground)>,
+        sure: Option<(bool, Basis)>,
         question: Question,
-        answer: impl Fn(&Reading) -> bool,
-    ) -> Result<(bool, Ground), FrfError> {
+        answer: impl Fn(&PhaseReading) -> bool,
+    ) -> Result<(bool, Basis), FrfError> {
         let evidence = evidence(all, &answer);
-        let clear = evidence.filter(Evidence::is_clear);
+        let clear = evidence.filter(PhaseEvidence::is_clear);
         if let Some(said) = said {
             let contradicts = clear.filter(|e| answer(&e.best.reading) != said && !e.rival.is_plausible());
             let impossible = sure.filter(|(is, _)| *is != said).map(|(_, ground)| ground);
@@ -221,24 +221,24 @@ impl Decider<'_> {
                     question,
                     says: words.to_owned(),
                     doubt: match impossible {
-                        Some(Ground::Value(value)) => Doubt::Value { value },
-                        Some(Ground::PhaseRange(low, high)) => Doubt::PhaseRange { low, high },
-                        _ => Doubt::of(evidence),
+                        Some(Basis::Value(value)) => SweepDoubt::Value { value },
+                        Some(Basis::PhaseRange(low, high)) => SweepDoubt::PhaseRange { low, high },
+                        _ => SweepDoubt::of(evidence),
                     },
                 });
             }
-            return Ok((said, Ground::Header(words.to_owned())));
+            return Ok((said, Basis::Header(words.to_owned())));
         }
         if let Some((is, ground)) = sure {
             return Ok((is, ground));
         }
         match (clear, evidence) {
-            (Some(e), _) => Ok((answer(&e.best.reading), Ground::GainPhase(e))),
+            (Some(e), _) => Ok((answer(&e.best.reading), Basis::GainPhase(e))),
             // The data lean against the contract, but not clearly.
             (None, Some(e)) if !answer(&e.best.reading) => {
-                Err(FrfError::Ambiguous { file: self.file.to_owned(), question, doubt: Doubt::of(Some(e)) })
+                Err(FrfError::Ambiguous { file: self.file.to_owned(), question, doubt: SweepDoubt::of(Some(e)) })
             }
-            _ => Ok((true, Ground::Contract)),
+            _ => Ok((true, Basis::Contract)),
         }
     }
 
@@ -247,7 +247,7 @@ impl Decider<'_> {
     fn conjugate(
         &self,
         (w, first, second): (&[f64], &[f64], &[f64]),
-        polar: Reading,
+        polar: PhaseReading,
         notes: &mut Vec<Note>,
     ) -> Result<bool, FrfError> {
         match self.settings.conjugate {
@@ -261,7 +261,7 @@ impl Decider<'_> {
         let mut readings = Vec::with_capacity(4);
         for margin in [false, true] {
             for conjugated in [false, true] {
-                readings.push(Reading { margin, conjugated, ..polar });
+                readings.push(PhaseReading { margin, conjugated, ..polar });
             }
         }
         let all = misfits(w, first, second, &readings);
@@ -290,7 +290,7 @@ impl Decider<'_> {
             PhaseConvention::Auto => {}
         }
         let evidence = evidence(all, |r| r.margin);
-        let clear = evidence.filter(Evidence::is_clear);
+        let clear = evidence.filter(PhaseEvidence::is_clear);
         let words = columns.said[2].as_ref().map_or("", |m| m.name.as_str());
         let note = |margin, ground| if margin { Note::PhaseMargin { ground } } else { Note::PhaseResponse { ground } };
         let (margin, ground) = match (said, clear) {
@@ -299,13 +299,13 @@ impl Decider<'_> {
                     file: self.file.to_owned(),
                     question: Question::Phase,
                     says: words.to_owned(),
-                    doubt: Doubt::of(evidence),
+                    doubt: SweepDoubt::of(evidence),
                 });
             }
-            (Some(said), _) => (said, Ground::Header(words.to_owned())),
-            (None, Some(e)) => (e.best.reading.margin, Ground::GainPhase(e)),
+            (Some(said), _) => (said, Basis::Header(words.to_owned())),
+            (None, Some(e)) => (e.best.reading.margin, Basis::GainPhase(e)),
             (None, None) => {
-                let doubt = Doubt::of(evidence);
+                let doubt = SweepDoubt::of(evidence);
                 return Err(FrfError::Ambiguous { file: self.file.to_owned(), question: Question::Phase, doubt });
             }
         };

@@ -2,7 +2,7 @@
 //!
 //! In: nothing. Out: [`FrfError`]. Spec: `specs/frf.md`.
 
-use super::causality::Evidence;
+use super::causality::PhaseEvidence;
 use super::channel::{Channel, Dead};
 use super::response::FrfShapeError;
 use super::settings::Measured;
@@ -66,9 +66,9 @@ impl fmt::Display for NotText {
 
 /// What speaks for and against, or why nothing does.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Doubt {
+pub enum SweepDoubt {
     /// The gain-phase relation, as far as it goes.
-    GainPhase(Evidence),
+    GainPhase(PhaseEvidence),
     /// Too few points, or too narrow a sweep, for the gain-phase relation.
     TooShort,
     /// A value that the header's unit does not allow.
@@ -94,24 +94,26 @@ pub enum Doubt {
     },
 }
 
-impl Doubt {
+impl SweepDoubt {
     /// The evidence, where there is any.
-    pub(crate) fn of(evidence: Option<Evidence>) -> Self {
-        evidence.map_or(Doubt::TooShort, Doubt::GainPhase)
+    pub(crate) fn of(evidence: Option<PhaseEvidence>) -> Self {
+        evidence.map_or(SweepDoubt::TooShort, SweepDoubt::GainPhase)
     }
 }
 
-impl fmt::Display for Doubt {
+impl fmt::Display for SweepDoubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Doubt::GainPhase(evidence) => evidence.fmt(f),
-            Doubt::TooShort => f.write_str(
+            SweepDoubt::GainPhase(evidence) => evidence.fmt(f),
+            SweepDoubt::TooShort => f.write_str(
                 "the gain-phase relation cannot be tested (it needs 12 points over a factor of 3 in frequency)",
             ),
-            Doubt::Value { value } => write!(f, "the value {value} cannot be in that unit"),
-            Doubt::PhaseRange { low, high } => write!(f, "all phases lie from {low} to {high}, as if in radians"),
-            Doubt::NoUnit => f.write_str("no unit stands beside the frequencies, and both are usual in such a file"),
-            Doubt::RoundEnds { low, high } => {
+            SweepDoubt::Value { value } => write!(f, "the value {value} cannot be in that unit"),
+            SweepDoubt::PhaseRange { low, high } => write!(f, "all phases lie from {low} to {high}, as if in radians"),
+            SweepDoubt::NoUnit => {
+                f.write_str("no unit stands beside the frequencies, and both are usual in such a file")
+            }
+            SweepDoubt::RoundEnds { low, high } => {
                 write!(f, "the ends are round numbers only after division by 2 pi, {low:.6} and {high:.6}")
             }
         }
@@ -219,13 +221,13 @@ pub enum FrfError {
     #[error("{file}: found {found} rows; the header declares {declared}")]
     RowsCut { file: String, found: usize, declared: usize },
     #[error("{file}: the data do not tell {question}: {doubt}")]
-    Ambiguous { file: String, question: Question, doubt: Doubt },
+    Ambiguous { file: String, question: Question, doubt: SweepDoubt },
     #[error("{file}: the header says `{}`, the data say otherwise: {doubt}; undecided {question}", quoted(says))]
-    Contradiction { file: String, question: Question, says: String, doubt: Doubt },
+    Contradiction { file: String, question: Question, says: String, doubt: SweepDoubt },
     #[error(
         "{file}: the phase rises with frequency as no causal system's does, as if the file held the complex conjugate: {evidence} (--conjugate yes undoes it, --conjugate no takes the file as it is)"
     )]
-    Conjugated { file: String, evidence: Evidence },
+    Conjugated { file: String, evidence: PhaseEvidence },
     #[error(
         "{file}: found {found} datasets of type 58 with a frequency response; choose one by its number: {}",
         list(datasets)

@@ -11,7 +11,7 @@ use std::f64::consts::{PI, TAU};
 
 /// A response estimated from records.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Estimate {
+pub struct EstimatedResponse {
     /// The response with the relative standard deviation of each value.
     pub frf: Frf,
     /// Share of the output power that is linear in the input at each point, 0 to 1.
@@ -71,7 +71,7 @@ pub fn periodic(
     output: &[f64],
     sample_time_s: f64,
     settings: &PeriodicSettings,
-) -> Result<Estimate, FrfError> {
+) -> Result<EstimatedResponse, FrfError> {
     check(input, output, sample_time_s)?;
     let n = settings.period;
     if n < 4 {
@@ -132,7 +132,7 @@ pub fn segments(
     output: &[f64],
     sample_time_s: f64,
     settings: &SegmentSettings,
-) -> Result<Estimate, FrfError> {
+) -> Result<EstimatedResponse, FrfError> {
     check(input, output, sample_time_s)?;
     let n = settings.segment;
     if n < 8 {
@@ -203,10 +203,10 @@ impl Parts {
         self.std.push(std);
         self.coherence.push(coherence);
     }
-    fn finish(self, averaged: usize) -> Result<Estimate, FrfError> {
+    fn finish(self, averaged: usize) -> Result<EstimatedResponse, FrfError> {
         let shape = |source| FrfError::Shape { file: "record".to_owned(), source };
         let frf = Frf::new(self.w, self.value, Some(self.std)).map_err(shape)?;
-        Ok(Estimate { frf, coherence: self.coherence, averaged })
+        Ok(EstimatedResponse { frf, coherence: self.coherence, averaged })
     }
 }
 

@@ -3,7 +3,7 @@
 //! In: [`Variable`](super::mat::Variable)s. Out: [`Columns`]; the line of a point is its number in the vectors. Spec: `specs/frf.md`, "MATLAB files".
 
 use super::columns::{Columns, Pair};
-use super::error::{Doubt, FrfError, Question};
+use super::error::{FrfError, Question, SweepDoubt};
 use super::header::{Meaning, Role, Unit, meaning};
 use super::mat::{Numbers, Raw, Value, elements, variables};
 use super::note::Note;
@@ -193,7 +193,7 @@ impl<'a> Found<'a> {
         let either = grid.meaning.name == "w"
             || self.arrays.iter().any(|a| a.scope == grid.scope && a.meaning.name == "ResponseData");
         if grid.meaning.unit.is_none() && either {
-            let (question, doubt) = (Question::Frequency, Doubt::NoUnit);
+            let (question, doubt) = (Question::Frequency, SweepDoubt::NoUnit);
             return Err(FrfError::Ambiguous { file: file.to_owned(), question, doubt });
         }
         Ok((column, Some(grid.meaning.clone()), 1.0))

@@ -31,13 +31,13 @@ mod uff;
 mod uff_block;
 mod write;
 
-pub use causality::{Evidence, Misfit, Reading};
+pub use causality::{Misfit, PhaseEvidence, PhaseReading};
 pub use channel::{Channel, Dead};
 pub use closed_loop::{Opened, open_loop, scatter};
-pub use error::{Doubt, FrfError, NotText, Question};
-pub use estimate::{Estimate, PeriodicSettings, SegmentSettings, periodic, segments};
+pub use error::{FrfError, NotText, Question, SweepDoubt};
+pub use estimate::{EstimatedResponse, PeriodicSettings, SegmentSettings, periodic, segments};
 pub use gather::{GATHERED_ABOVE, Gathered, gathered};
-pub use note::{Ground, Note};
+pub use note::{Basis, Note};
 pub use phase::{log_steps, phase_rad};
 pub use read::{Sweep, read_bytes, read_file};
 pub use response::{Frf, FrfShapeError, Hold};

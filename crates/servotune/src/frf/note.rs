@@ -2,7 +2,7 @@
 //!
 //! In: a decision and its evidence. Out: [`Note`]. Spec: `specs/frf.md`.
 
-use super::causality::Evidence;
+use super::causality::PhaseEvidence;
 use super::settings::{AngleUnit, FrequencyUnit, MagnitudeScale};
 use crate::document::size_limits::quoted;
 use std::fmt;
@@ -12,13 +12,13 @@ const LISTED: usize = 20;
 
 /// Where a decision comes from.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ground {
+pub enum Basis {
     /// The header says so, in these words.
     Header(String),
     /// The file format fixes it.
     Format,
     /// The gain-phase relation tells.
-    GainPhase(Evidence),
+    GainPhase(PhaseEvidence),
     /// A value that the other reading cannot take.
     Value(f64),
     /// All phases lie between these two numbers, which is half a turn either way in radians and next to nothing in degrees.
@@ -29,19 +29,19 @@ pub enum Ground {
     Contract,
 }
 
-impl fmt::Display for Ground {
+impl fmt::Display for Basis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Ground::Header(words) => write!(f, "the header says `{}`", quoted(words)),
-            Ground::Format => f.write_str("the file format fixes it"),
-            Ground::GainPhase(evidence) => evidence.fmt(f),
-            Ground::Value(value) => write!(f, "the value {value} allows nothing else"),
-            Ground::PhaseRange(low, high) => write!(
+            Basis::Header(words) => write!(f, "the header says `{}`", quoted(words)),
+            Basis::Format => f.write_str("the file format fixes it"),
+            Basis::GainPhase(evidence) => evidence.fmt(f),
+            Basis::Value(value) => write!(f, "the value {value} allows nothing else"),
+            Basis::PhaseRange(low, high) => write!(
                 f,
                 "all phases lie from {low} to {high}, half a turn either way in radians and far too little in degrees for such a change of gain"
             ),
-            Ground::RoundEnds(low, high) => write!(f, "the sweep then runs from {low} to {high}, round numbers"),
-            Ground::Contract => f.write_str("the file does not say, and this is the standing rule"),
+            Basis::RoundEnds(low, high) => write!(f, "the sweep then runs from {low} to {high}, round numbers"),
+            Basis::Contract => f.write_str("the file does not say, and this is the standing rule"),
         }
     }
 }
@@ -51,21 +51,21 @@ impl fmt::Display for Ground {
 #[allow(missing_docs, reason = "each field is named in the sentence")]
 pub enum Note {
     /// The unit of the frequency column.
-    Frequency { unit: FrequencyUnit, ground: Ground },
+    Frequency { unit: FrequencyUnit, ground: Basis },
     /// The scale of the magnitude column.
-    Magnitude { scale: MagnitudeScale, ground: Ground },
+    Magnitude { scale: MagnitudeScale, ground: Basis },
     /// The unit of the phase column.
-    Angle { unit: AngleUnit, ground: Ground },
+    Angle { unit: AngleUnit, ground: Basis },
     /// The phase column shows the phase margin and was turned back.
-    PhaseMargin { ground: Ground },
+    PhaseMargin { ground: Basis },
     /// The phase column shows the response.
-    PhaseResponse { ground: Ground },
+    PhaseResponse { ground: Basis },
     /// The file was conjugated on demand.
     ConjugateUndone,
     /// The sign of the phase could not be tested and stays as written.
     ConjugateUntested,
     /// The sign of the phase was tested without a clear answer and stays as written.
-    ConjugateUnclear { evidence: Evidence },
+    ConjugateUnclear { evidence: PhaseEvidence },
     /// The sweep ran downwards.
     Descending { points: usize },
     /// The rows were sorted on demand.
@@ -83,7 +83,7 @@ pub enum Note {
     /// Numbers have a decimal comma.
     DecimalComma,
     /// How the standard deviation was read.
-    Deviation { relative: bool, ground: Ground },
+    Deviation { relative: bool, ground: Basis },
     /// Columns that were not used.
     ColumnsIgnored { names: Vec<String> },
     /// Which dataset of a universal file was read.

@@ -2,7 +2,7 @@
 //!
 //! In: a response. Out: radians, without jumps of a full turn. Source: paper section 2.1, figures 4 and 5; spec: `specs/frf.md`.
 
-use super::causality::{Reading, misfits};
+use super::causality::{PhaseReading, misfits};
 use super::gather::GATHERED_ABOVE;
 use super::minimum_phase::minimum_phase;
 use super::response::Frf;
@@ -46,9 +46,9 @@ pub fn phase_rad(frf: &Frf) -> Vec<f64> {
 fn expected_phase(w: &[f64], value: &[Complex<f64>], at: &[usize]) -> Option<Vec<f64>> {
     let gain: Vec<f64> = value.iter().map(|v| v.norm()).collect();
     let angle: Vec<f64> = value.iter().map(|v| v.arg()).collect();
-    let plain = Reading { decibels: false, degrees: false, margin: false, conjugated: false };
+    let plain = PhaseReading { decibels: false, degrees: false, margin: false, conjugated: false };
     // An inverted sensor turns everything by half a turn and is no reason to lose the guide.
-    let found = misfits(w, &gain, &angle, &[plain, Reading { margin: true, ..plain }]);
+    let found = misfits(w, &gain, &angle, &[plain, PhaseReading { margin: true, ..plain }]);
     let best = found.first().filter(|m| m.is_plausible())?;
     let log_w: Vec<f64> = w.iter().map(|w| w.ln()).collect();
     let log_gain: Vec<f64> = gain.iter().map(|g| g.ln()).collect();

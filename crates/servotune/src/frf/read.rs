@@ -3,12 +3,12 @@
 //! In: a path or bytes. Out: [`Sweep`]. Convention: rad/s, response phase. Spec: `specs/frf.md`.
 
 use super::bytes::{digest, load, text, unpack};
-use super::causality::Reading;
+use super::causality::PhaseReading;
 use super::columns::{Columns, Pair, columns};
 use super::decide::{frequency, reading};
 use super::error::FrfError;
 use super::header::Unit;
-use super::note::{Ground, Note};
+use super::note::{Basis, Note};
 use super::order::{Declared, complete, declared, gaps, groups};
 use super::outlier;
 use super::response::Frf;
@@ -180,7 +180,7 @@ fn positive(file: &str, columns: &Columns, settings: &ReadSettings) -> Result<()
 }
 
 /// The complex value of each row.
-fn rows(file: &str, columns: &Columns, reading: Reading) -> Result<Vec<Complex<f64>>, FrfError> {
+fn rows(file: &str, columns: &Columns, reading: PhaseReading) -> Result<Vec<Complex<f64>>, FrfError> {
     let mut out = Vec::with_capacity(columns.line.len());
     for ((&a, &b), &line) in columns.first.iter().zip(&columns.second).zip(&columns.line) {
         out.push(match columns.pair {
@@ -198,7 +198,7 @@ fn rows(file: &str, columns: &Columns, reading: Reading) -> Result<Vec<Complex<f
 }
 
 /// The value from its magnitude and the phase as written. Whole quarters in degrees give exact zeros.
-fn polar(size: f64, written: f64, reading: Reading) -> Complex<f64> {
+fn polar(size: f64, written: f64, reading: PhaseReading) -> Complex<f64> {
     if !reading.degrees {
         return Complex::from_polar(size, reading.response_phase(written));
     }
@@ -219,7 +219,7 @@ fn deviations(
     file: &str,
     columns: &Columns,
     rows: &[Complex<f64>],
-    reading: Reading,
+    reading: PhaseReading,
     settings: &ReadSettings,
     notes: &mut Vec<Note>,
 ) -> Result<Option<Vec<f64>>, FrfError> {
@@ -229,7 +229,7 @@ fn deviations(
     }
     let relative = |factor: f64| std.iter().map(|s| s * factor).collect::<Vec<f64>>();
     let absolute = || std.iter().zip(rows).map(|(s, v)| s / v.norm()).collect::<Vec<f64>>();
-    let header = |words: &str| Ground::Header(words.to_owned());
+    let header = |words: &str| Basis::Header(words.to_owned());
     let (values, is_relative, ground) = match (settings.deviation, columns.unit(3)) {
         (DeviationScale::Absolute, _) => return Ok(Some(absolute())),
         (DeviationScale::Relative, _) => return Ok(Some(relative(1.0))),
@@ -237,8 +237,8 @@ fn deviations(
         (_, Some((Unit::Percent, words))) => (relative(0.01), true, header(words)),
         (_, Some((Unit::Decibels, words))) => (relative(LN_10 / 20.0), true, header(words)),
         // Beside decibels a bare number is in decibels, beside a linear magnitude in its unit.
-        _ if columns.pair == Pair::Polar && reading.decibels => (relative(LN_10 / 20.0), true, Ground::Contract),
-        _ => (absolute(), false, Ground::Contract),
+        _ if columns.pair == Pair::Polar && reading.decibels => (relative(LN_10 / 20.0), true, Basis::Contract),
+        _ => (absolute(), false, Basis::Contract),
     };
     notes.push(Note::Deviation { relative: is_relative, ground });
     Ok(Some(values))

@@ -57,8 +57,8 @@ pub use network::{Network, NetworkWorkspace, parameter_count, softmax};
 pub use novelty::{Novelty, NoveltyScore};
 pub use prepare::Ranked;
 pub use report::{
-    Baseline, CalibrationReport, Candidate, ConformalReport, Counts, Decisions, MissedBroken, NoveltyReport, Published,
-    TrainReport, decisions,
+    Baseline, CalibrationReport, ConformalReport, Counts, Decisions, MissedBroken, NoveltyReport, Published,
+    TrainReport, TriedSize, decisions,
 };
 pub use scale::Scale;
 pub use settings::{FitSettings, TrainSettings};

@@ -61,7 +61,7 @@ pub struct Published {
 
 /// One size that the search tried (figure 37).
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Candidate {
+pub struct TriedSize {
     /// Hidden layers.
     pub hidden: Vec<usize>,
     /// Weights and biases.
@@ -186,7 +186,7 @@ pub struct TrainReport {
     /// The published network, where the search replaced it.
     pub published: Option<Published>,
     /// What the search tried.
-    pub search: Vec<Candidate>,
+    pub search: Vec<TriedSize>,
     /// Temperature and calibration error.
     pub calibration: CalibrationReport,
     /// Coverage.
@@ -221,7 +221,7 @@ pub struct NoveltyReport {
 /// What the steps of the training hand over.
 pub(super) struct Parts<'a> {
     pub published: Option<Published>,
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<TriedSize>,
     pub folds: Vec<Fold>,
     pub lda: Baseline,
     pub held: &'a [usize],

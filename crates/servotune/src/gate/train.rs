@@ -20,7 +20,7 @@ use super::network::NetworkWorkspace;
 use super::novelty::{MOST_FEATURES, MOST_LOOKED_AT, Novelty};
 use super::parallel::each;
 use super::prepare::{PATIENCE, Prepared, prepare, reach};
-use super::report::{Baseline, Candidate, Parts, Published, TrainReport};
+use super::report::{Baseline, Parts, Published, TrainReport, TriedSize};
 use super::settings::TrainSettings;
 use super::split::{folds, split};
 use super::table::{Column, Table};
@@ -142,7 +142,7 @@ fn drift(watched: &[&Column], p: &Prepared<'_>, taught: &[usize]) -> Vec<DriftRe
 }
 
 /// The published network, what was tried, and the hidden layers that won.
-type Searched = (Option<Published>, Vec<Candidate>, Vec<usize>);
+type Searched = (Option<Published>, Vec<TriedSize>, Vec<usize>);
 
 /// The published network first, then its middle layer over the candidates; the one with the least validation loss wins.
 fn search(job: &Job<'_>) -> Result<Searched, GateError> {
@@ -163,7 +163,7 @@ fn search(job: &Job<'_>) -> Result<Searched, GateError> {
         hidden[middle] = settings.candidates[i];
         let f = job.learn(&p, &hidden, settings, Some(PATIENCE), 400 + i as u64)?;
         let e: Epoch = f.history[f.best];
-        Ok(Candidate {
+        Ok(TriedSize {
             hidden,
             parameters: f.network.parameters(),
             validation_loss: e.validation_loss,
@@ -171,8 +171,8 @@ fn search(job: &Job<'_>) -> Result<Searched, GateError> {
             epoch: f.best + 1,
         })
     });
-    let tried = tried.into_iter().collect::<Result<Vec<Candidate>, GateError>>()?;
-    let better = |a: &Candidate, b: &Candidate| {
+    let tried = tried.into_iter().collect::<Result<Vec<TriedSize>, GateError>>()?;
+    let better = |a: &TriedSize, b: &TriedSize| {
         a.validation_loss.total_cmp(&b.validation_loss).then(a.parameters.cmp(&b.parameters))
     };
     let hidden = tried.iter().min_by(|a, b| better(a, b)).map_or(settings.hidden.clone(), |c| c.hidden.clone());

@@ -5,7 +5,7 @@ use super::growth::{self, Joint, Stage, structured};
 use super::held_out;
 use super::ladder;
 use super::noise::local_noise;
-use super::result::{BodyEvidence, FitWork, HeldOut, Identified};
+use super::result::{BodyEvidence, FitWork, Identified, OrderScore};
 use super::shape::{BodyForm, Ranges, Shape};
 use super::spread::{Spread, correlation_inflation};
 use super::sweep::Sweep;
@@ -13,7 +13,7 @@ use super::trust;
 use super::{BodyChoice, IdentifyError, IdentifySettings, ZeroSide};
 use crate::frf::{Frf, gathered};
 use crate::lti::FrequencyResponse;
-use crate::numeric::golden::Bound;
+use crate::numeric::golden::IntervalEnd;
 use crate::numeric::levenberg::Workspace;
 use crate::numeric::statistics::{median, nearest_rank, rms};
 use nalgebra::Complex;
@@ -79,11 +79,11 @@ pub fn identify(frf: &Frf, settings: &IdentifySettings) -> Result<Identified, Id
         ladder: rungs,
         body,
         delay_bound: if delay <= 0.0 {
-            Bound::Low
+            IntervalEnd::Low
         } else if delay >= ranges.delay {
-            Bound::High
+            IntervalEnd::High
         } else {
-            Bound::Inside
+            IntervalEnd::Inside
         },
         at_bound: at_bound(&joint, shape, &x),
         rms_relative_error: rms(&size),
@@ -182,7 +182,7 @@ fn flat(sweep: &Sweep) -> Start {
 }
 
 /// The stage to keep: by held-out errors among those up to `last`, or the last one of a fixed order.
-fn choose(stages: &[Stage], last: usize, weight: f64) -> (usize, Vec<HeldOut>) {
+fn choose(stages: &[Stage], last: usize, weight: f64) -> (usize, Vec<OrderScore>) {
     if stages.iter().any(|s| s.held_out.is_empty()) {
         return (last, vec![]);
     }

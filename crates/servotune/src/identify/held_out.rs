@@ -5,7 +5,7 @@
 //! step. With Q the thin factor and B the rows left out, e = r + Q_B (I - Q_BᵀQ_B)⁻¹ Q_Bᵀ r_B; for a linear model this
 //! is the exact error of a refit (Stone, J. R. Stat. Soc. B 36, 1974, in block form).
 
-use super::result::HeldOut;
+use super::result::OrderScore;
 use crate::numeric::least_squares::{Qr, dot};
 use nalgebra::{DMatrix, DVector};
 
@@ -49,12 +49,12 @@ pub(super) fn errors(qr: &Qr, residuals: &[f64], folds: usize, q: &mut Vec<f64>)
 ///
 /// Orders after index `last` are scored but not chosen. `deviation` is the noise of one real part in weighted units. The standard
 /// error is that of the paired difference, which is what tells two orders apart on the same points.
-pub(super) fn choose(errors: &[(usize, Vec<f64>)], last: usize, deviation: f64, unit: f64) -> (usize, Vec<HeldOut>) {
+pub(super) fn choose(errors: &[(usize, Vec<f64>)], last: usize, deviation: f64, unit: f64) -> (usize, Vec<OrderScore>) {
     let bound = 2.0 * (BOUND * deviation).powi(2);
     let loss: Vec<Vec<f64>> = errors.iter().map(|(_, e)| e.iter().map(|e| e / (1.0 + e / bound)).collect()).collect();
     let sums: Vec<f64> = loss.iter().map(|l| l.iter().sum()).collect();
     let best = (0..sums.len().min(last + 1)).min_by(|&a, &b| sums[a].total_cmp(&sums[b])).unwrap_or(0);
-    let scores: Vec<HeldOut> = errors
+    let scores: Vec<OrderScore> = errors
         .iter()
         .zip(&loss)
         .zip(&sums)
@@ -64,7 +64,7 @@ pub(super) fn choose(errors: &[(usize, Vec<f64>)], last: usize, deviation: f64, 
             let variance: f64 = l.iter().zip(&loss[best]).map(|(a, b)| (a - b - mean).powi(2)).sum();
             let error = variance.sqrt();
             let above_best = if error > 0.0 { (sum - sums[best]) / error } else { 0.0 };
-            HeldOut { modes: *modes, order: 2 + 2 * modes, score: unit * (sum / n).sqrt(), above_best }
+            OrderScore { modes: *modes, order: 2 + 2 * modes, score: unit * (sum / n).sqrt(), above_best }
         })
         .collect();
     let chosen = scores.iter().position(|s| s.above_best <= 1.0).unwrap_or(best);

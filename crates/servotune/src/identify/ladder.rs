@@ -8,7 +8,7 @@ use super::standard_form::{self, norm_error};
 use super::sweep::Sweep;
 use super::{IdentifySettings, LadderRung};
 use crate::lti::{Body, FrequencyResponse, Plant};
-use crate::numeric::golden::{Bound, golden_section};
+use crate::numeric::golden::{IntervalEnd, golden_section};
 use nalgebra::Complex;
 
 /// What the paper's way found.
@@ -17,9 +17,9 @@ pub(super) struct Ladder {
     pub rungs: Vec<LadderRung>,
     pub plant: Plant,
     /// Where the dead time sits in its interval after widening.
-    pub delay_bound: Bound,
+    pub delay_bound: IntervalEnd,
     /// Where the resonance gain sits in its interval after widening.
-    pub gain_bound: Bound,
+    pub gain_bound: IntervalEnd,
     /// Linear fits and golden-section evaluations.
     pub fits: usize,
 }
@@ -47,19 +47,19 @@ fn widening(
     limits: (f64, f64),
     tolerance: f64,
     evaluations: &mut usize,
-) -> (f64, Bound) {
+) -> (f64, IntervalEnd) {
     // Each round doubles the interval's width: twelve rounds reach four thousand times the first one.
     for _ in 0..12 {
         let m = golden_section(&mut f, low, high, tolerance);
         *evaluations += m.evaluations;
         let width = high - low;
         match m.at_bound {
-            Bound::Low if low > limits.0 => low = (low - width).max(limits.0),
-            Bound::High if high < limits.1 => high = (high + width).min(limits.1),
+            IntervalEnd::Low if low > limits.0 => low = (low - width).max(limits.0),
+            IntervalEnd::High if high < limits.1 => high = (high + width).min(limits.1),
             at => return (m.x, at),
         }
     }
-    (0.5 * (low + high), Bound::Inside)
+    (0.5 * (low + high), IntervalEnd::Inside)
 }
 
 /// Runs sections 2.4 to 2.6 from a given body.

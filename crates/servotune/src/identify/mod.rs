@@ -29,6 +29,6 @@ pub use error::IdentifyError;
 pub use finish::identify;
 pub use interval::{Intervals, ModeIntervals, ParameterEstimate};
 pub use near::{Near, identify_near};
-pub use result::{BodyEvidence, FitWork, HeldOut, Identified, LadderRung};
+pub use result::{BodyEvidence, FitWork, Identified, LadderRung, OrderScore};
 pub use settings::{BodyChoice, IdentifySettings, OrderChoice, ZeroSide};
 pub use trust::{BandEdge, BandReason, TrustedBand};

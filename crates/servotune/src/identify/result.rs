@@ -4,7 +4,7 @@ use super::interval::Intervals;
 use super::spread::Spread;
 use super::trust::TrustedBand;
 use crate::lti::Plant;
-use crate::numeric::golden::Bound;
+use crate::numeric::golden::IntervalEnd;
 use nalgebra::Complex;
 use serde::Serialize;
 
@@ -36,7 +36,7 @@ pub enum BodyEvidence {
 
 /// Held-out score of one order.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct HeldOut {
+pub struct OrderScore {
     /// Resonance pairs.
     pub modes: usize,
     /// Order of the rational part.
@@ -75,9 +75,9 @@ pub struct Identified {
     /// What the data say about the body's form.
     pub body: BodyEvidence,
     /// Whether the joint fit's dead time sits on an end of its range.
-    pub delay_bound: Bound,
+    pub delay_bound: IntervalEnd,
     /// The same for the golden-section steps of the paper's way: dead time and resonance gain.
-    pub stepwise_bounds: Option<(Bound, Bound)>,
+    pub stepwise_bounds: Option<(IntervalEnd, IntervalEnd)>,
     /// Names of parameters on an end of their range, as in the plant file.
     pub at_bound: Vec<String>,
     /// Points of the sweep where the fit saw means of neighbouring ones; none where it saw every point.
@@ -97,7 +97,7 @@ pub struct Identified {
     /// Factor on the variances for neighbouring residuals that agree; 1 for independent ones.
     pub correlation_inflation: f64,
     /// Held-out score of every order tried; empty for a fixed order.
-    pub held_out: Vec<HeldOut>,
+    pub held_out: Vec<OrderScore>,
     /// Where the model may be trusted.
     pub trusted: TrustedBand,
     /// Condition number of the scaled Jacobian at the solution.

@@ -2,7 +2,7 @@
 
 use super::rational::MOST;
 use crate::document::size_limits::{DAMPING, PLANT_MODES, PLANT_RAD_S, VALUE};
-use crate::document::{End, FileKey as Key, KeyFile, KeyTable, Kind, Need, Range};
+use crate::document::{End, FileKey as Key, KeyFile, KeyKind, KeyTable, Need, Range};
 
 const TOP: &[Key] = &[
     Key::of_text("position_unit", "unit of position"),
@@ -30,22 +30,22 @@ const PLANT: &[Key] = &[
     Key::number("gain", "pos/s^r/cmd", "P s^r far above every root, r poles more than zeros")
         .need(ROOTS)
         .takes(Range::NotZero),
-    Key::new("zeros_rad_s", Kind::Roots, "rad/s", "zeros").or_toml("[]").also("fewer than poles"),
-    Key::new("zeros_hz", Kind::Roots, "Hz", "the same in Hz").or_toml("[]").also("fewer than poles"),
-    Key::new("poles_rad_s", Kind::Roots, "rad/s", "poles").need(ROOTS).items(1, MOST),
-    Key::new("poles_hz", Kind::Roots, "Hz", "the same in Hz").need(ROOTS).items(1, MOST),
-    Key::new("numerator", Kind::Numbers, "", "highest power of s first").need(COEFFICIENTS).also("not all 0"),
-    Key::new("denominator", Kind::Numbers, "", "highest power of s first").need(COEFFICIENTS).also("not all 0"),
-    Key::new("a", Kind::Matrix, "1/s", "rows of A").need(STATES),
-    Key::new("b", Kind::Vector, "", "B").need(STATES),
-    Key::new("c", Kind::Vector, "", "C").need(STATES),
-    Key::new("d", Kind::NumberOrMatrix, "", "D: a plant answers no command at once").or(0.0).within(0.0, 0.0),
-    Key::new("lag_rad_s", Kind::Numbers, "rad/s", "factors 1/(1 + s/w) beside any form").or_toml("[]").above(0.0),
-    Key::new("lag_hz", Kind::Numbers, "Hz", "the same in Hz").or_toml("[]").above(0.0),
-    Key::new("lead_rad_s", Kind::Numbers, "rad/s", "factors 1 + s/w; below 0: a zero right of the axis")
+    Key::new("zeros_rad_s", KeyKind::Roots, "rad/s", "zeros").or_toml("[]").also("fewer than poles"),
+    Key::new("zeros_hz", KeyKind::Roots, "Hz", "the same in Hz").or_toml("[]").also("fewer than poles"),
+    Key::new("poles_rad_s", KeyKind::Roots, "rad/s", "poles").need(ROOTS).items(1, MOST),
+    Key::new("poles_hz", KeyKind::Roots, "Hz", "the same in Hz").need(ROOTS).items(1, MOST),
+    Key::new("numerator", KeyKind::Numbers, "", "highest power of s first").need(COEFFICIENTS).also("not all 0"),
+    Key::new("denominator", KeyKind::Numbers, "", "highest power of s first").need(COEFFICIENTS).also("not all 0"),
+    Key::new("a", KeyKind::Matrix, "1/s", "rows of A").need(STATES),
+    Key::new("b", KeyKind::Vector, "", "B").need(STATES),
+    Key::new("c", KeyKind::Vector, "", "C").need(STATES),
+    Key::new("d", KeyKind::NumberOrMatrix, "", "D: a plant answers no command at once").or(0.0).within(0.0, 0.0),
+    Key::new("lag_rad_s", KeyKind::Numbers, "rad/s", "factors 1/(1 + s/w) beside any form").or_toml("[]").above(0.0),
+    Key::new("lag_hz", KeyKind::Numbers, "Hz", "the same in Hz").or_toml("[]").above(0.0),
+    Key::new("lead_rad_s", KeyKind::Numbers, "rad/s", "factors 1 + s/w; below 0: a zero right of the axis")
         .or_toml("[]")
         .takes(Range::NotZero),
-    Key::new("lead_hz", Kind::Numbers, "Hz", "the same in Hz").or_toml("[]").takes(Range::NotZero),
+    Key::new("lead_hz", KeyKind::Numbers, "Hz", "the same in Hz").or_toml("[]").takes(Range::NotZero),
     Key::number("delay_s", "s", "dead time, computation included").at_least(0.0),
     Key::number("resonance_gain", "", "factor of the whole").or(1.0).takes(SIZE),
     Key::tables("residue", "form of residues").need(Need::Where("residues")).items(1, usize::MAX),

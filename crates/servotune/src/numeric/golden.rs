@@ -12,13 +12,13 @@ pub struct Minimum {
     /// Function evaluations.
     pub evaluations: usize,
     /// Whether the place lies within the tolerance of an end of the interval.
-    pub at_bound: Bound,
+    pub at_bound: IntervalEnd,
 }
 
 /// Which end of its interval a number sits on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Bound {
+pub enum IntervalEnd {
     /// Inside.
     Inside,
     /// On the lower end.
@@ -64,11 +64,11 @@ pub fn golden_section(mut f: impl FnMut(f64) -> f64, low: f64, high: f64, tolera
     let (x, value) = if f_left <= f_right { (left, f_left) } else { (right, f_right) };
     let near = 2.0 * tolerance;
     let at_bound = if x - start <= near {
-        Bound::Low
+        IntervalEnd::Low
     } else if end - x <= near {
-        Bound::High
+        IntervalEnd::High
     } else {
-        Bound::Inside
+        IntervalEnd::Inside
     };
     Minimum { x, value, evaluations, at_bound }
 }
@@ -84,12 +84,12 @@ mod tests {
         assert!((m.x - 0.3).abs() < 1e-7, "{m:?}");
         // 3 * KEEP^n <= 1e-7 first for n = 36.
         assert_eq!(m.evaluations, 2 + 36);
-        assert_eq!(m.at_bound, Bound::Inside);
+        assert_eq!(m.at_bound, IntervalEnd::Inside);
     }
 
     #[test]
     fn a_slope_ends_on_the_bound_and_says_so() {
-        assert_eq!(golden_section(|x| x, 1.0, 2.0, 1e-6).at_bound, Bound::Low);
-        assert_eq!(golden_section(|x| -x, 1.0, 2.0, 1e-6).at_bound, Bound::High);
+        assert_eq!(golden_section(|x| x, 1.0, 2.0, 1e-6).at_bound, IntervalEnd::Low);
+        assert_eq!(golden_section(|x| -x, 1.0, 2.0, 1e-6).at_bound, IntervalEnd::High);
     }
 }

@@ -4,7 +4,7 @@
 //! each source is simulated alone; noise by many draws. Convention: amplitudes as in `specs/pes.md`; spec: `specs/performance.md`.
 
 use super::figures::{HIGH_BAND_HZ, LOW_BAND_HZ};
-use super::{Harmonic, Noise, PesError, Profile, Scene, WindowDft};
+use super::{Harmonic, Noise, PesError, Profile, WindowDft, WriteScene};
 use crate::controller::Controller;
 use crate::lti::{DiscretePlant, Plant, Section};
 use crate::numeric::statistics::{deviation, quantile_of_draws};
@@ -13,7 +13,7 @@ use serde::Serialize;
 /// A source of the PES.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Source {
+pub enum PesSource {
     /// The move itself.
     Move,
     /// Repeatable run-out at the head.
@@ -28,7 +28,7 @@ pub enum Source {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SourceShare {
     /// Which.
-    pub source: Source,
+    pub source: PesSource,
     /// Norm over 600 to 1500 Hz, root of the mean square over the draws (position_unit).
     pub dft_low: f64,
     /// Norm over 1500 to 3000 Hz, likewise.
@@ -122,7 +122,7 @@ impl Runner {
     }
 
     fn window(&self, profile: &Profile) -> Result<Vec<f64>, PesError> {
-        let scene = Scene::of_window(profile, &self.sampled)?;
+        let scene = WriteScene::of_window(profile, &self.sampled)?;
         let mut work = scene.workspace(&self.sampled, self.chain.len());
         let c = &self.controller;
         scene.run(&self.sampled, &self.chain, c.feedforward.as_ref(), c.output_limit, &mut work);
@@ -162,10 +162,10 @@ pub fn budget(plant: &Plant, controller: &Controller, profile: &Profile) -> Resu
     let apart = |p: &Profile| -> Result<Vec<f64>, PesError> {
         Ok(run.window(p)?.iter().zip(&still).map(|(a, b)| a - b).collect())
     };
-    let mut found = vec![(Source::Move, run.spectrum(&still))];
+    let mut found = vec![(PesSource::Move, run.spectrum(&still))];
     let noise = &profile.noise;
     if !noise.runout.is_empty() {
-        found.push((Source::Runout, run.spectrum(&apart(&with(&|n| n.runout.clone_from(&noise.runout)))?)));
+        found.push((PesSource::Runout, run.spectrum(&apart(&with(&|n| n.runout.clone_from(&noise.runout)))?)));
     }
     let mean = |draw: &dyn Fn(u64) -> Result<Vec<f64>, PesError>| -> Result<([f64; 3], Vec<f64>), PesError> {
         let (mut sum, mut power) = ([0.0; 3], vec![0.0; run.dft.bins().len()]);
@@ -181,12 +181,12 @@ pub fn budget(plant: &Plant, controller: &Controller, profile: &Profile) -> Resu
     if noise.encoder_rms > 0.0 {
         let rms = noise.encoder_rms;
         let one = |seed| apart(&with(&|n| (n.encoder_rms, n.seed) = (rms, seed)));
-        found.push((Source::Encoder, mean(&one)?));
+        found.push((PesSource::Encoder, mean(&one)?));
     }
     if noise.windage_rms > 0.0 {
         let (rms, corner) = (noise.windage_rms, noise.windage_corner_hz);
         let one = |seed| apart(&with(&|n| (n.windage_rms, n.windage_corner_hz, n.seed) = (rms, corner, seed)));
-        found.push((Source::Windage, mean(&one)?));
+        found.push((PesSource::Windage, mean(&one)?));
     }
     let all = |seed| {
         let mut p = profile.clone();

@@ -27,7 +27,7 @@ mod step;
 mod window_frame;
 
 pub use budget::{
-    Budget, PredictSettings, PredictedRange, Prediction, Source, SourceShare, budget, predict, predict_each,
+    Budget, PesSource, PredictSettings, PredictedRange, Prediction, SourceShare, budget, predict, predict_each,
 };
 pub use dft::{Harmonic, WindowDft};
 pub use expected::{ExpectedNoise, NoiseWork};
@@ -38,9 +38,9 @@ pub use noise_power::{NoisePower, NoisePowerWork, coloured, tabulated};
 pub use physical::{context, simulate_physical};
 pub use profile::{Noise, PesClock, Profile, ProfileError, Runout, Spiral};
 pub use profile_keys::PROFILE_KEYS;
-pub use quick::{Asked, Figure, QuickScene, QuickWork, Record};
+pub use quick::{Asked, Figure, QuickScene, QuickWork, WriteRecord};
 pub use reference::Reference;
-pub use simulation::{ClosedLoop, PesError, Scene, WriteWorkspace, simulate};
+pub use simulation::{ClosedLoop, PesError, WriteScene, WriteWorkspace, simulate};
 pub use spectral::{SpectralPes, SpectralWork};
 pub use spectral_parts::{BinParts, SpectralParts};
 pub use step::{StepScene, StepWork};

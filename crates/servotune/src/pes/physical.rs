@@ -1,4 +1,4 @@
-//! The closed loop in time with physics beyond linear: the same write, on a [`Machine`].
+//! The closed loop in time with physics beyond linear: the same write, on a [`SimulatedMachine`].
 //!
 //! In: a plant with its physics made ready, a controller, a profile. Out: the same record as [`super::simulate`].
 //! The arm is exact at and between samples for the command and second order in the sample time for torques; what structure,
@@ -6,10 +6,10 @@
 //! head sees everything but the sensor's own errors. Spec: `specs/mismatch.md`, "Use".
 
 use super::Profile;
-use super::simulation::{ClosedLoop, PesError, Scene};
+use super::simulation::{ClosedLoop, PesError, WriteScene};
 use crate::controller::Controller;
 use crate::lti::{DiscretePlant, step_chain};
-use crate::physics::{Context, Machine, Reading, Restored};
+use crate::physics::{Context, Reading, Restored, SimulatedMachine};
 use std::f64::consts::TAU;
 
 /// What a profile and a controller say of the motion.
@@ -35,9 +35,9 @@ pub fn simulate_physical(
 ) -> Result<ClosedLoop, PesError> {
     let sections = controller.sections()?;
     let t = controller.sample_time_s;
-    let mut machine = Machine::new(&physics.scene.plant, &physics.effects(), &physics.scene)?;
+    let mut machine = SimulatedMachine::new(&physics.scene.plant, &physics.effects(), &physics.scene)?;
     let sampled = DiscretePlant::of(&physics.scene.plant, t)?;
-    let scene = Scene::new(profile, &sampled)?;
+    let scene = WriteScene::new(profile, &sampled)?;
     let readings: Vec<Reading> = scene.servo.iter().map(|s| machine.reading(s.offset_s)).collect();
     let ticks = scene.reference.len();
     let mut run = ClosedLoop {

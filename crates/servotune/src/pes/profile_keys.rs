@@ -1,6 +1,6 @@
 //! The keys of profile.toml. Reader: [`super::Profile`].
 
-use crate::document::{FileKey as Key, KeyFile, KeyTable, Kind, Range};
+use crate::document::{FileKey as Key, KeyFile, KeyKind, KeyTable, Range};
 
 const TOP: &[Key] = &[
     Key::table("spiral", "the move"),
@@ -20,7 +20,7 @@ const SPIRAL: &[Key] = &[
 
 const PES: &[Key] = &[
     Key::number("sample_rate_hz", "Hz", "servo clock").above(0.0),
-    Key::new("window", Kind::Integers, "samples", "first included, last not, counted from `start_s`")
+    Key::new("window", KeyKind::Integers, "samples", "first included, last not, counted from `start_s`")
         .also("first below last, within the record"),
 ];
 

@@ -1,17 +1,17 @@
-//! The write in a search's inner loop: the same equations as [`Scene::run`], laid out for speed, with slopes by one pass backward.
+//! The write in a search's inner loop: the same equations as [`WriteScene::run`], laid out for speed, with slopes by one pass backward.
 //!
 //! In: a profile and its plant, once; then a chain of sections, thousands of times. Out: the window's PES and the command of the record
 //! without noise and of the record with the profile's own draw, side by side; slopes of any figure of theirs in every coefficient.
-//! Sums run in another order than in [`Scene::run`], so the two agree to rounding, not to the bit; tests hold them together.
+//! Sums run in another order than in [`WriteScene::run`], so the two agree to rounding, not to the bit; tests hold them together.
 
 use super::kernel::{Buffers, Drive, Loop, Reading, Run, Seen, Slopes, Track};
-use super::{Profile, ProfileError, Scene};
+use super::{Profile, ProfileError, WriteScene};
 use crate::controller::Feedforward;
 use crate::lti::{DiscretePlant, PlantLanes, Section};
 
 /// Which record of one write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Record {
+pub enum WriteRecord {
     /// Without encoder noise and windage; run-out is in it.
     Still,
     /// With the profile's own draw, as [`super::simulate`] reports it. Where the profile has no noise it is the still one.
@@ -35,7 +35,7 @@ pub struct Asked {
 #[derive(Clone, Copy, Debug)]
 pub struct Figure<'a> {
     /// The record it is read off.
-    pub record: Record,
+    pub record: WriteRecord,
     /// d figure / d PES at the window's samples; empty where it does not see them.
     pub window: &'a [f64],
     /// d figure / d command at the samples from the first number on: a peak is its own sample and the sign there.
@@ -46,7 +46,7 @@ pub struct Figure<'a> {
 ///
 /// ```
 /// use servotune::lti::{Body, DiscretePlant, Plant, Section};
-/// use servotune::pes::{Asked, Figure, Noise, PesClock, Profile, QuickScene, QuickWork, Record, Spiral};
+/// use servotune::pes::{Asked, Figure, Noise, PesClock, Profile, QuickScene, QuickWork, WriteRecord, Spiral};
 ///
 /// let body = Body::FreeInertia { acceleration_gain: 1e7, viscous_rate_per_s: 0.0 };
 /// let (position_unit, command_unit) = ("um".into(), "A".into());
@@ -64,15 +64,15 @@ pub struct Figure<'a> {
 ///
 /// // Forward: both records in one pass, signals kept.
 /// scene.run(&[lead], None, Some(5.0), Asked { still: true, drawn: true, whole: true, slopes: true }, &mut work);
-/// let sum_of_squares: f64 = work.window(Record::Still).iter().map(|x| x * x).sum();
-/// let (at, peak) = work.peak(Record::Drawn);
+/// let sum_of_squares: f64 = work.window(WriteRecord::Still).iter().map(|x| x * x).sum();
+/// let (at, peak) = work.peak(WriteRecord::Drawn);
 ///
 /// // Backward: the slopes of both figures, two in one pass.
-/// let twice: Vec<f64> = work.window(Record::Still).iter().map(|x| 2.0 * x).collect();
-/// let sign = [work.command(Record::Drawn)[at].signum()];
+/// let twice: Vec<f64> = work.window(WriteRecord::Still).iter().map(|x| 2.0 * x).collect();
+/// let sign = [work.command(WriteRecord::Drawn)[at].signum()];
 /// let figures = [
-///     Figure { record: Record::Still, window: &twice, command: (0, &[]) },
-///     Figure { record: Record::Drawn, window: &[], command: (at, &sign) },
+///     Figure { record: WriteRecord::Still, window: &twice, command: (0, &[]) },
+///     Figure { record: WriteRecord::Drawn, window: &[], command: (at, &sign) },
 /// ];
 /// let mut slopes = Vec::new();
 /// scene.backward(&[lead], &figures, &mut work, &mut slopes);
@@ -81,9 +81,9 @@ pub struct Figure<'a> {
 /// // The same by moving b0.
 /// let h = 1e-7;
 /// scene.run(&[Section { b0: lead.b0 + h, ..lead }], None, Some(5.0), Asked { slopes: false, ..Asked::all() }, &mut work);
-/// let moved: f64 = work.window(Record::Still).iter().map(|x| x * x).sum();
+/// let moved: f64 = work.window(WriteRecord::Still).iter().map(|x| x * x).sum();
 /// assert!(((moved - sum_of_squares) / h - d_sum).abs() < 1e-3 * d_sum.abs());
-/// assert!(((work.peak(Record::Drawn).1 - peak) / h - d_peak).abs() < 1e-3 * d_peak.abs());
+/// assert!(((work.peak(WriteRecord::Drawn).1 - peak) / h - d_peak).abs() < 1e-3 * d_peak.abs());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -114,23 +114,23 @@ impl Asked {
 }
 
 impl QuickWork {
-    fn track(&self, record: Record) -> &Track {
+    fn track(&self, record: WriteRecord) -> &Track {
         &self.tracks[self.places[record as usize]]
     }
 
     /// The window's PES of a record that the last run was asked for.
-    pub fn window(&self, record: Record) -> &[f64] {
+    pub fn window(&self, record: WriteRecord) -> &[f64] {
         &self.track(record).readings
     }
 
     /// The command of a record, from sample 0 to the end of the window or of the write.
-    pub fn command(&self, record: Record) -> &[f64] {
+    pub fn command(&self, record: WriteRecord) -> &[f64] {
         let t = self.track(record);
         &t.command[..t.end]
     }
 
     /// The first sample with the largest |command|, and that size. Not a number wherever the command is not.
-    pub fn peak(&self, record: Record) -> (usize, f64) {
+    pub fn peak(&self, record: WriteRecord) -> (usize, f64) {
         let larger = |a: (usize, f64), (k, u): (usize, &f64)| {
             if u.abs() > a.1 || u.is_nan() { (k, u.abs()) } else { a }
         };
@@ -141,7 +141,7 @@ impl QuickWork {
 impl QuickScene {
     /// Lays a write out for its plant.
     pub fn new(profile: &Profile, plant: &DiscretePlant) -> Result<QuickScene, ProfileError> {
-        let scene = Scene::new(profile, plant)?;
+        let scene = WriteScene::new(profile, plant)?;
         let lanes = PlantLanes::of(plant);
         let [from, to] = scene.window;
         let (mut readings, mut weights) = (Vec::with_capacity(to - from), Vec::new());

@@ -1,6 +1,6 @@
 //! The closed loop in time: exact plant, the firmware's sections, the servo clock between controller samples.
 //!
-//! A [`Scene`] holds all that does not depend on the gains (reference, draws, readings between samples), so that a search
+//! A [`WriteScene`] holds all that does not depend on the gains (reference, draws, readings between samples), so that a search
 //! pays for it once. Running it allocates nothing.
 
 use super::{Profile, ProfileError, Reference, noise};
@@ -22,7 +22,7 @@ pub enum PesError {
 
 /// Everything of a simulated write that does not depend on the gains.
 #[derive(Clone, Debug)]
-pub struct Scene {
+pub struct WriteScene {
     sample_time_s: f64,
     /// Reference, its central differences (as many samples longer as a feed-forward may be ahead), and the draws, at the controller's samples.
     pub(super) reference: Vec<f64>,
@@ -77,18 +77,18 @@ pub struct ClosedLoop {
     pub limited: bool,
 }
 
-impl Scene {
+impl WriteScene {
     /// The whole write.
-    pub fn new(profile: &Profile, plant: &DiscretePlant) -> Result<Scene, ProfileError> {
-        Scene::until(profile, plant, None)
+    pub fn new(profile: &Profile, plant: &DiscretePlant) -> Result<WriteScene, ProfileError> {
+        WriteScene::until(profile, plant, None)
     }
 
     /// The write up to the end of the window: all that the figures of the window need.
-    pub fn of_window(profile: &Profile, plant: &DiscretePlant) -> Result<Scene, ProfileError> {
-        Scene::until(profile, plant, Some(profile.pes.window[1]))
+    pub fn of_window(profile: &Profile, plant: &DiscretePlant) -> Result<WriteScene, ProfileError> {
+        WriteScene::until(profile, plant, Some(profile.pes.window[1]))
     }
 
-    fn until(profile: &Profile, plant: &DiscretePlant, last: Option<usize>) -> Result<Scene, ProfileError> {
+    fn until(profile: &Profile, plant: &DiscretePlant, last: Option<usize>) -> Result<WriteScene, ProfileError> {
         profile.check()?;
         let t = plant.sample_time_s();
         let rate = profile.pes.sample_rate_hz;
@@ -129,7 +129,7 @@ impl Scene {
         let acceleration = (0..known).map(|k| (around(k).2 - 2.0 * around(k).1 + around(k).0) / (t * t)).collect();
         let quiet = profile.noise.encoder_rms == 0.0 && profile.noise.windage_rms == 0.0;
         let moves = (profile.spiral.start_s / t).floor() as usize;
-        Ok(Scene {
+        Ok(WriteScene {
             sample_time_s: t,
             encoder: noise::encoder(&profile.noise, ticks),
             windage: noise::windage(&profile.noise, ticks, t),
@@ -206,7 +206,7 @@ impl Scene {
 pub fn simulate(plant: &Plant, controller: &Controller, profile: &Profile) -> Result<ClosedLoop, PesError> {
     let sections = controller.sections()?;
     let sampled = DiscretePlant::of(plant, controller.sample_time_s)?;
-    let scene = Scene::new(profile, &sampled)?;
+    let scene = WriteScene::new(profile, &sampled)?;
     let mut work = scene.workspace(&sampled, sections.chain.len());
     let free =
         scene.run(&sampled, &sections.chain, controller.feedforward.as_ref(), controller.output_limit, &mut work);

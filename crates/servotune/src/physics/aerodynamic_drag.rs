@@ -5,7 +5,7 @@
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::key::Key;
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 
 /// Its strength is the drag coefficient.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,15 +52,15 @@ impl Parametric for AerodynamicDrag {
         ShownOver::Velocity
     }
 
-    fn grid(_scene: &Scene) -> Vec<AerodynamicDrag> {
+    fn grid(_scene: &MotionScene) -> Vec<AerodynamicDrag> {
         vec![AerodynamicDrag]
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Drag)
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         vec![COEFFICIENT.at(strengths[0])]
     }
 
@@ -68,7 +68,7 @@ impl Parametric for AerodynamicDrag {
         strengths.first().is_some_and(|s| *s > 0.0)
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(AerodynamicDrag, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(AerodynamicDrag, Vec<f64>), PhysicsError> {
         Ok((AerodynamicDrag, vec![given.need(&COEFFICIENT)?]))
     }
 }

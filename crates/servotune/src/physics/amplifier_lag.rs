@@ -3,9 +3,9 @@
 //! tau i' = u - i with u held between samples; i(t) = u + (i0 - u) exp(-t/tau), and what acts is its mean over the interval.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
-use super::key::{Bound, Key, Measure, Prior};
+use super::key::{Key, Measure, Prior, ScanEnd};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 use super::share::Share;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
@@ -21,7 +21,7 @@ pub struct AmplifierLag {
 pub(super) const TIME_CONSTANT_S: Key = Key::new("time_constant_s", Unit::Second, "time constant")
     .unless(&["bandwidth_hz"])
     .positive()
-    .scan(Bound::At(0.1, Measure::Sample), Bound::At(20.0, Measure::Sample));
+    .scan(ScanEnd::At(0.1, Measure::Sample), ScanEnd::At(20.0, Measure::Sample));
 pub(super) const BANDWIDTH_HZ: Key = Key::new("bandwidth_hz", Unit::Hertz, "1/(2 pi time_constant_s)")
     .unless(&["time_constant_s"])
     .positive()
@@ -74,7 +74,7 @@ impl Parametric for AmplifierLag {
         &FACTS
     }
 
-    fn grid(scene: &Scene) -> Vec<AmplifierLag> {
+    fn grid(scene: &MotionScene) -> Vec<AmplifierLag> {
         let t = scene.sample_time_s;
         logarithmic(0.1 * t, 20.0 * t, 14).into_iter().map(|time_constant_s| AmplifierLag { time_constant_s }).collect()
     }
@@ -83,16 +83,16 @@ impl Parametric for AmplifierLag {
         vec![Some(&mut self.time_constant_s)]
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         let ratio = scene.sample_time_s / self.time_constant_s;
         Box::new(Lag { keep: (-ratio).exp(), mean: -(-ratio).exp_m1() / ratio, current: None })
     }
 
-    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         vec![TIME_CONSTANT_S.at(self.time_constant_s), BANDWIDTH_HZ.at(1.0 / (TAU * self.time_constant_s))]
     }
 
-    fn response_share(&self, _strengths: &[f64], scene: &Scene, w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], scene: &MotionScene, w_rad_s: f64) -> Share {
         let ratio = scene.sample_time_s / self.time_constant_s;
         let keep = (-ratio).exp();
         // Current over command at the samples, then the mean over the interval.
@@ -100,7 +100,7 @@ impl Parametric for AmplifierLag {
         Share::Ratio((arrived - 1.0) * -(-ratio).exp_m1() / ratio)
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(AmplifierLag, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(AmplifierLag, Vec<f64>), PhysicsError> {
         let time_constant_s = if given.has(&TIME_CONSTANT_S) {
             given.need(&TIME_CONSTANT_S)?
         } else {

@@ -9,9 +9,9 @@
 //! the inertia, behind the play -(1 - s) e.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure, Prior, Takes};
+use super::key::{Key, Measure, Prior, ScanEnd, Takes};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 use super::share::Share;
 use crate::lti::Body;
 use nalgebra::Complex;
@@ -40,11 +40,11 @@ pub struct Contact {
 
 const GAP: Key = Key::new("gap", Unit::Position, "g")
     .positive()
-    .scan(Bound::Greatest(&[(0.1, Measure::Noise), (1e-5, Measure::Travel)]), Bound::At(1.0, Measure::Travel));
+    .scan(ScanEnd::Greatest(&[(0.1, Measure::Noise), (1e-5, Measure::Travel)]), ScanEnd::At(1.0, Measure::Travel));
 const CONTACT_HZ: Key = Key::new("contact_hz", Unit::Hertz, "the two masses against one another in contact")
     .or_else("a rigid contact")
     .positive()
-    .scan(Bound::At(CONTACTS[0], Measure::SampleRate), Bound::At(CONTACTS[1], Measure::SampleRate));
+    .scan(ScanEnd::At(CONTACTS[0], Measure::SampleRate), ScanEnd::At(CONTACTS[1], Measure::SampleRate));
 const DAMPING_RATIO: Key =
     Key::new("damping_ratio", Unit::Ratio, "damping ratio there; the last fit moves it between 0.001 and 0.5")
         .or(DAMPING)
@@ -151,7 +151,7 @@ struct Apart {
 }
 
 impl Apart {
-    fn of(gap: f64, contact: Contact, scene: &Scene) -> Apart {
+    fn of(gap: f64, contact: Contact, scene: &MotionScene) -> Apart {
         let w = TAU * contact.hz;
         let b = scene.acceleration_gain();
         let [k, c] = match scene.plant.body {
@@ -263,7 +263,7 @@ impl Parametric for Backlash {
         ShownOver::Loop
     }
 
-    fn grid(scene: &Scene) -> Vec<Backlash> {
+    fn grid(scene: &MotionScene) -> Vec<Backlash> {
         // A gap below the sensor's noise still shows: thousands of reversals tell of it.
         let low = (0.1 * scene.noise).max(1e-5 * scene.travel);
         let rigid = logarithmic(low, scene.travel, 24).into_iter().map(|gap| Backlash { gap, contact: None });
@@ -301,14 +301,14 @@ impl Parametric for Backlash {
         if self.contact.is_some() { vec![(3, [1e-3, 0.5])] } else { Vec::new() }
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         match self.contact {
             Some(contact) => Box::new(Apart::of(self.gap, contact, scene)),
             None => Box::new(Play { half: 0.5 * self.gap.abs(), part: None }),
         }
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let mut all = vec![GAP.at(self.gap)];
         if let Some(c) = self.contact {
             let read = strengths.first().copied().unwrap_or(0.0);
@@ -333,14 +333,14 @@ impl Parametric for Backlash {
     }
 
     /// With a contact that of both masses touching: what motions large beside the gap meet. Without one the play's own loop.
-    fn response_share(&self, strengths: &[f64], _scene: &Scene, w_rad_s: f64) -> Share {
+    fn response_share(&self, strengths: &[f64], _scene: &MotionScene, w_rad_s: f64) -> Share {
         let Some(c) = self.contact else { return Share::Cycle };
         let (w, read) = (TAU * c.hz, strengths.first().copied().unwrap_or(0.0));
         let answer = Complex::new(w * w - w_rad_s * w_rad_s, 2.0 * c.damping_ratio * w * w_rad_s);
         Share::Ratio(-read * c.drive * w_rad_s * w_rad_s / answer)
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(Backlash, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(Backlash, Vec<f64>), PhysicsError> {
         let gap = given.need(&GAP)?;
         if !given.has(&CONTACT_HZ) {
             return Ok((Backlash { gap, contact: None }, vec![1.0]));

@@ -3,9 +3,9 @@
 //! Base: x_b'' + 2 z w x_b' + w² x_b = -R i; m = x - x_b, so m = x + g w²/(s² + 2 z w s + w²) i with g = R/w².
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
-use super::key::{Bound, Key, Measure, Takes};
+use super::key::{Key, Measure, ScanEnd, Takes};
 use super::parameter::{Parameter, Unit};
-use super::sample::Scene;
+use super::sample::MotionScene;
 use super::share::Share;
 use super::unmodelled_resonance::{Ringing, scan, term};
 use std::f64::consts::TAU;
@@ -21,7 +21,7 @@ pub struct BaseMode {
 
 const FREQUENCY_HZ: Key = Key::new("frequency_hz", Unit::Hertz, "natural frequency")
     .positive()
-    .scan(Bound::At(3.0, Measure::One), Bound::Least(&[(80.0, Measure::One), (0.2, Measure::SampleRate)]));
+    .scan(ScanEnd::At(3.0, Measure::One), ScanEnd::Least(&[(80.0, Measure::One), (0.2, Measure::SampleRate)]));
 const DAMPING_RATIO: Key =
     Key::new("damping_ratio", Unit::Ratio, "damping ratio; refined from a third of the first up, below 0.3")
         .takes(Takes::Between(0.0, 1.0, "above 0 and below 1"))
@@ -59,7 +59,7 @@ impl Parametric for BaseMode {
         &FACTS
     }
 
-    fn grid(scene: &Scene) -> Vec<BaseMode> {
+    fn grid(scene: &MotionScene) -> Vec<BaseMode> {
         let high = 80f64.min(0.2 / scene.sample_time_s);
         [0.01, 0.05, 0.15].iter().flat_map(|&z| scan(3.0, high, z, scene)).map(BaseMode::at).collect()
     }
@@ -72,11 +72,11 @@ impl Parametric for BaseMode {
         vec![Some(&mut self.frequency_hz), Some(&mut self.damping_ratio)]
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Ringing::at_rest(self.frequency_hz, self.damping_ratio, scene.sample_time_s, 1))
     }
 
-    fn free_motions(&self, scene: &Scene, n: usize) -> Vec<Vec<f64>> {
+    fn free_motions(&self, scene: &MotionScene, n: usize) -> Vec<Vec<f64>> {
         let (w, z) = (TAU * self.frequency_hz, self.damping_ratio.clamp(0.0, 1.0));
         let turning = w * ((1.0 - z) * (1.0 + z)).sqrt();
         let over = |of: fn(f64) -> f64| {
@@ -86,15 +86,15 @@ impl Parametric for BaseMode {
         vec![over(f64::cos), over(f64::sin)]
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         vec![FREQUENCY_HZ.at(self.frequency_hz), DAMPING_RATIO.at(self.damping_ratio), STATIC_GAIN.at(strengths[0])]
     }
 
-    fn response_share(&self, strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, strengths: &[f64], _scene: &MotionScene, _w_rad_s: f64) -> Share {
         Share::Terms(vec![term(self.frequency_hz, self.damping_ratio, strengths[0], 0.0)])
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(BaseMode, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(BaseMode, Vec<f64>), PhysicsError> {
         let damping = given.need(&DAMPING_RATIO)?;
         let strengths = vec![given.need(&STATIC_GAIN)?];
         Ok((BaseMode::at([given.need(&FREQUENCY_HZ)?, damping]), strengths))

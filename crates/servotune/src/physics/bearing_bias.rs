@@ -5,9 +5,9 @@
 //! smallest one is no new move.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure, Prior};
+use super::key::{Key, Measure, Prior, ScanEnd};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 
 /// The bearing's memory. Its strength is the largest bias B.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,10 +23,10 @@ pub struct BearingBias {
 const BIAS_COMMAND: Key = Key::new("bias_command", Unit::Command, "largest bias, B");
 const CRITICAL_LENGTH: Key = Key::new("critical_length", Unit::Position, "move beyond which the bias grows no further")
     .positive()
-    .scan(Bound::At(0.15, Measure::Travel), Bound::At(1.5, Measure::Travel));
+    .scan(ScanEnd::At(0.15, Measure::Travel), ScanEnd::At(1.5, Measure::Travel));
 const RELAXATION_TIME_S: Key = Key::new("relaxation_time_s", Unit::Second, "time constant of the bias")
     .positive()
-    .scan(Bound::At(0.01, Measure::Record), Bound::At(3.0, Measure::Record));
+    .scan(ScanEnd::At(0.01, Measure::Record), ScanEnd::At(3.0, Measure::Record));
 const SHORTEST_MOVE: Key = Key::new("shortest_move", Unit::Position, "way back that begins a new move")
     .or_else("max(6 noise, 0.0001 travel)")
     .prior(Prior::Words("max(6 noise, 0.0001 travel), 5 and 25 times that, up to 0.1 travel"));
@@ -113,7 +113,7 @@ impl Parametric for BearingBias {
         ShownOver::Loop
     }
 
-    fn grid(scene: &Scene) -> Vec<BearingBias> {
+    fn grid(scene: &MotionScene) -> Vec<BearingBias> {
         let times = logarithmic(0.01 * scene.duration_s, 3.0 * scene.duration_s, 6);
         let shortest = (6.0 * scene.noise).max(1e-4 * scene.travel);
         let ways = [shortest, 5.0 * shortest, 25.0 * shortest].map(|w| w.min(0.1 * scene.travel));
@@ -130,7 +130,7 @@ impl Parametric for BearingBias {
         vec![Some(&mut self.critical_length), Some(&mut self.relaxation_time_s), Some(&mut self.shortest_move)]
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         let ratio = scene.sample_time_s / self.relaxation_time_s;
         let mean = -(-ratio).exp_m1() / ratio;
         Box::new(Memory {
@@ -142,7 +142,7 @@ impl Parametric for BearingBias {
         })
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         vec![
             BIAS_COMMAND.at(strengths[0]),
             CRITICAL_LENGTH.at(self.critical_length),
@@ -156,7 +156,7 @@ impl Parametric for BearingBias {
         0.01
     }
 
-    fn setting_of(given: &Given, scene: &Scene) -> Result<(BearingBias, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, scene: &MotionScene) -> Result<(BearingBias, Vec<f64>), PhysicsError> {
         let shortest_move = given.or_else(&SHORTEST_MOVE, (6.0 * scene.noise).max(1e-4 * scene.travel))?;
         let (critical_length, relaxation_time_s) = (given.need(&CRITICAL_LENGTH)?, given.need(&RELAXATION_TIME_S)?);
         let law = BearingBias { critical_length, relaxation_time_s, shortest_move };

@@ -5,9 +5,9 @@
 //! is the creep and the curvature. A free inertia has no spring of its own, so there creep time 0 stands for the plain one.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure, Prior};
+use super::key::{Key, Measure, Prior, ScanEnd};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 use crate::lti::Body;
 
 /// The cable. Its strengths are stiffness and curvature.
@@ -24,7 +24,7 @@ const QUADRATIC: Key = Key::new("quadratic", Unit::CommandPerPositionSquared, "k
 const CREEP_TIME_S: Key =
     Key::new("creep_time_s", Unit::Second, "time constant of the creep; 0 for none, which is tried on a free inertia")
         .or(0.0)
-        .scan(Bound::At(20.0, Measure::Sample), Bound::At(2.0, Measure::Record));
+        .scan(ScanEnd::At(20.0, Measure::Sample), ScanEnd::At(2.0, Measure::Record));
 const CENTRE: Key = Key::new("centre", Unit::Position, "where it does not pull, x0")
     .or_else("the middle of the stroke")
     .prior(Prior::Words("the middle of the positions"));
@@ -91,7 +91,7 @@ impl Parametric for CableSpring {
         ShownOver::Position
     }
 
-    fn grid(scene: &Scene) -> Vec<CableSpring> {
+    fn grid(scene: &MotionScene) -> Vec<CableSpring> {
         let times = logarithmic(20.0 * scene.sample_time_s, 2.0 * scene.duration_s, 10);
         let at = |creep_time_s| CableSpring { creep_time_s, centre: scene.centre };
         let mut all: Vec<CableSpring> = times.into_iter().map(|tau| at(Some(tau))).collect();
@@ -105,7 +105,7 @@ impl Parametric for CableSpring {
         vec![self.creep_time_s.as_mut(), Some(&mut self.centre)]
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         let ratio = self.creep_time_s.map_or(1.0, |tau| scene.sample_time_s / tau);
         let mean = -(-ratio).exp_m1() / ratio;
         Box::new(Cable {
@@ -117,7 +117,7 @@ impl Parametric for CableSpring {
         })
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         vec![
             STIFFNESS.at(strengths[0]),
             QUADRATIC.at(strengths[1]),
@@ -131,7 +131,7 @@ impl Parametric for CableSpring {
         0.01
     }
 
-    fn setting_of(given: &Given, scene: &Scene) -> Result<(CableSpring, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, scene: &MotionScene) -> Result<(CableSpring, Vec<f64>), PhysicsError> {
         let creep_time_s = Some(given.or(&CREEP_TIME_S)?).filter(|tau| *tau > 0.0);
         let law = CableSpring { creep_time_s, centre: given.or_else(&CENTRE, scene.centre)? };
         Ok((law, vec![given.need(&STIFFNESS)?, given.or(&QUADRATIC)?]))

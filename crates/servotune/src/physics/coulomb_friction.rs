@@ -10,10 +10,10 @@
 //! While the arm sticks they damp what swings on them; once it slides dz/dt is 0, and nothing is left of it.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure};
+use super::key::{Key, Measure, ScanEnd};
 use super::parameter::{Parameter, Unit};
 use super::pivot_friction::{BRISTLE_TIME_S, BRISTLE_TIMES, SLID, bristle_rate, bristle_time_of, dahl, shortest_loop};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 use std::cell::Cell;
 
 /// Dry friction. Its strength is the level at speed.
@@ -56,8 +56,8 @@ const SLIDING_LENGTH: Key = Key::new("sliding_length", Unit::Position, "way over
     .or_else("max(6 noise, 0.00001 travel)")
     .positive()
     .scan(
-        Bound::Greatest(&[(1.5, Measure::Noise), (3e-6, Measure::Travel)]),
-        Bound::Greatest(&[(12.0, Measure::Noise), (2e-3, Measure::Travel)]),
+        ScanEnd::Greatest(&[(1.5, Measure::Noise), (3e-6, Measure::Travel)]),
+        ScanEnd::Greatest(&[(12.0, Measure::Noise), (2e-3, Measure::Travel)]),
     );
 const CREEP_SPEED: Key = Key::new(
     "creep_speed",
@@ -66,11 +66,11 @@ const CREEP_SPEED: Key = Key::new(
 )
 .or_else("it sticks")
 .positive()
-.scan(Bound::At(1e-3, Measure::Speed), Bound::At(0.3, Measure::Speed));
+.scan(ScanEnd::At(1e-3, Measure::Speed), ScanEnd::At(0.3, Measure::Speed));
 const STRIBECK_SPEED: Key = Key::new("stribeck_speed", Unit::PositionPerSecond, "speed over which the rise falls off")
     .or_else("no rise")
     .positive()
-    .scan(Bound::At(0.015, Measure::Speed), Bound::At(0.2, Measure::Speed));
+    .scan(ScanEnd::At(0.015, Measure::Speed), ScanEnd::At(0.2, Measure::Speed));
 const STRIBECK_RISE: Key =
     Key::new("stribeck_rise", Unit::Ratio, "rise at rest over the level").beside("stribeck_speed").points(&[0.5]);
 
@@ -194,7 +194,7 @@ impl Law for Film {
 }
 
 /// Shortest and longest length: up to that from which on pre-sliding friction is told by its loop.
-fn lengths(scene: &Scene) -> [f64; 2] {
+fn lengths(scene: &MotionScene) -> [f64; 2] {
     [(1.5 * scene.noise).max(3e-6 * scene.travel), shortest_loop(scene)]
 }
 
@@ -227,7 +227,7 @@ impl Parametric for CoulombFriction {
         (place == 0).then_some(DRIER)
     }
 
-    fn grid(scene: &Scene) -> Vec<CoulombFriction> {
+    fn grid(scene: &MotionScene) -> Vec<CoulombFriction> {
         let [short, long] = lengths(scene);
         let count = 1 + (OCTAVE * (long / short).log2()).ceil().max(4.0) as usize;
         let plain = |length| CoulombFriction::sticking(length, None);
@@ -243,7 +243,7 @@ impl Parametric for CoulombFriction {
     }
 
     /// With Stribeck's rise, with damped bristles; one after the other makes both.
-    fn fuller(&self, scene: &Scene) -> Vec<(CoulombFriction, Vec<[f64; 2]>)> {
+    fn fuller(&self, scene: &MotionScene) -> Vec<(CoulombFriction, Vec<[f64; 2]>)> {
         if matches!(self.turning, Turning::Creep { .. }) {
             return Vec::new();
         }
@@ -272,7 +272,7 @@ impl Parametric for CoulombFriction {
         vec![usize::from(matches!(self.turning, Turning::Creep { .. }))]
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         let stribeck = self.stribeck;
         match self.turning {
             Turning::Length { sliding_length: length } => match self.bristle_time_s {
@@ -299,7 +299,7 @@ impl Parametric for CoulombFriction {
         rise * strengths.first().copied().unwrap_or(0.0).abs() / sliding_length
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let mut all = vec![
             LEVEL_COMMAND.at(strengths[0]),
             match self.turning {
@@ -324,7 +324,7 @@ impl Parametric for CoulombFriction {
         0.03
     }
 
-    fn setting_of(given: &Given, scene: &Scene) -> Result<(CoulombFriction, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, scene: &MotionScene) -> Result<(CoulombFriction, Vec<f64>), PhysicsError> {
         let turning = if let Some(speed) = given.get(&CREEP_SPEED)? {
             Turning::Creep { speed }
         } else {

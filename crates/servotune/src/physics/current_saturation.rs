@@ -4,9 +4,9 @@
 //! their slopes.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure, Takes};
+use super::key::{Key, Measure, ScanEnd, Takes};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 
 /// The amplifier's limit.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +23,7 @@ const WIDEST: f64 = 1.0;
 
 const LIMIT: Key = Key::new("limit", Unit::Command, "largest current, as a command")
     .positive()
-    .scan(Bound::At(0.115, Measure::Command), Bound::At(0.991, Measure::Command));
+    .scan(ScanEnd::At(0.115, Measure::Command), ScanEnd::At(0.991, Measure::Command));
 const KNEE: Key = Key::new("knee", Unit::Ratio, "half the width of the rounded corner over the limit")
     .or_else("a sharp corner")
     .takes(Takes::Between(0.0, f64::next_up(WIDEST), "a number above 0, at most 1"))
@@ -80,7 +80,7 @@ impl Parametric for CurrentSaturation {
         ShownOver::Input
     }
 
-    fn grid(scene: &Scene) -> Vec<CurrentSaturation> {
+    fn grid(scene: &MotionScene) -> Vec<CurrentSaturation> {
         // Dense towards the largest command: there few samples are touched, and each point touches others.
         let near = (0..8).map(|i| 1.0 - 0.12 * 0.7f64.powi(i));
         let far = (3..23).map(|i| f64::from(i) / 26.0);
@@ -101,7 +101,7 @@ impl Parametric for CurrentSaturation {
         usize::from(self.knee.is_some())
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Clip { limit: self.limit, knee: self.knee.unwrap_or(0.0) })
     }
 
@@ -109,7 +109,7 @@ impl Parametric for CurrentSaturation {
         true
     }
 
-    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let knee = self.knee.map(|k| KNEE.at(k));
         std::iter::once(LIMIT.at(self.limit)).chain(knee).collect()
     }
@@ -119,7 +119,7 @@ impl Parametric for CurrentSaturation {
         0.02
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(CurrentSaturation, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(CurrentSaturation, Vec<f64>), PhysicsError> {
         let knee = given.get(&KNEE)?;
         Ok((CurrentSaturation { limit: given.need(&LIMIT)?, knee }, vec![1.0]))
     }

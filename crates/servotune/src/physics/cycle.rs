@@ -5,8 +5,8 @@
 //! laws that look at the acting command. Time and spindle stand still: a disturbance adds nothing.
 
 use super::effect::{COLUMNS, Entry};
-use super::library::Setting;
-use super::sample::{Sample, Scene};
+use super::library::LawSetting;
+use super::sample::{MotionScene, Sample};
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
@@ -62,9 +62,9 @@ impl Cycle {
     }
 
     /// The phasor that an effect adds (command_unit, or position_unit at [`Entry::Position`]) against the input's sine.
-    pub fn added(&self, setting: &Setting, scene: &Scene, m: &Motion) -> Complex<f64> {
+    pub fn added(&self, setting: &LawSetting, scene: &MotionScene, m: &Motion) -> Complex<f64> {
         let (entry, columns) = (setting.facts().entry, setting.facts().columns);
-        let fine = Scene { sample_time_s: TAU / m.w_rad_s / STEPS as f64, ..scene.clone() };
+        let fine = MotionScene { sample_time_s: TAU / m.w_rad_s / STEPS as f64, ..scene.clone() };
         let mut law = setting.law.in_motion(&fine);
         let mut out = [0.0; COLUMNS];
         let mut last = Complex::new(f64::NAN, 0.0);

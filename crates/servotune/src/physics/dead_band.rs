@@ -6,9 +6,9 @@
 //! carries it through both signs and the loss fades: i = u - (1 - g) clip(u, -D, D), a band that is not wholly dead.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure, Prior, Takes};
+use super::key::{Key, Measure, Prior, ScanEnd, Takes};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 
 /// The band without an answer.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +25,7 @@ const GAINS: [f64; 3] = [0.1, 0.3, 0.6];
 const HALF_WIDTH: Key = Key::new("half_width", Unit::Command, "D")
     .unless(&["width"])
     .positive()
-    .scan(Bound::At(2e-5, Measure::Command), Bound::At(0.5, Measure::Command));
+    .scan(ScanEnd::At(2e-5, Measure::Command), ScanEnd::At(0.5, Measure::Command));
 const WIDTH: Key = Key::new("width", Unit::Command, "2 D")
     .unless(&["half_width"])
     .positive()
@@ -76,7 +76,7 @@ impl Parametric for DeadBand {
         ShownOver::Input
     }
 
-    fn grid(scene: &Scene) -> Vec<DeadBand> {
+    fn grid(scene: &MotionScene) -> Vec<DeadBand> {
         let widths = logarithmic(2e-5 * scene.command, 0.5 * scene.command, 20);
         let forms = std::iter::once(None).chain(GAINS.map(Some));
         forms
@@ -96,7 +96,7 @@ impl Parametric for DeadBand {
         usize::from(self.gain_inside.is_some())
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         // A fit may try a gain of 1 or more on its way: then nothing is lost.
         let lost = 1.0 - self.gain_inside.map_or(0.0, |g| g.clamp(0.0, 1.0));
         Box::new(Zone { half: self.half_width.abs(), lost })
@@ -111,7 +111,7 @@ impl Parametric for DeadBand {
         self.gain_inside.is_none_or(|g| g < 1.0)
     }
 
-    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let mut all = vec![HALF_WIDTH.at(self.half_width), WIDTH.at(2.0 * self.half_width)];
         if let Some(gain) = self.gain_inside {
             all.extend([GAIN_INSIDE.at(gain), LOST_COMMAND.at((1.0 - gain) * self.half_width)]);
@@ -124,7 +124,7 @@ impl Parametric for DeadBand {
         0.01
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(DeadBand, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(DeadBand, Vec<f64>), PhysicsError> {
         let half_width = if given.has(&HALF_WIDTH) { given.need(&HALF_WIDTH)? } else { 0.5 * given.need(&WIDTH)? };
         let gain = given.or(&GAIN_INSIDE)?;
         if !(0.0..1.0).contains(&gain) {

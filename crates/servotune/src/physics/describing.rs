@@ -5,8 +5,8 @@
 //! x = A sin(w t) with no command otherwise. Definition: Gelb, Vander Velde 1968, by quadrature over one cycle.
 
 use super::effect::{COLUMNS, Entry};
-use super::library::Setting;
-use super::sample::{Sample, Scene};
+use super::library::LawSetting;
+use super::sample::{MotionScene, Sample};
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
@@ -19,7 +19,7 @@ const STEADY: f64 = 1e-10;
 
 /// N(A, w) of what the effect adds, to the torque or command (command_unit) or to the position; none where no steady cycle
 /// is reached (an effect of time, such as a drift) or where `amplitude` or `w_rad_s` is not above 0.
-pub fn describing(setting: &Setting, scene: &Scene, amplitude: f64, w_rad_s: f64) -> Option<Complex<f64>> {
+pub fn describing(setting: &LawSetting, scene: &MotionScene, amplitude: f64, w_rad_s: f64) -> Option<Complex<f64>> {
     let good = |v: f64| v.is_finite() && v > 0.0;
     if !good(amplitude) || !good(w_rad_s) {
         return None;
@@ -27,7 +27,7 @@ pub fn describing(setting: &Setting, scene: &Scene, amplitude: f64, w_rad_s: f64
     let facts = setting.facts();
     // The law is sampled as finely as the cycle asks for, whatever the machine's clock.
     let step = TAU / w_rad_s / STEPS as f64;
-    let fine = Scene { sample_time_s: step, ..scene.clone() };
+    let fine = MotionScene { sample_time_s: step, ..scene.clone() };
     let mut law = setting.law.in_motion(&fine);
     let mut out = [0.0; COLUMNS];
     let mut last: Option<Complex<f64>> = None;

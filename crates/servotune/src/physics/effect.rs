@@ -5,7 +5,7 @@
 
 use super::key::Key;
 use super::parameter::Parameter;
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 use super::share::Share;
 use crate::document::Need;
 use std::collections::BTreeMap;
@@ -197,7 +197,7 @@ pub trait Parametric: Clone + PartialEq + std::fmt::Debug + Sized {
 
     /// Points of the search; one where there is nothing to search, none where these records leave the law without meaning (no spindle, for
     /// instance).
-    fn grid(scene: &Scene) -> Vec<Self>;
+    fn grid(scene: &MotionScene) -> Vec<Self>;
 
     /// Its numbers that are measures (lengths, times, frequencies), in an order of its own; none at the place of one that this form of the law
     /// has not. A law has as many places in every form.
@@ -227,13 +227,13 @@ pub trait Parametric: Clone + PartialEq + std::fmt::Debug + Sized {
     }
 
     /// The law at rest.
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law>;
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law>;
 
     /// The parameters as reports name them.
-    fn parameters(&self, strengths: &[f64], scene: &Scene) -> Vec<Parameter>;
+    fn parameters(&self, strengths: &[f64], scene: &MotionScene) -> Vec<Parameter>;
 
     /// The law and its strengths from named parameters; the inverse of [`Parametric::parameters`].
-    fn setting_of(given: &Given, scene: &Scene) -> Result<(Self, Vec<f64>), PhysicsError>;
+    fn setting_of(given: &Given, scene: &MotionScene) -> Result<(Self, Vec<f64>), PhysicsError>;
 
     /// Whether a machine can be so: a drag takes energy, it gives none. `errors` are the standard errors of the strengths, empty
     /// where they are not known yet.
@@ -331,7 +331,7 @@ pub trait Parametric: Clone + PartialEq + std::fmt::Debug + Sized {
 
     /// Fuller forms of it to be tried once it stands as it is: with what a plain form leaves out, each with the least and the greatest of
     /// every number between which a fit moves it.
-    fn fuller(&self, _scene: &Scene) -> Vec<(Self, Vec<[f64; 2]>)> {
+    fn fuller(&self, _scene: &MotionScene) -> Vec<(Self, Vec<[f64; 2]>)> {
         Vec::new()
     }
 
@@ -341,7 +341,7 @@ pub trait Parametric: Clone + PartialEq + std::fmt::Debug + Sized {
     }
 
     /// Motions of its own over `n` samples that a record may begin in, in the recorded position: what still rings from the move before.
-    fn free_motions(&self, _scene: &Scene, _n: usize) -> Vec<Vec<f64>> {
+    fn free_motions(&self, _scene: &MotionScene, _n: usize) -> Vec<Vec<f64>> {
         Vec::new()
     }
 
@@ -351,7 +351,7 @@ pub trait Parametric: Clone + PartialEq + std::fmt::Debug + Sized {
     }
 
     /// Its part in the loop's response at `w_rad_s`, sampled as the law samples it.
-    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &MotionScene, _w_rad_s: f64) -> Share {
         Share::Cycle
     }
 }

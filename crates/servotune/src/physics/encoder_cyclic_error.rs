@@ -4,9 +4,9 @@
 //! amplitudes and a phase that is not 90 degrees the second (Heydemann 1981).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure};
+use super::key::{Key, Measure, ScanEnd};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 use std::f64::consts::TAU;
 
 /// The wave of the grating. Its strengths are cosine and sine of each harmonic.
@@ -30,7 +30,7 @@ pub enum Harmonics {
 const AMPLITUDE: Key = Key::new("amplitude", Unit::Position, "first harmonic");
 const PERIOD: Key = Key::new("period", Unit::Position, "length of the wave")
     .positive()
-    .scan(Bound::Greatest(&[(8.0, Measure::Noise), (0.01, Measure::Travel)]), Bound::At(0.6, Measure::Travel));
+    .scan(ScanEnd::Greatest(&[(8.0, Measure::Noise), (0.01, Measure::Travel)]), ScanEnd::At(0.6, Measure::Travel));
 const PHASE_DEG: Key = Key::new("phase_deg", Unit::Degree, "phase").or(0.0);
 const AMPLITUDE_2: Key = Key::new("amplitude_2", Unit::Position, "second harmonic").or_else("the first alone");
 const PHASE_2_DEG: Key = Key::new("phase_2_deg", Unit::Degree, "its phase").or(0.0).beside("amplitude_2");
@@ -88,7 +88,7 @@ impl Parametric for EncoderCyclicError {
         ShownOver::Position
     }
 
-    fn grid(scene: &Scene) -> Vec<EncoderCyclicError> {
+    fn grid(scene: &MotionScene) -> Vec<EncoderCyclicError> {
         // Evenly in 1/P, seven tenths of a wave over twice the travel apart: the nearest point still sees more than half of any
         // wave, and refinement finds the rest.
         let finest = (8.0 * scene.noise).max(scene.travel / 100.0);
@@ -109,7 +109,7 @@ impl Parametric for EncoderCyclicError {
         vec![if self.second() { 2 } else { 1 }]
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Wave { period: self.period, second: self.second() })
     }
 
@@ -123,7 +123,7 @@ impl Parametric for EncoderCyclicError {
         Some(EncoderCyclicError { period: 0.5 * self.period, ..self.clone() })
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let at = |i: usize| strengths.get(i).copied().unwrap_or(0.0);
         let pair = |i: usize| (at(i).hypot(at(i + 1)), (-at(i + 1)).atan2(at(i)).to_degrees());
         let (first, second) = (pair(0), pair(2));
@@ -135,7 +135,7 @@ impl Parametric for EncoderCyclicError {
         all
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(EncoderCyclicError, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(EncoderCyclicError, Vec<f64>), PhysicsError> {
         let pair = |amplitude: f64, phase: f64| [amplitude * phase.cos(), -amplitude * phase.sin()];
         let first = pair(given.need(&AMPLITUDE)?, given.or(&PHASE_DEG)?.to_radians());
         let second = pair(given.or_else(&AMPLITUDE_2, 0.0)?, given.or(&PHASE_2_DEG)?.to_radians());

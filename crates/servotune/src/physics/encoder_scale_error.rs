@@ -6,7 +6,7 @@
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::key::{Key, Prior};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 
 /// The uneven scale. Its strengths are e2 and e3.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +59,7 @@ impl Parametric for EncoderScaleError {
         ShownOver::Position
     }
 
-    fn grid(scene: &Scene) -> Vec<EncoderScaleError> {
+    fn grid(scene: &MotionScene) -> Vec<EncoderScaleError> {
         vec![EncoderScaleError { centre: scene.centre }]
     }
 
@@ -67,11 +67,11 @@ impl Parametric for EncoderScaleError {
         vec![Some(&mut self.centre)]
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Scale { centre: self.centre })
     }
 
-    fn parameters(&self, strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], scene: &MotionScene) -> Vec<Parameter> {
         let [e2, e3] = [strengths[0], strengths[1]];
         let travel = scene.travel;
         vec![
@@ -82,7 +82,7 @@ impl Parametric for EncoderScaleError {
         ]
     }
 
-    fn setting_of(given: &Given, scene: &Scene) -> Result<(EncoderScaleError, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, scene: &MotionScene) -> Result<(EncoderScaleError, Vec<f64>), PhysicsError> {
         let law = EncoderScaleError { centre: given.or_else(&CENTRE, scene.centre)? };
         Ok((law, vec![given.need(&QUADRATIC)?, given.or(&CUBIC)?]))
     }

@@ -5,9 +5,9 @@
 //! positions and velocities (Hermite).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
-use super::key::{Bound, Key, Measure, Prior, Takes};
+use super::key::{Key, Measure, Prior, ScanEnd, Takes};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 use super::share::Share;
 
 /// The delay.
@@ -29,7 +29,7 @@ pub enum ExtraDelay {
 
 impl ExtraDelay {
     /// Delay at the start of the session (s), and what it gains over the time (s/s).
-    fn course(&self, scene: &Scene) -> [f64; 2] {
+    fn course(&self, scene: &MotionScene) -> [f64; 2] {
         match *self {
             ExtraDelay::Constant { delay_s } => [delay_s, 0.0],
             ExtraDelay::Growing { start_s, growth } => {
@@ -45,7 +45,7 @@ const LONGEST: usize = 16;
 const DELAY_S: Key = Key::new("delay_s", Unit::Second, "d")
     .unless(&["delay_growth"])
     .takes(Takes::Law("above 0 and at most 16 samples; beside delay_growth also 0"))
-    .scan(Bound::At(0.1, Measure::Sample), Bound::At(6.0, Measure::Sample));
+    .scan(ScanEnd::At(0.1, Measure::Sample), ScanEnd::At(6.0, Measure::Sample));
 const DELAY_GROWTH: Key = Key::new("delay_growth", Unit::Ratio, "g, of either sign, over the time of the session")
     .unless(&["delay_s"])
     .prior(Prior::Words("0.1 to 3 samples over the session"));
@@ -121,7 +121,7 @@ impl Parametric for ExtraDelay {
         &FACTS
     }
 
-    fn grid(scene: &Scene) -> Vec<ExtraDelay> {
+    fn grid(scene: &MotionScene) -> Vec<ExtraDelay> {
         let constant = [0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0];
         let mut all: Vec<ExtraDelay> =
             constant.iter().map(|n| ExtraDelay::Constant { delay_s: n * scene.sample_time_s }).collect();
@@ -148,26 +148,26 @@ impl Parametric for ExtraDelay {
         usize::from(matches!(self, ExtraDelay::Growing { .. }))
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         let step = scene.sample_time_s;
         let [start, growth] = self.course(scene);
         let past = [(0.0, 0.0); LONGEST + 2];
         Box::new(Late { start: start / step, growth, step, past, newest: 0, started: false })
     }
 
-    fn parameters(&self, _strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], scene: &MotionScene) -> Vec<Parameter> {
         let [start, growth] = self.course(scene);
         let grows = self.member() > 0;
         [DELAY_S.at(start)].into_iter().chain(grows.then(|| DELAY_GROWTH.at(growth))).collect()
     }
 
     /// Of one that grows the longest of the session: the loop has the least of its margin there.
-    fn response_share(&self, _strengths: &[f64], scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], scene: &MotionScene, _w_rad_s: f64) -> Share {
         let [start, growth] = self.course(scene);
         Share::Delay((start + (growth * scene.session_s).max(0.0)).min(LONGEST as f64 * scene.sample_time_s))
     }
 
-    fn setting_of(given: &Given, scene: &Scene) -> Result<(ExtraDelay, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, scene: &MotionScene) -> Result<(ExtraDelay, Vec<f64>), PhysicsError> {
         let longest = (LONGEST as f64 + 1e-9) * scene.sample_time_s;
         let growth = given.get(&DELAY_GROWTH)?;
         let start_s = if growth.is_some() { given.get(&DELAY_S)? } else { Some(given.need(&DELAY_S)?) };

@@ -11,7 +11,7 @@ use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::key::{Key, Prior};
 use super::knots::{Knots, Surface};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 use super::share::Share;
 use super::sliders::{Loading, Sliders, slider_stiffness};
 use crate::lti::{CurveEntry, CurveKnot, PhysicsEntry};
@@ -316,11 +316,11 @@ impl Parametric for FreeForm {
     }
 
     /// None: the search of the library does not look for it.
-    fn grid(_scene: &Scene) -> Vec<FreeForm> {
+    fn grid(_scene: &MotionScene) -> Vec<FreeForm> {
         Vec::new()
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         if self.port == CurvePort::TorqueOverLoading {
             let stiffness = slider_stiffness(&self.knots.at, &self.value);
             return Box::new(Loading { sliders: Sliders::of(&self.knots.at), stiffness });
@@ -340,7 +340,7 @@ impl Parametric for FreeForm {
     }
 
     /// None: its numbers are knots.
-    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         Vec::new()
     }
 
@@ -355,7 +355,7 @@ impl Parametric for FreeForm {
     }
 
     /// A reading that turns round does not tell where the arm is.
-    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &MotionScene, _w_rad_s: f64) -> Share {
         if self.port == CurvePort::TorqueOverTime {
             return Share::Outside;
         }
@@ -369,7 +369,7 @@ impl Parametric for FreeForm {
     }
 
     /// Curves are restored from their knots (`restored`), not from named numbers.
-    fn setting_of(_given: &Given, _scene: &Scene) -> Result<(FreeForm, Vec<f64>), PhysicsError> {
+    fn setting_of(_given: &Given, _scene: &MotionScene) -> Result<(FreeForm, Vec<f64>), PhysicsError> {
         Err(PhysicsError::Missing { effect: FACTS.name, parameter: "knots" })
     }
 }

@@ -5,9 +5,9 @@
 //! a temperature was recorded, tau = i (1 + c (T - T0)): copper's resistance rises by 0.39 %/K, a magnet's field falls by about 0.1 %/K.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure, Prior};
+use super::key::{Key, Measure, Prior, ScanEnd};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 use super::share::Share;
 use nalgebra::Complex;
 
@@ -41,7 +41,7 @@ const TIME_CONSTANT_S: Key =
     Key::new("time_constant_s", Unit::Second, "thermal time constant; of a session the same in its length")
         .beside("gain_change")
         .positive()
-        .scan(Bound::At(0.03, Measure::Record), Bound::At(3.0, Measure::Record));
+        .scan(ScanEnd::At(0.03, Measure::Record), ScanEnd::At(3.0, Measure::Record));
 const FROM_SESSION_START: Key = Key::new(
     "from_session_start",
     Unit::Ratio,
@@ -103,7 +103,7 @@ impl Parametric for GainDrift {
         ShownOver::FactorOverTime
     }
 
-    fn grid(scene: &Scene) -> Vec<GainDrift> {
+    fn grid(scene: &MotionScene) -> Vec<GainDrift> {
         let mut all = if scene.warm { vec![GainDrift::ByTemperature] } else { Vec::new() };
         // A time constant much above record or session is a straight line in time already.
         let record = logarithmic(0.03 * scene.duration_s, 3.0 * scene.duration_s, 7);
@@ -127,7 +127,7 @@ impl Parametric for GainDrift {
         vec![usize::from(matches!(self, GainDrift::Warming { from: Start::Session, .. }))]
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         let &GainDrift::Warming { time_constant_s: tau, from } = self else { return Box::new(ByTemperature) };
         let ratio = scene.sample_time_s / tau;
         Box::new(Warming { tau, session: from == Start::Session, mean: -(-ratio).exp_m1() / ratio })
@@ -137,7 +137,7 @@ impl Parametric for GainDrift {
         true
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         match *self {
             GainDrift::ByTemperature => vec![GAIN_PER_DEGREE.at(strengths[0])],
             GainDrift::Warming { time_constant_s, from } => vec![
@@ -148,13 +148,13 @@ impl Parametric for GainDrift {
         }
     }
 
-    fn response_share(&self, strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, strengths: &[f64], _scene: &MotionScene, _w_rad_s: f64) -> Share {
         // Fully warm: the machine after a long session. With a recorded temperature the cold machine.
         let warm = matches!(self, GainDrift::Warming { .. });
         Share::Ratio(Complex::new(if warm { strengths[0] } else { 0.0 }, 0.0))
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(GainDrift, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(GainDrift, Vec<f64>), PhysicsError> {
         if given.has(&GAIN_PER_DEGREE) {
             return Ok((GainDrift::ByTemperature, vec![given.need(&GAIN_PER_DEGREE)?]));
         }

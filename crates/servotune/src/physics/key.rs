@@ -4,7 +4,7 @@
 //! ranges of the search against the grids.
 
 use super::parameter::{Parameter, Unit};
-use super::sample::Scene;
+use super::sample::MotionScene;
 use crate::document::Need;
 
 /// One key of a law.
@@ -45,7 +45,7 @@ pub enum Prior {
     /// Nothing: a strength, estimated freely.
     Free,
     /// A scan of its size from one to the other; 0 stands for what this form lacks.
-    Scan(Bound, Bound),
+    Scan(ScanEnd, ScanEnd),
     /// These numbers, one by one.
     Points(&'static [f64]),
     /// What the words say.
@@ -54,7 +54,7 @@ pub enum Prior {
 
 /// An end of a scan, in measures of the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Bound {
+pub enum ScanEnd {
     /// So many of one.
     At(f64, Measure),
     /// The greatest of several.
@@ -94,7 +94,7 @@ pub enum Measure {
 
 impl Measure {
     /// Its size in a scene; 0 without a spindle.
-    pub fn of(self, scene: &Scene) -> f64 {
+    pub fn of(self, scene: &MotionScene) -> f64 {
         match self {
             Measure::One => 1.0,
             Measure::Noise => scene.noise,
@@ -129,14 +129,14 @@ impl Measure {
     }
 }
 
-impl Bound {
+impl ScanEnd {
     /// Its size in a scene.
-    pub fn of(self, scene: &Scene) -> f64 {
+    pub fn of(self, scene: &MotionScene) -> f64 {
         let size = |(by, measure): &(f64, Measure)| by * measure.of(scene);
         match self {
-            Bound::At(by, measure) => by * measure.of(scene),
-            Bound::Greatest(all) => all.iter().map(size).fold(f64::NEG_INFINITY, f64::max),
-            Bound::Least(all) => all.iter().map(size).fold(f64::INFINITY, f64::min),
+            ScanEnd::At(by, measure) => by * measure.of(scene),
+            ScanEnd::Greatest(all) => all.iter().map(size).fold(f64::NEG_INFINITY, f64::max),
+            ScanEnd::Least(all) => all.iter().map(size).fold(f64::INFINITY, f64::min),
         }
     }
 
@@ -145,9 +145,9 @@ impl Bound {
         let list =
             |all: &[(f64, Measure)]| all.iter().map(|(by, measure)| measure.times(*by)).collect::<Vec<_>>().join(", ");
         match self {
-            Bound::At(by, measure) => measure.times(by),
-            Bound::Greatest(all) => format!("max({})", list(all)),
-            Bound::Least(all) => format!("min({})", list(all)),
+            ScanEnd::At(by, measure) => measure.times(by),
+            ScanEnd::Greatest(all) => format!("max({})", list(all)),
+            ScanEnd::Least(all) => format!("min({})", list(all)),
         }
     }
 }
@@ -226,7 +226,7 @@ impl Key {
     }
 
     /// The same, scanned.
-    pub const fn scan(self, from: Bound, to: Bound) -> Key {
+    pub const fn scan(self, from: ScanEnd, to: ScanEnd) -> Key {
         self.prior(Prior::Scan(from, to))
     }
 

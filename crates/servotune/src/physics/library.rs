@@ -5,7 +5,7 @@
 
 use super::effect::{Facts, Given, Law, Parametric, PhysicsError, ShownOver};
 use super::parameter::Parameter;
-use super::sample::Scene;
+use super::sample::MotionScene;
 use super::share::Share;
 use super::{
     aliased_mode, broadband_disturbance, controller_mismatch, encoder_noise, free_form, jitter, linear_parameters,
@@ -100,22 +100,22 @@ use super::free_form::FreeForm;
 
 /// A law with its numbers and its strengths, one a column.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Setting {
+pub struct LawSetting {
     /// The law.
     pub law: AnyLaw,
     /// Strengths, in the law's own order; of every record one after another where they differ from record to record.
     pub strengths: Vec<f64>,
 }
 
-impl Setting {
+impl LawSetting {
     /// A law with strengths.
-    pub fn new(law: impl Into<AnyLaw>, strengths: Vec<f64>) -> Setting {
-        Setting { law: law.into(), strengths }
+    pub fn new(law: impl Into<AnyLaw>, strengths: Vec<f64>) -> LawSetting {
+        LawSetting { law: law.into(), strengths }
     }
 
     /// A law whose strength is 1 by definition.
-    pub fn fixed(law: impl Into<AnyLaw>) -> Setting {
-        Setting::new(law, vec![1.0])
+    pub fn fixed(law: impl Into<AnyLaw>) -> LawSetting {
+        LawSetting::new(law, vec![1.0])
     }
 
     /// What is known of it beforehand.
@@ -124,7 +124,7 @@ impl Setting {
     }
 
     /// [`Parametric::parameters`].
-    pub fn parameters(&self, scene: &Scene) -> Vec<Parameter> {
+    pub fn parameters(&self, scene: &MotionScene) -> Vec<Parameter> {
         each!(&self.law, law => law.parameters(&self.strengths, scene))
     }
 
@@ -139,7 +139,7 @@ impl Setting {
     }
 
     /// [`Parametric::response_share`].
-    pub fn response_share(&self, scene: &Scene, w_rad_s: f64) -> Share {
+    pub fn response_share(&self, scene: &MotionScene, w_rad_s: f64) -> Share {
         each!(&self.law, law => law.response_share(&self.strengths, scene, w_rad_s))
     }
 }
@@ -216,7 +216,7 @@ impl AnyLaw {
     }
 
     /// [`Parametric::in_motion`].
-    pub fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    pub fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         each!(self, law => law.in_motion(scene))
     }
 
@@ -236,7 +236,7 @@ impl AnyLaw {
     }
 
     /// [`Parametric::fuller`].
-    pub fn fuller(&self, scene: &Scene) -> Vec<(AnyLaw, Vec<[f64; 2]>)> {
+    pub fn fuller(&self, scene: &MotionScene) -> Vec<(AnyLaw, Vec<[f64; 2]>)> {
         each!(self, law => law.fuller(scene).into_iter().map(|(law, ranges)| (law.into(), ranges)).collect())
     }
 
@@ -246,7 +246,7 @@ impl AnyLaw {
     }
 
     /// [`Parametric::free_motions`].
-    pub fn free_motions(&self, scene: &Scene, n: usize) -> Vec<Vec<f64>> {
+    pub fn free_motions(&self, scene: &MotionScene, n: usize) -> Vec<Vec<f64>> {
         each!(self, law => law.free_motions(scene, n))
     }
 
@@ -261,8 +261,8 @@ impl AnyLaw {
 pub trait Effect: Sync {
     /// [`Parametric::known`].
     fn facts(&self) -> &'static Facts;
-    fn grid(&self, scene: &Scene) -> Vec<AnyLaw>;
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError>;
+    fn grid(&self, scene: &MotionScene) -> Vec<AnyLaw>;
+    fn setting_of(&self, given: &Given, scene: &MotionScene) -> Result<LawSetting, PhysicsError>;
     fn finer_simulated(&self, place: usize) -> Option<f64>;
     fn shown_over(&self) -> ShownOver;
     fn is_drag(&self) -> bool;
@@ -296,12 +296,12 @@ where
         L::known()
     }
 
-    fn grid(&self, scene: &Scene) -> Vec<AnyLaw> {
+    fn grid(&self, scene: &MotionScene) -> Vec<AnyLaw> {
         L::grid(scene).into_iter().map(AnyLaw::from).collect()
     }
 
-    fn setting_of(&self, given: &Given, scene: &Scene) -> Result<Setting, PhysicsError> {
-        L::setting_of(given, scene).map(|(law, strengths)| Setting::new(law, strengths))
+    fn setting_of(&self, given: &Given, scene: &MotionScene) -> Result<LawSetting, PhysicsError> {
+        L::setting_of(given, scene).map(|(law, strengths)| LawSetting::new(law, strengths))
     }
 
     fn finer_simulated(&self, place: usize) -> Option<f64> {

@@ -3,9 +3,9 @@
 //! tau = a cos(2 pi f t) + b sin(2 pi f t); the mean over an interval is the value at its middle times sin(y)/y, y = pi f T.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
-use super::key::{Bound, Key, Measure};
+use super::key::{Key, Measure, ScanEnd};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 use super::share::Share;
 use std::f64::consts::{PI, TAU};
 
@@ -23,8 +23,8 @@ const FREQUENCY_HZ: Key = Key::new(
 )
 .positive()
 .scan(
-    Bound::Least(&[(50.0, Measure::One), (3.0, Measure::Line)]),
-    Bound::Least(&[(1000.0, Measure::One), (0.45, Measure::SampleRate)]),
+    ScanEnd::Least(&[(50.0, Measure::One), (3.0, Measure::Line)]),
+    ScanEnd::Least(&[(1000.0, Measure::One), (0.45, Measure::SampleRate)]),
 );
 const AMPLITUDE_COMMAND: Key = Key::new("amplitude_command", Unit::Command, "a");
 const PHASE_DEG: Key = Key::new("phase_deg", Unit::Degree, "phase").or(0.0);
@@ -95,7 +95,7 @@ impl Parametric for LineDisturbance {
         &FACTS
     }
 
-    fn grid(scene: &Scene) -> Vec<LineDisturbance> {
+    fn grid(scene: &MotionScene) -> Vec<LineDisturbance> {
         let high = 1000f64.min(0.45 / scene.sample_time_s);
         // Mains of 50 and 60 Hz with harmonics, and rectified, first; then everything that the longest record resolves.
         let mut all: Vec<f64> = Vec::new();
@@ -115,7 +115,7 @@ impl Parametric for LineDisturbance {
         vec![Some(&mut self.frequency_hz)]
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         let y = PI * self.frequency_hz * scene.sample_time_s;
         let (sin, cos) = (2.0 * y).sin_cos();
         Box::new(Line {
@@ -134,7 +134,7 @@ impl Parametric for LineDisturbance {
         true
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let [a, b] = [strengths[0], strengths[1]];
         vec![
             FREQUENCY_HZ.at(self.frequency_hz),
@@ -159,11 +159,11 @@ impl Parametric for LineDisturbance {
         chi < free + 3.0 * (2.0 * free).sqrt()
     }
 
-    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &MotionScene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(LineDisturbance, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(LineDisturbance, Vec<f64>), PhysicsError> {
         let (amplitude, phase) = (given.need(&AMPLITUDE_COMMAND)?, given.or(&PHASE_DEG)?.to_radians());
         let strengths = vec![amplitude * phase.cos(), -amplitude * phase.sin()];
         Ok((LineDisturbance { frequency_hz: given.need(&FREQUENCY_HZ)? }, strengths))

@@ -5,8 +5,8 @@
 //! arm and law swing within few samples (a dry drag that holds), a sample is made in several steps.
 
 use super::effect::{COLUMNS, Entry, Law, Port};
-use super::library::Setting;
-use super::sample::{Sample, Scene};
+use super::library::LawSetting;
+use super::sample::{MotionScene, Sample};
 use crate::lti::{DiscretePlant, Intersample, LtiError, Plant, PlantState};
 
 struct Part {
@@ -26,8 +26,8 @@ impl Part {
 
 /// One simulated machine, from rest at position 0.
 ///
-/// Order of calls for sample k: [`Machine::measure`], then [`Machine::command`].
-pub struct Machine {
+/// Order of calls for sample k: [`SimulatedMachine::measure`], then [`SimulatedMachine::command`].
+pub struct SimulatedMachine {
     delayed: DiscretePlant,
     /// The same without delay, sampled at the steps of the torque.
     direct: DiscretePlant,
@@ -83,7 +83,7 @@ const SECANTS: usize = 90;
 const SWING: f64 = 0.2;
 const MOST_STEPS: usize = 16;
 
-/// Where a position between two samples is read: see [`Machine::reading`].
+/// Where a position between two samples is read: see [`SimulatedMachine::reading`].
 #[derive(Clone, Debug)]
 pub struct Reading {
     command: Intersample,
@@ -93,7 +93,7 @@ pub struct Reading {
 }
 
 /// Steps of a sample that a plant needs with these effects; a power of two, so that few changes of their numbers change it.
-fn steps(plant: &Plant, effects: &[&Setting], t: f64) -> Result<usize, LtiError> {
+fn steps(plant: &Plant, effects: &[&LawSetting], t: f64) -> Result<usize, LtiError> {
     let stiffest = effects.iter().map(|s| s.stiffness()).fold(0.0f64, f64::max);
     if stiffest <= 0.0 {
         return Ok(1);
@@ -116,9 +116,9 @@ fn reach(direct: &DiscretePlant) -> f64 {
     unit.position()
 }
 
-impl Machine {
+impl SimulatedMachine {
     /// The same machine, at rest at `origin` under a standing command, springs and cables in balance, instead of at 0.
-    pub fn started_at(mut self, origin: f64, command: f64) -> Machine {
+    pub fn started_at(mut self, origin: f64, command: f64) -> SimulatedMachine {
         self.origin = origin;
         self.x = [origin; 3];
         self.path = [origin; 2];
@@ -134,12 +134,12 @@ impl Machine {
     }
 
     /// The same machine, started that long after its session began (s).
-    pub fn begun_at(self, session_s: f64) -> Machine {
-        Machine { began_s: session_s, ..self }
+    pub fn begun_at(self, session_s: f64) -> SimulatedMachine {
+        SimulatedMachine { began_s: session_s, ..self }
     }
 
     /// The same machine, started at rest but not in balance: beside command and laws a constant torque acts (command_unit).
-    pub fn held_by(mut self, torque: f64, gain_at_rest: f64) -> Machine {
+    pub fn held_by(mut self, torque: f64, gain_at_rest: f64) -> SimulatedMachine {
         let spring = if gain_at_rest.is_finite() && gain_at_rest != 0.0 { self.origin / gain_at_rest } else { 0.0 };
         self.standing = [spring - torque, 0.0];
         self.w = [0.0; 2];
@@ -148,7 +148,7 @@ impl Machine {
 
     /// The same machine with a motion that neither command nor law makes: the answer to a start in full swing or to a hum
     /// (position_unit, a value per sample). The laws feel it.
-    pub fn carried_by(mut self, free: Vec<f64>) -> Machine {
+    pub fn carried_by(mut self, free: Vec<f64>) -> SimulatedMachine {
         if let [first, second, ..] = free[..] {
             // The positions before the first sample, for the speed there.
             self.x = [0.0, 1.0, 2.0].map(|k| self.x[0] + first + k * (first - second));
@@ -161,7 +161,7 @@ impl Machine {
     }
 
     /// The same machine, its laws led along the turns before it began to where it begins.
-    pub fn led_by(mut self, turned: &[f64]) -> Machine {
+    pub fn led_by(mut self, turned: &[f64]) -> SimulatedMachine {
         let (begins, scale) = (self.x[0], self.arm);
         self.torque.iter_mut().for_each(|p| p.law.led(turned, begins, scale));
         self
@@ -173,7 +173,7 @@ impl Machine {
     }
 
     /// A machine with these effects; `scene` says what the laws need to know of it.
-    pub fn new(plant: &Plant, effects: &[&Setting], scene: &Scene) -> Result<Machine, LtiError> {
+    pub fn new(plant: &Plant, effects: &[&LawSetting], scene: &MotionScene) -> Result<SimulatedMachine, LtiError> {
         let t = scene.sample_time_s;
         let steps = steps(plant, effects, t)?;
         let delayed = DiscretePlant::of(plant, t)?;
@@ -194,7 +194,7 @@ impl Machine {
             }
         }
         let history = vec![0.0; delayed.whole_delay_samples() + 2];
-        Ok(Machine {
+        Ok(SimulatedMachine {
             reach: reach(&direct),
             path: [0.0; 2],
             speed: 0.0,
@@ -252,7 +252,7 @@ impl Machine {
         self.offset
     }
 
-    /// How [`Machine::between`] reads the position `offset_s` after a sample, 0 <= offset < T; from the next command on it can.
+    /// How [`SimulatedMachine::between`] reads the position `offset_s` after a sample, 0 <= offset < T; from the next command on it can.
     pub fn reading(&mut self, offset_s: f64) -> Reading {
         self.read = true;
         let step_s = self.direct.sample_time_s();
@@ -261,7 +261,7 @@ impl Machine {
         Reading { command: self.delayed.intersample(offset_s), torque, step }
     }
 
-    /// Position of the arm between the last sample and the next, after [`Machine::command`].
+    /// Position of the arm between the last sample and the next, after [`SimulatedMachine::command`].
     ///
     /// Exact for the command. The torque is taken at its mean over each step: second order in it.
     pub fn between(&self, at: &Reading) -> f64 {

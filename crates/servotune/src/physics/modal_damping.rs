@@ -12,7 +12,7 @@ use super::key::{Key, Prior};
 use super::mode_shift::{MODE, MODE_HZ, ModeForm, STAGE, mode};
 use super::pair::{Pair, Turn};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 use super::stage::{Next, Stage};
 use nalgebra::Complex;
 use std::cell::Cell;
@@ -132,7 +132,7 @@ impl Parametric for ModalDamping {
         &FACTS
     }
 
-    fn grid(scene: &Scene) -> Vec<ModalDamping> {
+    fn grid(scene: &MotionScene) -> Vec<ModalDamping> {
         let mut all = Vec::new();
         let at = |mode, growth, form| ModalDamping { mode, growth, form };
         for (j, pair) in Pair::all(scene) {
@@ -165,7 +165,7 @@ impl Parametric for ModalDamping {
         self.mode
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         if self.form == ModeForm::Stage
             && let Some(stage) = Stage::of(scene, self.mode)
         {
@@ -174,7 +174,7 @@ impl Parametric for ModalDamping {
         Box::new(Joint::of(Pair::of(scene, self.mode), self.growth, scene.sample_time_s))
     }
 
-    fn parameters(&self, _strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], scene: &MotionScene) -> Vec<Parameter> {
         let mut all =
             vec![MODE.at(self.mode as f64), GROWTH.at(self.growth), STAGE.at(f64::from(self.form == ModeForm::Stage))];
         if let Some(pair) = Pair::of(scene, self.mode) {
@@ -183,7 +183,7 @@ impl Parametric for ModalDamping {
         all
     }
 
-    fn setting_of(given: &Given, scene: &Scene) -> Result<(ModalDamping, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, scene: &MotionScene) -> Result<(ModalDamping, Vec<f64>), PhysicsError> {
         let form = ModeForm::of(given.or(&STAGE)?);
         Ok((ModalDamping { mode: mode(given, scene)?, growth: given.need(&GROWTH)?, form }, vec![1.0]))
     }

@@ -11,10 +11,10 @@
 //! Or, where the resonance is a stage of a chain, its pole and zero move together (`physics::stage`).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
-use super::key::{Bound, Key, Measure, Prior, Takes};
+use super::key::{Key, Measure, Prior, ScanEnd, Takes};
 use super::pair::{Pair, Turn};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 use super::stage::{Next, Stage};
 use nalgebra::Complex;
 use std::cell::Cell;
@@ -88,7 +88,7 @@ pub(super) const MODE: Key = Key::new("mode", Unit::Ratio, "its number in `plant
     .prior(Prior::Words("every mode of the plant that rings"));
 const SHIFT_PER_POSITION: Key = Key::new("shift_per_position", Unit::PerPosition, "c, of either sign")
     .unless(&["shift_per_amplitude_squared"])
-    .scan(Bound::At(1e-3, Measure::PerTravel), Bound::At(0.1, Measure::PerTravel));
+    .scan(ScanEnd::At(1e-3, Measure::PerTravel), ScanEnd::At(0.1, Measure::PerTravel));
 const CENTRE: Key = Key::new("centre", Unit::Position, "where it has the frequency of the plant, x0")
     .or_else("the middle of the stroke")
     .beside("shift_per_position")
@@ -220,7 +220,7 @@ impl Parametric for ModeShift {
         &FACTS
     }
 
-    fn grid(scene: &Scene) -> Vec<ModeShift> {
+    fn grid(scene: &MotionScene) -> Vec<ModeShift> {
         if scene.travel <= 0.0 {
             return Vec::new();
         }
@@ -264,7 +264,7 @@ impl Parametric for ModeShift {
         2 * self.mode + usize::from(self.goes.by_amplitude())
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         if self.form == ModeForm::Stage
             && let Some(stage) = Stage::of(scene, self.mode)
         {
@@ -273,7 +273,7 @@ impl Parametric for ModeShift {
         Box::new(Shifted::of(Pair::of(scene, self.mode), self.goes, scene.sample_time_s))
     }
 
-    fn parameters(&self, _strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], scene: &MotionScene) -> Vec<Parameter> {
         let mut all = vec![MODE.at(self.mode as f64)];
         match self.goes {
             ShiftGoes::ByPosition { shift_per_position, centre } => all.extend([
@@ -292,7 +292,7 @@ impl Parametric for ModeShift {
         all
     }
 
-    fn setting_of(given: &Given, scene: &Scene) -> Result<(ModeShift, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, scene: &MotionScene) -> Result<(ModeShift, Vec<f64>), PhysicsError> {
         let mode = mode(given, scene)?;
         let form = ModeForm::of(given.or(&STAGE)?);
         // Beside a shift over the position one by amplitude is a key that has no meaning.
@@ -310,7 +310,7 @@ impl Parametric for ModeShift {
 }
 
 /// The number of a mode that the plant has, counted from 0 as in `plant.modes`.
-pub(super) fn mode(given: &Given, scene: &Scene) -> Result<usize, PhysicsError> {
+pub(super) fn mode(given: &Given, scene: &MotionScene) -> Result<usize, PhysicsError> {
     let found = given.need(&MODE)?;
     if found.fract() == 0.0 && found >= 0.0 && Pair::of(scene, found as usize).is_some() {
         return Ok(found as usize);

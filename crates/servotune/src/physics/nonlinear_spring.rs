@@ -6,7 +6,7 @@
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::key::{Key, Prior};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 
 /// The spring. Its strength is k3 or the stop's stiffness.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,7 +97,7 @@ impl Parametric for NonlinearSpring {
         ShownOver::Position
     }
 
-    fn grid(scene: &Scene) -> Vec<NonlinearSpring> {
+    fn grid(scene: &MotionScene) -> Vec<NonlinearSpring> {
         let at = |stiffening| NonlinearSpring { centre: scene.centre, stiffening };
         let mut all = vec![at(Stiffening::Cubic)];
         for share in [0.3, 0.5, 0.65, 0.8, 0.9] {
@@ -114,11 +114,11 @@ impl Parametric for NonlinearSpring {
         vec![Some(&mut self.centre), offset]
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Spring { centre: self.centre, stiffening: self.stiffening })
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let centre = CENTRE.at(self.centre);
         match self.stiffening {
             Stiffening::Cubic => vec![CUBIC.at(strengths[0]), centre],
@@ -133,7 +133,7 @@ impl Parametric for NonlinearSpring {
         0.01
     }
 
-    fn setting_of(given: &Given, scene: &Scene) -> Result<(NonlinearSpring, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, scene: &MotionScene) -> Result<(NonlinearSpring, Vec<f64>), PhysicsError> {
         let centre = given.or_else(&CENTRE, scene.centre)?;
         if given.has(&STOP_STIFFNESS) {
             let offset = given.need(&STOP_POSITION)? - centre;

@@ -5,7 +5,7 @@
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::key::Key;
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 use super::share::Share;
 
 /// Its strengths are slope and curvature, per record.
@@ -46,11 +46,11 @@ impl Parametric for OffsetDrift {
         &FACTS
     }
 
-    fn grid(_scene: &Scene) -> Vec<OffsetDrift> {
+    fn grid(_scene: &MotionScene) -> Vec<OffsetDrift> {
         vec![OffsetDrift]
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Drift)
     }
 
@@ -58,15 +58,15 @@ impl Parametric for OffsetDrift {
         true
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         vec![SLOPE.at(strengths[0]), CURVATURE.at(strengths[1])]
     }
 
-    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &MotionScene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(OffsetDrift, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(OffsetDrift, Vec<f64>), PhysicsError> {
         Ok((OffsetDrift, vec![given.need(&SLOPE)?, given.or(&CURVATURE)?]))
     }
 }

@@ -3,7 +3,7 @@
 //! In: plant, number of the mode. Out: the pair whose response 2 Re(r/(s - p)) is the mode's share of the position.
 //! Convention: as in `lti::ModalForm`; `specs/mismatch.md`.
 
-use super::sample::Scene;
+use super::sample::MotionScene;
 use crate::lti::ModalForm;
 use nalgebra::Complex;
 
@@ -16,7 +16,7 @@ pub(super) struct Pair {
 
 impl Pair {
     /// The pair of `plant.modes[mode]`; none where there is no such mode or it does not ring.
-    pub(super) fn of(scene: &Scene, mode: usize) -> Option<Pair> {
+    pub(super) fn of(scene: &MotionScene, mode: usize) -> Option<Pair> {
         let found = scene.plant.modes.get(mode)?;
         let (w, z) = (found.pole_rad_s, found.pole_damping_ratio);
         if z >= 1.0 {
@@ -30,7 +30,7 @@ impl Pair {
     }
 
     /// Numbers of the modes that have a pair.
-    pub(super) fn all(scene: &Scene) -> Vec<(usize, Pair)> {
+    pub(super) fn all(scene: &MotionScene) -> Vec<(usize, Pair)> {
         (0..scene.plant.modes.len()).filter_map(|j| Some((j, Pair::of(scene, j)?))).collect()
     }
 }

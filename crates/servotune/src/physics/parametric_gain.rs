@@ -5,7 +5,7 @@
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::key::{Key, Prior};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 use super::share::Share;
 use std::f64::consts::{PI, TAU};
 
@@ -92,7 +92,7 @@ impl Parametric for ParametricGain {
         ShownOver::FactorOverTime
     }
 
-    fn grid(scene: &Scene) -> Vec<ParametricGain> {
+    fn grid(scene: &MotionScene) -> Vec<ParametricGain> {
         let mut all: Vec<ParametricGain> = Vec::new();
         if let Some(spindle) = scene.spindle_hz {
             let order = |n: usize| ParametricGain { frequency_hz: n as f64 * spindle, clock: Clock::Spindle(n) };
@@ -116,7 +116,7 @@ impl Parametric for ParametricGain {
         vec![self.order()]
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         let order = self.order() as f64;
         let hz =
             if order > 0.0 { scene.spindle_hz.map_or(self.frequency_hz, |s| order * s) } else { self.frequency_hz };
@@ -128,7 +128,7 @@ impl Parametric for ParametricGain {
         true
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let [a, b] = [strengths[0], strengths[1]];
         vec![
             DEPTH.at(a.hypot(b)),
@@ -138,11 +138,11 @@ impl Parametric for ParametricGain {
         ]
     }
 
-    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &MotionScene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(ParametricGain, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(ParametricGain, Vec<f64>), PhysicsError> {
         let (depth, phase) = (given.need(&DEPTH)?, given.or(&PHASE_DEG)?.to_radians());
         let clock = match given.or(&SPINDLE_ORDER)?.round().max(0.0) as usize {
             0 => Clock::Time,

@@ -11,9 +11,9 @@
 //! on the bearing while it sticks and is gone once it slides.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure, Prior, Takes};
+use super::key::{Key, Measure, Prior, ScanEnd, Takes};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 
 /// The bearing. Its strength is the sliding level.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,7 +40,7 @@ pub enum Loading {
 
 const SLIDING_LENGTH: Key = Key::new("sliding_length", Unit::Position, "sliding level over the first stiffness")
     .positive()
-    .scan(Bound::Greatest(&[(12.0, Measure::Noise), (2e-3, Measure::Travel)]), Bound::At(4.0, Measure::Travel));
+    .scan(ScanEnd::Greatest(&[(12.0, Measure::Noise), (2e-3, Measure::Travel)]), ScanEnd::At(4.0, Measure::Travel));
 const LEVEL_COMMAND: Key = Key::new("level_command", Unit::Command, "drag once it slides, F");
 const SHAPE: Key = Key::new("shape", Unit::Ratio, "0: Dahl; above 0 a Maxwell-slip row with the first loading 1 - (1 + m d/x_s)^(-1/m), m = shape/2 - 1: 1 a parabola, 2 the curve of Dahl, towards 0 one spring that slips; the last fit moves it between 0.1 and 3.5").or(0.0).points(&[0.0, 1.0, 2.0]);
 /// Damping of the bristles, of every drag that sticks.
@@ -200,7 +200,7 @@ fn loaded_to(left: f64, tail: f64) -> f64 {
 }
 
 /// Shortest sliding length whose hysteresis is told from dry friction: some twelve times the sensor's noise, or a small share of the travel.
-pub(crate) fn shortest_loop(scene: &Scene) -> f64 {
+pub(crate) fn shortest_loop(scene: &MotionScene) -> f64 {
     (12.0 * scene.noise).max(2e-3 * scene.travel)
 }
 
@@ -251,7 +251,7 @@ impl Parametric for PivotFriction {
         ShownOver::Loop
     }
 
-    fn grid(scene: &Scene) -> Vec<PivotFriction> {
+    fn grid(scene: &MotionScene) -> Vec<PivotFriction> {
         let lengths = logarithmic(shortest_loop(scene), 4.0 * scene.travel, 14);
         let loadings = [0.0, 1.0, 2.0].map(Loading::of);
         let each = |sliding_length| loadings.map(|loading| PivotFriction::of(sliding_length, loading));
@@ -267,7 +267,7 @@ impl Parametric for PivotFriction {
     }
 
     /// With damped bristles.
-    fn fuller(&self, scene: &Scene) -> Vec<(PivotFriction, Vec<[f64; 2]>)> {
+    fn fuller(&self, scene: &MotionScene) -> Vec<(PivotFriction, Vec<[f64; 2]>)> {
         if self.bristle_time_s.is_some() {
             return Vec::new();
         }
@@ -280,7 +280,7 @@ impl Parametric for PivotFriction {
         Some(self.sliding_length)
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         let (length, bristle_time_s) = (self.sliding_length, self.bristle_time_s.unwrap_or(0.0));
         match self.loading {
             Loading::Dahl => Box::new(Dahl { length, bristle_time_s, z: 0.0 }),
@@ -298,7 +298,7 @@ impl Parametric for PivotFriction {
         true
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let mut all = vec![
             SLIDING_LENGTH.at(self.sliding_length),
             LEVEL_COMMAND.at(strengths[0]),
@@ -332,7 +332,7 @@ impl Parametric for PivotFriction {
         }
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(PivotFriction, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(PivotFriction, Vec<f64>), PhysicsError> {
         let sliding_length = given.need(&SLIDING_LENGTH)?;
         let loading = Loading::of(given.or(&SHAPE)?);
         let law = PivotFriction { sliding_length, loading, bristle_time_s: bristle_time_of(given)? };

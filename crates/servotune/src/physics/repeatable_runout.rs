@@ -4,9 +4,9 @@
 //! not of hertz: where the spindle's speed moves, the lines move with it.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure};
+use super::key::{Key, Measure, ScanEnd};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 use super::share::Share;
 use std::f64::consts::TAU;
 
@@ -19,7 +19,7 @@ pub struct RepeatableRunout {
 
 const BASE_HZ: Key = Key::new("base_hz", Unit::Hertz, "base order")
     .positive()
-    .scan(Bound::At(1.0, Measure::Spindle), Bound::At(8.0, Measure::Spindle));
+    .scan(ScanEnd::At(1.0, Measure::Spindle), ScanEnd::At(8.0, Measure::Spindle));
 const AMPLITUDE: Key = Key::new("amplitude", Unit::Position, "first harmonic");
 const PHASE_DEG: Key = Key::new("phase_deg", Unit::Degree, "its phase").or(0.0);
 const AMPLITUDE_2: Key = Key::new("amplitude_2", Unit::Position, "second harmonic").or(0.0);
@@ -72,7 +72,7 @@ impl Parametric for RepeatableRunout {
         ShownOver::Spindle
     }
 
-    fn grid(scene: &Scene) -> Vec<RepeatableRunout> {
+    fn grid(scene: &MotionScene) -> Vec<RepeatableRunout> {
         let Some(spindle) = scene.spindle_hz else { return Vec::new() };
         (1..=8)
             .map(|n| f64::from(n) * spindle)
@@ -85,7 +85,7 @@ impl Parametric for RepeatableRunout {
         vec![Some(&mut self.base_hz)]
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         // A recorded angle may wrap at one turn: only whole orders may be taken from it.
         let ratio = scene.spindle_hz.map(|s| self.base_hz / s);
         let order = ratio.map(f64::round).filter(|n| *n >= 1.0 && ratio.is_some_and(|r| (r - n).abs() < 1e-2));
@@ -96,7 +96,7 @@ impl Parametric for RepeatableRunout {
         true
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let mut all = vec![BASE_HZ.at(self.base_hz)];
         for (h, pair) in strengths.chunks_exact(2).take(3).enumerate() {
             all.push(AMPLITUDES[h].at(pair[0].hypot(pair[1])));
@@ -105,11 +105,11 @@ impl Parametric for RepeatableRunout {
         all
     }
 
-    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &MotionScene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(RepeatableRunout, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(RepeatableRunout, Vec<f64>), PhysicsError> {
         let mut strengths = Vec::with_capacity(6);
         for h in 0..3 {
             let (amplitude, phase) = (given.or(&AMPLITUDES[h])?, given.or(&PHASES[h])?.to_radians());

@@ -5,8 +5,8 @@
 
 use super::effect::{Given, PhysicsError};
 use super::free_form;
-use super::library::{Effect, Setting, curves, data_facts, effect, library};
-use super::sample::Scene;
+use super::library::{Effect, LawSetting, curves, data_facts, effect, library};
+use super::sample::MotionScene;
 use super::share::Share;
 use crate::document::Need;
 use crate::lti::{Body, PhysicsEntry, Plant};
@@ -44,9 +44,9 @@ impl Default for Context {
 #[derive(Clone)]
 pub struct Restored {
     /// Effects with their numbers, in the order of the file.
-    pub parts: Vec<Setting>,
+    pub parts: Vec<LawSetting>,
     /// The machine they act in: the linear plant, without physics entries.
-    pub scene: Scene,
+    pub scene: MotionScene,
     /// Entries that belong to the records (statistics, clocks, logs): no law, left out.
     pub left_out: Vec<&'static str>,
 }
@@ -54,7 +54,7 @@ pub struct Restored {
 impl Restored {
     /// The physics of `plant`; unknown effects and unknown or missing parameters are refused by name.
     pub fn of(plant: &Plant, context: &Context) -> Result<Restored, PhysicsError> {
-        let scene = Scene {
+        let scene = MotionScene {
             plant: Plant { physics: Vec::new(), ..plant.paired() },
             sample_time_s: context.sample_time_s,
             spindle_hz: context.spindle_hz,
@@ -73,7 +73,7 @@ impl Restored {
         for entry in &plant.physics {
             if entry.effect == free_form::FACTS.name {
                 bodied(entry, &restored.scene.plant)?;
-                restored.parts.push(Setting::fixed(free_form::restored(entry)?));
+                restored.parts.push(LawSetting::fixed(free_form::restored(entry)?));
                 continue;
             }
             if entry.curve.is_some() {
@@ -109,8 +109,8 @@ impl Restored {
         blind.map_or(Ok(()), |s| Err(PhysicsError::Blind { effect: s.facts().name }))
     }
 
-    /// Effects as [`super::Machine::new`] takes them.
-    pub fn effects(&self) -> Vec<&Setting> {
+    /// Effects as [`super::SimulatedMachine::new`] takes them.
+    pub fn effects(&self) -> Vec<&LawSetting> {
         self.parts.iter().collect()
     }
 }
@@ -123,7 +123,7 @@ fn bodied(entry: &PhysicsEntry, plant: &Plant) -> Result<(), PhysicsError> {
     }
 }
 
-fn setting(e: &'static dyn Effect, entry: &PhysicsEntry, scene: &Scene) -> Result<Setting, PhysicsError> {
+fn setting(e: &'static dyn Effect, entry: &PhysicsEntry, scene: &MotionScene) -> Result<LawSetting, PhysicsError> {
     let name = e.facts().name;
     if let Some((parameter, found)) = entry.parameters.iter().find(|(_, v)| !v.is_finite()) {
         return Err(PhysicsError::Finite { effect: name, parameter: parameter.clone(), found: *found });

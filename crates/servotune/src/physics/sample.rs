@@ -25,7 +25,7 @@ pub struct Sample {
 
 /// The machine and the size of its motion: what grids and units are made from.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scene {
+pub struct MotionScene {
     /// The linear plant.
     pub plant: Plant,
     /// Sample time (s).
@@ -54,7 +54,7 @@ pub struct Scene {
     pub warm: bool,
 }
 
-impl Scene {
+impl MotionScene {
     /// Half the sample rate (Hz).
     pub fn nyquist_hz(&self) -> f64 {
         0.5 / self.sample_time_s

@@ -7,7 +7,7 @@
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::key::{Key, Prior, Takes};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 use super::share::Share;
 
 /// The curve that the sensor reads.
@@ -110,11 +110,11 @@ impl Parametric for SensorCurve {
     }
 
     /// None: along a folded or limited record nothing is seen of the motion behind it.
-    fn grid(_scene: &Scene) -> Vec<SensorCurve> {
+    fn grid(_scene: &MotionScene) -> Vec<SensorCurve> {
         Vec::new()
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Reading { curve: self.clone() })
     }
 
@@ -122,7 +122,7 @@ impl Parametric for SensorCurve {
         true
     }
 
-    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         match *self {
             SensorCurve::Folded { lowest, at } => vec![LOWEST_READING.at(lowest), FOLD_POSITION.at(at)],
             SensorCurve::Limited { low, high } => vec![LOWEST_READING.at(low), HIGHEST_READING.at(high)],
@@ -133,11 +133,11 @@ impl Parametric for SensorCurve {
     }
 
     /// A fold does not tell on which side the arm is.
-    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &MotionScene, _w_rad_s: f64) -> Share {
         if matches!(self, SensorCurve::Folded { .. }) { Share::Blind } else { Share::Cycle }
     }
 
-    fn setting_of(given: &Given, scene: &Scene) -> Result<(SensorCurve, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, scene: &MotionScene) -> Result<(SensorCurve, Vec<f64>), PhysicsError> {
         if given.has(&FOLD_POSITION) {
             let at = given.need(&FOLD_POSITION)?;
             return Ok((SensorCurve::Folded { lowest: given.or_else(&LOWEST_READING, at)?, at }, vec![1.0]));

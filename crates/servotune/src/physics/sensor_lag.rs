@@ -5,7 +5,7 @@
 use super::amplifier_lag::{BANDWIDTH_HZ, TIME_CONSTANT_S};
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
 use super::parameter::Parameter;
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 use super::share::Share;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
@@ -66,7 +66,7 @@ impl Parametric for SensorLag {
         &FACTS
     }
 
-    fn grid(scene: &Scene) -> Vec<SensorLag> {
+    fn grid(scene: &MotionScene) -> Vec<SensorLag> {
         let t = scene.sample_time_s;
         logarithmic(0.1 * t, 20.0 * t, 14).into_iter().map(|time_constant_s| SensorLag { time_constant_s }).collect()
     }
@@ -75,23 +75,23 @@ impl Parametric for SensorLag {
         vec![Some(&mut self.time_constant_s)]
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         let step = scene.sample_time_s;
         Box::new(Lag { tau: self.time_constant_s, step, keep: (-step / self.time_constant_s).exp(), behind: None })
     }
 
-    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         vec![TIME_CONSTANT_S.at(self.time_constant_s), BANDWIDTH_HZ.at(1.0 / (TAU * self.time_constant_s))]
     }
 
-    fn response_share(&self, _strengths: &[f64], scene: &Scene, w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], scene: &MotionScene, w_rad_s: f64) -> Share {
         let (step, tau) = (scene.sample_time_s, self.time_constant_s);
         let keep = (-step / tau).exp();
         let z = Complex::from_polar(1.0, w_rad_s * step);
         Share::Ratio((z - 1.0) / (z - keep) * (keep - 1.0) * tau / step)
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(SensorLag, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(SensorLag, Vec<f64>), PhysicsError> {
         let time_constant_s = if given.has(&TIME_CONSTANT_S) {
             given.need(&TIME_CONSTANT_S)?
         } else {

@@ -3,9 +3,9 @@
 //! tau = B sin(pi (t - t0)/w) for t0 < t < t0 + w: the half-sine of shock tests (IEC 60068-2-27); its mean over an interval is exact.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
-use super::key::{Bound, Key, Measure, Prior};
+use super::key::{Key, Measure, Prior, ScanEnd};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene, logarithmic};
+use super::sample::{MotionScene, Sample, logarithmic};
 use super::share::Share;
 use std::f64::consts::PI;
 
@@ -23,7 +23,7 @@ const TIME_S: Key =
     Key::new("time_s", Unit::Second, "when it begins, t0").prior(Prior::Words("half a width apart over the record"));
 const WIDTH_S: Key = Key::new("width_s", Unit::Second, "w")
     .positive()
-    .scan(Bound::Greatest(&[(8.0, Measure::Sample), (0.005, Measure::Record)]), Bound::At(0.125, Measure::Record));
+    .scan(ScanEnd::Greatest(&[(8.0, Measure::Sample), (0.005, Measure::Record)]), ScanEnd::At(0.125, Measure::Record));
 
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
@@ -67,7 +67,7 @@ impl Parametric for Shock {
         &FACTS
     }
 
-    fn grid(scene: &Scene) -> Vec<Shock> {
+    fn grid(scene: &MotionScene) -> Vec<Shock> {
         let shortest = (8.0 * scene.sample_time_s).max(scene.duration_s / 200.0);
         let mut all = Vec::new();
         for width in logarithmic(shortest, scene.duration_s / 8.0, 4) {
@@ -83,7 +83,7 @@ impl Parametric for Shock {
         vec![Some(&mut self.time_s), Some(&mut self.width_s)]
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Pulse { start: self.time_s, width: self.width_s.abs() })
     }
 
@@ -95,15 +95,15 @@ impl Parametric for Shock {
         true
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         vec![PEAK_COMMAND.at(strengths[0]), TIME_S.at(self.time_s), WIDTH_S.at(self.width_s)]
     }
 
-    fn response_share(&self, _strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, _strengths: &[f64], _scene: &MotionScene, _w_rad_s: f64) -> Share {
         Share::Outside
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(Shock, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(Shock, Vec<f64>), PhysicsError> {
         let law = Shock { time_s: given.need(&TIME_S)?, width_s: given.need(&WIDTH_S)? };
         Ok((law, vec![given.need(&PEAK_COMMAND)?]))
     }

@@ -4,9 +4,9 @@
 //! the step. A digital limiter works at the samples instead: i_k = i_(k-1) + clip(u_k - i_(k-1), -S T, S T).
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
-use super::key::{Bound, Key, Measure};
+use super::key::{Key, Measure, ScanEnd};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 
 /// The limit of the rate.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub struct SlewLimit {
 
 const MAX_SLOPE: Key = Key::new("max_slope", Unit::CommandPerSecond, "largest slope, S")
     .positive()
-    .scan(Bound::At(0.02, Measure::SteepestCommand), Bound::At(60.0, Measure::SteepestCommand));
+    .scan(ScanEnd::At(0.02, Measure::SteepestCommand), ScanEnd::At(60.0, Measure::SteepestCommand));
 const BETWEEN_SAMPLES: Key =
     Key::new("between_samples", Unit::Ratio, "0: limited at the samples; else the current ramps between them")
         .or(0.0)
@@ -80,7 +80,7 @@ impl Parametric for SlewLimit {
         &FACTS
     }
 
-    fn grid(scene: &Scene) -> Vec<SlewLimit> {
+    fn grid(scene: &MotionScene) -> Vec<SlewLimit> {
         // A limit above the largest step that occurs does nothing.
         let largest = scene.command_step / scene.sample_time_s;
         let slope = |share: f64, between_samples| SlewLimit { max_slope: share * largest, between_samples };
@@ -99,7 +99,7 @@ impl Parametric for SlewLimit {
         vec![usize::from(self.between_samples)]
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Limiter { step: self.max_slope * scene.sample_time_s, ramps: self.between_samples, current: None })
     }
 
@@ -107,11 +107,11 @@ impl Parametric for SlewLimit {
         true
     }
 
-    fn parameters(&self, _strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, _strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         vec![MAX_SLOPE.at(self.max_slope), BETWEEN_SAMPLES.at(f64::from(self.between_samples))]
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(SlewLimit, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(SlewLimit, Vec<f64>), PhysicsError> {
         let between_samples = given.or(&BETWEEN_SAMPLES)? != 0.0;
         Ok((SlewLimit { max_slope: given.need(&MAX_SLOPE)?, between_samples }, vec![1.0]))
     }

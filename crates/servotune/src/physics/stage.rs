@@ -4,7 +4,7 @@
 //! enters it, a = (ωz/ωp)² - 1, b = 2 (ζz ωz - ζp ωp)/ωp. Both are kept while pole and zero move together. Body and all other stages
 //! stand before it: they commute with it as long as it changes slowly.
 
-use super::sample::Scene;
+use super::sample::MotionScene;
 use crate::lti::{ModalForm, Plant};
 use nalgebra::Complex;
 use std::cell::Cell;
@@ -51,7 +51,7 @@ pub(super) struct Next {
 
 impl Stage {
     /// The stage of `plant.modes[mode]` at rest; none where there is no such mode or it does not ring.
-    pub(super) fn of(scene: &Scene, mode: usize) -> Option<Stage> {
+    pub(super) fn of(scene: &MotionScene, mode: usize) -> Option<Stage> {
         let m = *scene.plant.modes.get(mode).filter(|m| m.pole_damping_ratio < 1.0)?;
         let mut modes = scene.plant.modes.clone();
         modes.remove(mode);

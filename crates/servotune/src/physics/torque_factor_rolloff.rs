@@ -4,9 +4,9 @@
 //! have corners that no expansion follows: there the fall ends, or only begins.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
-use super::key::{Bound, Key, Measure, Prior};
+use super::key::{Key, Measure, Prior, ScanEnd};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 
 /// The fall of the torque factor. Its strengths are those of -z i, -f(z) i, -z⁴ i, -z⁶ i with z = position over the travel; f is z² but
 /// for shapes with a corner; the linear one moves the centre.
@@ -50,11 +50,11 @@ const CURVATURE: Key = Key::new("curvature", Unit::PerPositionSquared, "a").unle
 const BEGINS_AT: Key = Key::new("begins_at", Unit::Position, "corner where a parabola begins")
     .or_else("no corner")
     .positive()
-    .scan(Bound::At(0.3, Measure::Travel), Bound::At(0.95, Measure::Travel));
+    .scan(ScanEnd::At(0.3, Measure::Travel), ScanEnd::At(0.95, Measure::Travel));
 const ENDS_AT: Key = Key::new("ends_at", Unit::Position, "corner where a parabola ends")
     .or_else("no corner")
     .positive()
-    .scan(Bound::At(0.3, Measure::Travel), Bound::At(0.95, Measure::Travel));
+    .scan(ScanEnd::At(0.3, Measure::Travel), ScanEnd::At(0.95, Measure::Travel));
 const SLOPE: Key = Key::new("slope", Unit::PerPosition, "s").or_else("no such term");
 const QUARTIC: Key = Key::new("quartic", Unit::Named("1/position^4"), "b").or_else("no such term");
 const SEXTIC: Key = Key::new("sextic", Unit::Named("1/position^6"), "c").or_else("no such term");
@@ -127,7 +127,7 @@ impl Parametric for TorqueFactorRolloff {
         ShownOver::FactorOverPosition
     }
 
-    fn grid(_scene: &Scene) -> Vec<TorqueFactorRolloff> {
+    fn grid(_scene: &MotionScene) -> Vec<TorqueFactorRolloff> {
         let begins = CORNERS.map(|corner| Shape::Begins { corner });
         let ends = CORNERS.map(|corner| Shape::Ends { corner });
         let all = [Shape::Parabola, Shape::Polynomial].into_iter().chain(begins).chain(ends);
@@ -159,7 +159,7 @@ impl Parametric for TorqueFactorRolloff {
         }
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         // The magnet's zones are told by the position as recorded.
         Box::new(Rolloff { shape: self.shape, travel: scene.travel * scene.arm_over_record() })
     }
@@ -181,7 +181,7 @@ impl Parametric for TorqueFactorRolloff {
         whole > 0.0 && (1..=8).all(rises)
     }
 
-    fn parameters(&self, strengths: &[f64], scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], scene: &MotionScene) -> Vec<Parameter> {
         let (s, l, shape) = (strengths, scene.travel, self.shape);
         // What a reader can picture first; the function after it, from which the law is made again.
         let mut all = vec![DROP_AT_TRAVEL.at(fall(shape, s, 1.0)), CURVATURE.at(s[1] / l.powi(2))];
@@ -200,7 +200,7 @@ impl Parametric for TorqueFactorRolloff {
         all
     }
 
-    fn setting_of(given: &Given, scene: &Scene) -> Result<(TorqueFactorRolloff, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, scene: &MotionScene) -> Result<(TorqueFactorRolloff, Vec<f64>), PhysicsError> {
         let l = scene.travel;
         let shape = if given.has(&BEGINS_AT) {
             Shape::Begins { corner: given.need(&BEGINS_AT)? / l }

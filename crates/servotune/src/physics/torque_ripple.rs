@@ -4,9 +4,9 @@
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::encoder_cyclic_error::EncoderCyclicError;
-use super::key::{Bound, Key, Measure};
+use super::key::{Key, Measure, ScanEnd};
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 use std::cell::Cell;
 use std::f64::consts::TAU;
 
@@ -25,7 +25,7 @@ const AMPLITUDE_RELATIVE: Key =
     Key::new("amplitude_relative", Unit::Ratio, "of a wave of the torque factor").unless(&["amplitude_command"]);
 const PERIOD: Key = Key::new("period", Unit::Position, "length of the wave")
     .positive()
-    .scan(Bound::Greatest(&[(8.0, Measure::Noise), (0.01, Measure::Travel)]), Bound::At(0.6, Measure::Travel));
+    .scan(ScanEnd::Greatest(&[(8.0, Measure::Noise), (0.01, Measure::Travel)]), ScanEnd::At(0.6, Measure::Travel));
 const PHASE_DEG: Key = Key::new("phase_deg", Unit::Degree, "phase").or(0.0);
 
 /// What is known beforehand.
@@ -93,7 +93,7 @@ impl Parametric for TorqueRipple {
         ShownOver::Position
     }
 
-    fn grid(scene: &Scene) -> Vec<TorqueRipple> {
+    fn grid(scene: &MotionScene) -> Vec<TorqueRipple> {
         // The same question as for the encoder's wave: no period over the travel may fall between two points.
         let periods = EncoderCyclicError::grid(scene).into_iter().map(|wave| wave.period).step_by(2);
         periods.flat_map(|period| [false, true].map(|of_factor| TorqueRipple { period, of_factor })).collect()
@@ -107,11 +107,11 @@ impl Parametric for TorqueRipple {
         vec![usize::from(self.of_factor)]
     }
 
-    fn in_motion(&self, _scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Ripple { wave: TAU / self.period, factor: self.of_factor, last: Cell::new([f64::NAN; 3]) })
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let [a, b] = [strengths[0], strengths[1]];
         let amplitude = match self.of_factor {
             true => AMPLITUDE_RELATIVE.at(a.hypot(b)),
@@ -120,7 +120,7 @@ impl Parametric for TorqueRipple {
         vec![amplitude, PERIOD.at(self.period), PHASE_DEG.at((-b).atan2(a).to_degrees())]
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(TorqueRipple, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(TorqueRipple, Vec<f64>), PhysicsError> {
         let of_factor = given.has(&AMPLITUDE_RELATIVE);
         let amplitude = given.need(if of_factor { &AMPLITUDE_RELATIVE } else { &AMPLITUDE_COMMAND })?;
         let phase = given.or(&PHASE_DEG)?.to_radians();

@@ -4,10 +4,10 @@
 //! modal form). Exact for a command held between samples.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
-use super::key::{Bound, Key, Measure, Takes};
+use super::key::{Key, Measure, ScanEnd, Takes};
 use super::oscillator::Oscillator;
 use super::parameter::{Parameter, Unit};
-use super::sample::{Sample, Scene};
+use super::sample::{MotionScene, Sample};
 use super::share::Share;
 use crate::lti::ModalTerm;
 use nalgebra::Complex;
@@ -22,9 +22,10 @@ pub struct UnmodelledResonance {
     pub damping_ratio: f64,
 }
 
-const FREQUENCY_HZ: Key = Key::new("frequency_hz", Unit::Hertz, "natural frequency")
-    .positive()
-    .scan(Bound::Least(&[(30.0, Measure::One), (0.0045, Measure::SampleRate)]), Bound::At(0.45, Measure::SampleRate));
+const FREQUENCY_HZ: Key = Key::new("frequency_hz", Unit::Hertz, "natural frequency").positive().scan(
+    ScanEnd::Least(&[(30.0, Measure::One), (0.0045, Measure::SampleRate)]),
+    ScanEnd::At(0.45, Measure::SampleRate),
+);
 const DAMPING_RATIO: Key =
     Key::new("damping_ratio", Unit::Ratio, "damping ratio; refined from a third of the first to three times the last")
         .takes(Takes::Between(0.0, 1.0, "above 0 and below 1"))
@@ -73,7 +74,7 @@ impl Law for Ringing {
 }
 
 /// Frequency and damping from `low` to `high`, one half-power width apart, never closer than the longest record resolves.
-pub(super) fn scan(low: f64, high: f64, damping: f64, scene: &Scene) -> Vec<[f64; 2]> {
+pub(super) fn scan(low: f64, high: f64, damping: f64, scene: &MotionScene) -> Vec<[f64; 2]> {
     let finest = if scene.duration_s > 0.0 { 0.4 / scene.duration_s } else { low };
     let mut all = Vec::new();
     let mut hz = low;
@@ -103,7 +104,7 @@ impl Parametric for UnmodelledResonance {
         &FACTS
     }
 
-    fn grid(scene: &Scene) -> Vec<UnmodelledResonance> {
+    fn grid(scene: &MotionScene) -> Vec<UnmodelledResonance> {
         let high = 0.45 / scene.sample_time_s;
         [0.005, 0.02, 0.06]
             .iter()
@@ -116,7 +117,7 @@ impl Parametric for UnmodelledResonance {
         vec![Some(&mut self.frequency_hz), Some(&mut self.damping_ratio)]
     }
 
-    fn in_motion(&self, scene: &Scene) -> Box<dyn Law> {
+    fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         Box::new(Ringing::at_rest(self.frequency_hz, self.damping_ratio, scene.sample_time_s, 2))
     }
 
@@ -124,7 +125,7 @@ impl Parametric for UnmodelledResonance {
         true
     }
 
-    fn parameters(&self, strengths: &[f64], _scene: &Scene) -> Vec<Parameter> {
+    fn parameters(&self, strengths: &[f64], _scene: &MotionScene) -> Vec<Parameter> {
         let [a, b] = [strengths[0], strengths[1]];
         vec![
             FREQUENCY_HZ.at(self.frequency_hz),
@@ -135,11 +136,11 @@ impl Parametric for UnmodelledResonance {
         ]
     }
 
-    fn response_share(&self, strengths: &[f64], _scene: &Scene, _w_rad_s: f64) -> Share {
+    fn response_share(&self, strengths: &[f64], _scene: &MotionScene, _w_rad_s: f64) -> Share {
         Share::Terms(vec![term(self.frequency_hz, self.damping_ratio, strengths[0], strengths[1])])
     }
 
-    fn setting_of(given: &Given, _scene: &Scene) -> Result<(UnmodelledResonance, Vec<f64>), PhysicsError> {
+    fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(UnmodelledResonance, Vec<f64>), PhysicsError> {
         let damping = given.need(&DAMPING_RATIO)?;
         let strengths = vec![given.need(&STATIC_GAIN)?, given.or(&RATE_GAIN)?];
         Ok((UnmodelledResonance::at([given.need(&FREQUENCY_HZ)?, damping]), strengths))

@@ -1,7 +1,7 @@
 //! The keys of case.toml. Reader: [`super::Case`].
 
 use super::case::MOST_INPUTS;
-use crate::document::{FileKey as Key, KeyFile, KeyTable, Kind};
+use crate::document::{FileKey as Key, KeyFile, KeyKind, KeyTable};
 
 const TOP: &[Key] = &[
     Key::of_text("id", "name of the case").also("a name (`specs/files.md`, \"Names\")"),
@@ -9,7 +9,7 @@ const TOP: &[Key] = &[
     Key::path("controller", "without one the command is taken as given").or_none(),
     Key::number("spindle_hz", "Hz", "spindle speed").or_none().above(0.0),
     Key::table("noise", "levels of a sound machine").or_toml("{}"),
-    Key::new("further_inputs", Kind::Texts, "", "further columns of every record that act on its position")
+    Key::new("further_inputs", KeyKind::Texts, "", "further columns of every record that act on its position")
         .or_toml("[]")
         .items(0, MOST_INPUTS)
         .also("each once"),
@@ -23,7 +23,7 @@ const NOISE: &[Key] = &[
 
 const RECORDS: &[Key] = &[
     Key::path("file", "record, CSV, gzip or not"),
-    Key::new("role", Kind::Choice(&["fit", "holdout"]), "", "holdout is never used for fitting or selection"),
+    Key::new("role", KeyKind::Choice(&["fit", "holdout"]), "", "holdout is never used for fitting or selection"),
     Key::of_text("repeat_group", "same reference and excitation, other noise").or_none(),
 ];
 

@@ -2,7 +2,7 @@
 
 use super::RecordingError;
 use crate::document::size_limits::{self, quoted as cut};
-use crate::document::{Bounded, OverLimit};
+use crate::document::{BoundedReader, OverLimit};
 use flate2::read::MultiGzDecoder;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ const LEAST_ROWS: usize = 2;
 /// A comma-separated file with its header read; bytes, rows and samples are limited as [`size_limits`] says.
 pub(super) struct Rows {
     file: PathBuf,
-    reader: csv::Reader<Bounded<Box<dyn Read>>>,
+    reader: csv::Reader<BoundedReader<Box<dyn Read>>>,
     header: csv::StringRecord,
     row: csv::StringRecord,
 }
@@ -32,7 +32,7 @@ impl Rows {
         let mut bytes = BufReader::new(std::fs::File::open(file).map_err(io)?);
         let packed = bytes.fill_buf().map_err(io)?.starts_with(&[0x1f, 0x8b]);
         let text: Box<dyn Read> = if packed { Box::new(MultiGzDecoder::new(bytes)) } else { Box::new(bytes) };
-        let text = Bounded::new(text, size_limits::RECORD_BYTES_UNPACKED, size_limits::ROW_BYTES);
+        let text = BoundedReader::new(text, size_limits::RECORD_BYTES_UNPACKED, size_limits::ROW_BYTES);
         let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
         let (header, row) = (csv::StringRecord::new(), csv::StringRecord::new());
         let mut rows = Rows { file: file.into(), reader, header, row };

@@ -7,7 +7,7 @@ use super::judge::judge_loop;
 use super::judge::judged;
 use super::outcome::{AtBound, Infeasible, Reached, RelaxedLimit, SearchWork};
 use super::polish::refine;
-use super::requirements::{Found, MET, Requirement};
+use super::requirements::{FoundFigures, MET, Requirement};
 use super::{Judged, JudgedLimit, Judgement, Machine, Minimise, Side, Spec, TuneError, TuningProblem};
 use std::f64::consts::TAU;
 
@@ -77,7 +77,7 @@ impl<'a> Ending<'a> {
                     continue;
                 }
                 let records = problem.found(i, &work);
-                let found = Found { settling_s: None, move_settling_s: None, ..records };
+                let found = FoundFigures { settling_s: None, move_settling_s: None, ..records };
                 let (mut a, mut b) = (0, 0);
                 for (number, (w, inside)) in problem.wanted.iter().zip(inside).enumerate() {
                     let asked = w.inside(rooms[number]);
@@ -153,7 +153,7 @@ impl<'a> Ending<'a> {
     /// The parameters that lie on their bounds.
     pub fn at_bounds(&self, problem: &TuningProblem, x: &[f64]) -> Vec<AtBound> {
         let p = problem.parameters();
-        let on = |((parameter, [from, to]), x): ((&super::Parameter, &[f64; 2]), &f64)| {
+        let on = |((parameter, [from, to]), x): ((&super::TunedNumber, &[f64; 2]), &f64)| {
             let (lower, upper) = (x - from < ON_BOUND, to - x < ON_BOUND);
             (lower || upper).then(|| AtBound { parameter: *parameter, value: x.exp(), upper })
         };

@@ -1,9 +1,9 @@
 //! The figures of one loop, refined on the function itself: margins, the ends of its crossings, bandwidth, curves.
 //!
-//! In: an open loop, its plant, what a spec limits. Out: margins and [`Found`] without its records. Shares nothing with the search's grid.
+//! In: an open loop, its plant, what a spec limits. Out: margins and [`FoundFigures`] without its records. Shares nothing with the search's grid.
 
 use super::limits::MarginLimits;
-use super::requirements::{CurveFound, Found};
+use super::requirements::{CurveFound, FoundFigures};
 use crate::feedback::{CurveLimit, Margins, OpenLoop, closed_loop_bandwidth};
 use nalgebra::Complex;
 
@@ -14,13 +14,13 @@ pub(super) fn exact_loop(
     plant: &dyn Fn(f64) -> Complex<f64>,
     limits: &MarginLimits,
     curves: &[CurveLimit],
-) -> (Margins, Found) {
+) -> (Margins, FoundFigures) {
     let outside = |hz: f64| !limits.phase_stabilised_hz.iter().any(|[from, to]| (*from..=*to).contains(&hz));
     let ends = m.gain_crossings.iter().map(|c| c.hz).filter(|hz| outside(*hz));
     let ends = ends.fold(None, |ends: Option<[f64; 2]>, hz| {
         Some(ends.map_or([hz, hz], |[low, high]| [low.min(hz), high.max(hz)]))
     });
-    let found = Found {
+    let found = FoundFigures {
         unstable_poles: m.unstable_poles,
         phase_margin_deg: m.phase_margin_deg,
         gain_crossover_hz: m.gain_crossover_hz,
@@ -29,7 +29,7 @@ pub(super) fn exact_loop(
         gain_crossings_hz: ends,
         bandwidth_hz: closed_loop_bandwidth(l),
         curves: curves.iter().map(|c| nearest(l, plant, c)).collect(),
-        ..Found::default()
+        ..FoundFigures::default()
     };
     (m, found)
 }

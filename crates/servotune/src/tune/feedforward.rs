@@ -10,7 +10,7 @@ use super::record_figures::band_weights;
 use super::{Minimise, Spec, TuneError};
 use crate::controller::{Controller, Feedforward};
 use crate::lti::{DiscretePlant, Plant};
-use crate::pes::{Asked, Profile, QuickScene, QuickWork, Record};
+use crate::pes::{Asked, Profile, QuickScene, QuickWork, WriteRecord};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SolverStatus, SupportedConeT,
@@ -38,7 +38,10 @@ pub(super) fn best_feedforward(plant: &Plant, c: &Controller, spec: &Spec) -> Re
         let forward = Feedforward { factor: 1.0, velocity_s, acceleration_s2, ahead_samples };
         // The output limit would bend what is affine; the limit on the peak is a row below.
         scene.run(&chain, Some(&forward), None, asked, &mut work);
-        Response { window: work.window(Record::Still).to_vec(), command: work.command(Record::Still).to_vec() }
+        Response {
+            window: work.window(WriteRecord::Still).to_vec(),
+            command: work.command(WriteRecord::Still).to_vec(),
+        }
     };
     let base = respond(0.0, 0.0, 0);
     let unit =

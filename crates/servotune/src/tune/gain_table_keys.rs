@@ -1,7 +1,7 @@
 //! The keys of gains.toml beside those of controller.toml. Reader: [`super::GainTable`].
 
 use crate::controller::CONTROLLER_KEYS;
-use crate::document::{FileKey as Key, KeyFile, KeyTable, Kind};
+use crate::document::{FileKey as Key, KeyFile, KeyKind, KeyTable};
 
 const TOP: &[Key] = &[
     Key::of_text("position_unit", "unit of position").or_none(),
@@ -24,7 +24,7 @@ const SECTION: &[Key] = &[
 ];
 
 const SUMMARY: &[Key] = &[
-    Key::new("stable", Kind::Bool, "", "whether the loop is stable"),
+    Key::new("stable", KeyKind::Bool, "", "whether the loop is stable"),
     Key::number("phase_margin_deg", "deg", "smallest").or_none(),
     Key::number("gain_crossover_hz", "Hz", "where that is").or_none(),
     Key::number("gain_margin_db", "dB", "smallest").or_none(),
@@ -46,8 +46,8 @@ const CROSSING: &[Key] =
 
 const PROVENANCE: &[Key] = &[
     Key::of_text("program", "version of the program"),
-    Key::new("route", Kind::Choice(&["model", "response", "physics"]), "", "what it was tuned on"),
-    Key::new("feasible", Kind::Bool, "", "whether every limit is met"),
+    Key::new("route", KeyKind::Choice(&["model", "response", "physics"]), "", "what it was tuned on"),
+    Key::new("feasible", KeyKind::Bool, "", "whether every limit is met"),
     Key::integer("seed", "", "of the search"),
     Key::integer("evaluations", "", "candidates scored"),
     Key::of_text("spec_sha256", "digest of spec.toml"),
@@ -55,7 +55,7 @@ const PROVENANCE: &[Key] = &[
     Key::of_text("gate_action", "what the gate said to do").or_none(),
     Key::number("gate_probability", "", "of that class").or_none(),
     Key::of_text("gate_override", "why it was tuned all the same").or_none(),
-    Key::new("physics", Kind::Texts, "", "effects beyond linear that it was tuned with").or_toml("[]"),
+    Key::new("physics", KeyKind::Texts, "", "effects beyond linear that it was tuned with").or_toml("[]"),
     Key::tables("inputs", "every other input"),
 ];
 

@@ -2,7 +2,7 @@
 
 use super::exact_loop::exact_loop;
 use super::machine::curve;
-use super::requirements::{Found, Judged, Requirement};
+use super::requirements::{FoundFigures, Judged, Requirement};
 use super::step_figures::{MoveEnd, overshoot, settling_s};
 use super::{Machine, Spec, TuneError};
 use crate::controller::Controller;
@@ -54,7 +54,11 @@ pub fn judge(machine: &Machine<'_>, controller: &Controller, spec: &Spec) -> Res
 }
 
 /// The figures of the loop alone.
-pub(super) fn judge_loop(m: &Machine<'_>, controller: &Controller, spec: &Spec) -> Result<(Margins, Found), TuneError> {
+pub(super) fn judge_loop(
+    m: &Machine<'_>,
+    controller: &Controller,
+    spec: &Spec,
+) -> Result<(Margins, FoundFigures), TuneError> {
     let sections = controller.sections()?;
     let (limits, curves) = (&spec.margins, &spec.limits.curve);
     Ok(match m {
@@ -81,7 +85,7 @@ fn simulated(
     c: &Controller,
     spec: &Spec,
     profile: &Profile,
-    found: &mut Found,
+    found: &mut FoundFigures,
 ) -> Result<(), TuneError> {
     let write = simulate(plant, c, profile)?;
     let start = profile.first_servo_sample();
@@ -99,7 +103,7 @@ fn simulated(
 }
 
 /// Norms over the first two bands and the limited harmonics; none of a band without a bin.
-fn bands(dft: &WindowDft, amplitude: &[f64], spec: &Spec, found: &mut Found) {
+fn bands(dft: &WindowDft, amplitude: &[f64], spec: &Spec, found: &mut FoundFigures) {
     let norm = |i: usize| {
         let band = *spec.objective.bands_hz.get(i)?;
         dft.inside(band).next().map(|_| dft.band(amplitude, band))
@@ -122,7 +126,7 @@ pub(super) fn bins(spec: &Spec, profile: &Profile, harmonics: &[usize]) -> Vec<u
 }
 
 /// Overshoot and settling of a step of the reference and of the profile's move, where a limit asks for them.
-fn stepped(plant: &Plant, c: &Controller, spec: &Spec, found: &mut Found) -> Result<(), TuneError> {
+fn stepped(plant: &Plant, c: &Controller, spec: &Spec, found: &mut FoundFigures) -> Result<(), TuneError> {
     let (l, t) = (&spec.limits, c.sample_time_s);
     let mut work = StepWork::default();
     let mut run = |scene: &StepScene| -> Result<Vec<f64>, TuneError> {

@@ -2,7 +2,7 @@
 //!
 //! In: machines (models or measured responses), `spec.toml`, optionally the controller to start from. Out: an [`Outcome`]:
 //! the tuned controller, or the limits in conflict and the smallest relaxation; a gain table that ties it to its inputs.
-//! Convention: requirements are wanted ([`Requirement`]), then found ([`Found`]), then judged ([`Judged`]); spec: `specs/tuning.md`.
+//! Convention: requirements are wanted ([`Requirement`]), then found ([`FoundFigures`]), then judged ([`Judged`]); spec: `specs/tuning.md`.
 
 mod bounds;
 mod confidence;
@@ -60,19 +60,19 @@ pub use linear::{CandidateSlopes, LimitSlope};
 pub use machine::{Machine, Route};
 pub use objective::{Disturbance, Minimise, Objective};
 pub use outcome::{AtBound, Infeasible, Outcome, Reached, RelaxedLimit, SearchWork, Tuned};
-pub use parameters::{DERIVATIVE_FILTER, Parameter, Parameters};
+pub use parameters::{DERIVATIVE_FILTER, Parameters, TunedNumber};
 pub use pareto::{ParetoPoint, ParetoSettings, pareto};
 pub use physical::{
     PhysicalJudgement, PhysicalTuning, TUNED_AMPLITUDES, equivalent_responses, judge_physical, tune_physical,
 };
 pub use problem::{TuningProblem, TuningWork, ranges};
-pub use requirements::{CurveFound, Found, Judged, JudgedLimit, MET, Requirement, Side, What};
+pub use requirements::{CurveFound, FoundFigures, Judged, JudgedLimit, MET, Requirement, Side, What};
 pub use score::Score;
 pub use settings::TuneSettings;
 pub use spec::{GUARD, Search, Spec};
 pub use spec_error::SpecError;
 pub use spec_keys::SPEC_KEYS;
-pub use structure::{Kind, Setting, Structure};
+pub use structure::{ControllerKind, FixedOrSearched, Structure};
 pub use tune_error::TuneError;
 pub use tuning::{sample_time_s, tune, tune_from, tune_jointly, tune_watched};
 pub use watch::{SearchStep, SearchWatch, unwatched};

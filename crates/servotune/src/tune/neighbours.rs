@@ -10,7 +10,7 @@ use super::placement::{notches, placed, refine_placed};
 use super::simplex::{best_of, simplex, walk_back};
 use super::starts::DRAWN;
 use super::starts::further;
-use super::{Minimise, Parameter, Score, SearchStep, SearchWatch, TuningProblem, TuningWork};
+use super::{Minimise, Score, SearchStep, SearchWatch, TunedNumber, TuningProblem, TuningWork};
 use crate::numeric::random::Random;
 use rayon::prelude::*;
 
@@ -162,7 +162,7 @@ pub(super) fn spread(problem: &TuningProblem, ends: Vec<Polished>) -> Vec<Polish
 fn mark(problem: &TuningProblem, x: &[f64]) -> Vec<f64> {
     let free = problem.parameters().free();
     let mut centres: Vec<f64> =
-        x.iter().zip(free).filter(|(_, p)| matches!(p, Parameter::NotchFrequency { .. })).map(|(x, _)| *x).collect();
+        x.iter().zip(free).filter(|(_, p)| matches!(p, TunedNumber::NotchFrequency { .. })).map(|(x, _)| *x).collect();
     centres.sort_by(f64::total_cmp);
     let plain = x.iter().zip(free).filter(|(_, p)| notch(p).is_none()).map(|(x, _)| *x);
     plain.chain(centres).collect()
@@ -251,15 +251,15 @@ fn neighbour(
     x
 }
 
-fn notch(p: &Parameter) -> Option<usize> {
+fn notch(p: &TunedNumber) -> Option<usize> {
     match *p {
-        Parameter::NotchFrequency { filter }
-        | Parameter::NotchDepth { filter }
-        | Parameter::NotchPoleDamping { filter } => Some(filter),
+        TunedNumber::NotchFrequency { filter }
+        | TunedNumber::NotchDepth { filter }
+        | TunedNumber::NotchPoleDamping { filter } => Some(filter),
         _ => None,
     }
 }
 
-fn kind(p: &Parameter) -> std::mem::Discriminant<Parameter> {
+fn kind(p: &TunedNumber) -> std::mem::Discriminant<TunedNumber> {
     std::mem::discriminant(p)
 }

@@ -1,7 +1,7 @@
 //! What tuning says: a controller that meets every limit, or the limits in conflict and what would have to give.
 
 use super::judge::Judgement;
-use super::{Minimise, Parameter, Ranges, Route, Side, What};
+use super::{Minimise, Ranges, Route, Side, TunedNumber, What};
 use crate::controller::Controller;
 use serde::Serialize;
 
@@ -97,7 +97,7 @@ pub struct RelaxedLimit {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct AtBound {
     /// Which.
-    pub parameter: Parameter,
+    pub parameter: TunedNumber,
     /// Its value.
     pub value: f64,
     /// Whether it is the upper one.

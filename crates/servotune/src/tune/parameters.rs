@@ -6,7 +6,7 @@
 
 use super::bounds::Ranges;
 use super::spec::Spec;
-use super::structure::{Kind, Setting};
+use super::structure::{ControllerKind, FixedOrSearched};
 use crate::controller::{Controller, Lowpass, Notch, Pid};
 use crate::lti::Section;
 use serde::Serialize;
@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs, reason = "the names are those of controller.toml; filters are counted from 0")]
-pub enum Parameter {
+pub enum TunedNumber {
     Kp,
     Ki,
     Kd,
@@ -42,20 +42,20 @@ pub enum Parameter {
     },
 }
 
-impl std::fmt::Display for Parameter {
+impl std::fmt::Display for TunedNumber {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Parameter::Kp => f.write_str("kp"),
-            Parameter::Ki => f.write_str("ki"),
-            Parameter::Kd => f.write_str("kd"),
-            Parameter::PositionGain => f.write_str("position gain"),
-            Parameter::VelocityGain => f.write_str("velocity gain"),
-            Parameter::VelocityIntegral => f.write_str("velocity integral gain"),
-            Parameter::DerivativeFilter => f.write_str("derivative filter"),
-            Parameter::LowpassFrequency { filter } => write!(f, "low-pass {} corner", filter + 1),
-            Parameter::NotchFrequency { filter } => write!(f, "notch {} centre", filter + 1),
-            Parameter::NotchDepth { filter } => write!(f, "notch {} depth", filter + 1),
-            Parameter::NotchPoleDamping { filter } => write!(f, "notch {} pole damping", filter + 1),
+            TunedNumber::Kp => f.write_str("kp"),
+            TunedNumber::Ki => f.write_str("ki"),
+            TunedNumber::Kd => f.write_str("kd"),
+            TunedNumber::PositionGain => f.write_str("position gain"),
+            TunedNumber::VelocityGain => f.write_str("velocity gain"),
+            TunedNumber::VelocityIntegral => f.write_str("velocity integral gain"),
+            TunedNumber::DerivativeFilter => f.write_str("derivative filter"),
+            TunedNumber::LowpassFrequency { filter } => write!(f, "low-pass {} corner", filter + 1),
+            TunedNumber::NotchFrequency { filter } => write!(f, "notch {} centre", filter + 1),
+            TunedNumber::NotchDepth { filter } => write!(f, "notch {} depth", filter + 1),
+            TunedNumber::NotchPoleDamping { filter } => write!(f, "notch {} pole damping", filter + 1),
         }
     }
 }
@@ -82,8 +82,8 @@ pub(super) const BELOW_HALF_RATE: f64 = 0.99;
 pub struct Parameters {
     /// The controller that the free numbers are put into.
     base: Controller,
-    kind: Kind,
-    free: Vec<Parameter>,
+    kind: ControllerKind,
+    free: Vec<TunedNumber>,
     /// Logarithms of the ranges, [from, to].
     bounds: Vec<[f64; 2]>,
     ranges: Ranges,
@@ -141,31 +141,31 @@ impl Parameters {
         let mut p = Parameters { base, kind, free: Vec::new(), bounds: Vec::new(), ranges: r };
         p.add_gains();
         let filter = match (structure.derivative_filter_s, kind) {
-            (_, Kind::Pi | Kind::PPi) => None,
-            (None, Kind::Lead) if start.is_none() => Some(LEAD_FILTER.map(|share| share * t)),
+            (_, ControllerKind::Pi | ControllerKind::PPi) => None,
+            (None, ControllerKind::Lead) if start.is_none() => Some(LEAD_FILTER.map(|share| share * t)),
             (None, _) => None,
-            (Some(Setting::Fixed(x)), _) => Some([x, x]),
-            (Some(Setting::Range(range)), _) => Some(range),
+            (Some(FixedOrSearched::Fixed(x)), _) => Some([x, x]),
+            (Some(FixedOrSearched::Range(range)), _) => Some(range),
         };
         if let Some(range) = filter {
-            p.add(Parameter::DerivativeFilter, range);
+            p.add(TunedNumber::DerivativeFilter, range);
         }
         for filter in 0..s.lowpasses {
-            p.add(Parameter::LowpassFrequency { filter }, lowpass_hz);
+            p.add(TunedNumber::LowpassFrequency { filter }, lowpass_hz);
         }
         for filter in 0..s.notches {
-            p.add(Parameter::NotchFrequency { filter }, notch_hz);
-            p.add(Parameter::NotchDepth { filter }, NOTCH_DEPTH);
-            p.add(Parameter::NotchPoleDamping { filter }, NOTCH_POLE_DAMPING);
+            p.add(TunedNumber::NotchFrequency { filter }, notch_hz);
+            p.add(TunedNumber::NotchDepth { filter }, NOTCH_DEPTH);
+            p.add(TunedNumber::NotchPoleDamping { filter }, NOTCH_POLE_DAMPING);
         }
         for i in 0..structure.peaks {
             let filter = s.notches + i;
             if orders.get(i).is_none() {
                 let [low, high] = r.crossover_hz;
-                p.add(Parameter::NotchFrequency { filter }, [0.05 * low, high]);
+                p.add(TunedNumber::NotchFrequency { filter }, [0.05 * low, high]);
             }
-            p.add(Parameter::NotchDepth { filter }, PEAK_HEIGHT);
-            p.add(Parameter::NotchPoleDamping { filter }, PEAK_POLE_DAMPING);
+            p.add(TunedNumber::NotchDepth { filter }, PEAK_HEIGHT);
+            p.add(TunedNumber::NotchPoleDamping { filter }, PEAK_POLE_DAMPING);
         }
         p
     }
@@ -174,32 +174,32 @@ impl Parameters {
     fn add_gains(&mut self) {
         let r = self.ranges;
         match self.kind {
-            Kind::Pid => {
-                self.add(Parameter::Kp, r.kp);
-                self.add(Parameter::Ki, r.ki_per_s);
-                self.add(Parameter::Kd, r.kd_s);
+            ControllerKind::Pid => {
+                self.add(TunedNumber::Kp, r.kp);
+                self.add(TunedNumber::Ki, r.ki_per_s);
+                self.add(TunedNumber::Kd, r.kd_s);
             }
-            Kind::Pi => {
+            ControllerKind::Pi => {
                 self.base.pid.kd_s = 0.0;
-                self.add(Parameter::Kp, r.kp);
-                self.add(Parameter::Ki, r.ki_per_s);
+                self.add(TunedNumber::Kp, r.kp);
+                self.add(TunedNumber::Ki, r.ki_per_s);
             }
-            Kind::PPi => {
+            ControllerKind::PPi => {
                 self.base.pid.derivative_filter_s = 0.0;
                 let [low, high] = r.crossover_hz;
-                self.add(Parameter::PositionGain, [0.02 * TAU * low, TAU * high]);
-                self.add(Parameter::VelocityGain, r.kd_s);
-                self.add(Parameter::VelocityIntegral, [1e-3 * r.kp[0], r.kp[1]]);
+                self.add(TunedNumber::PositionGain, [0.02 * TAU * low, TAU * high]);
+                self.add(TunedNumber::VelocityGain, r.kd_s);
+                self.add(TunedNumber::VelocityIntegral, [1e-3 * r.kp[0], r.kp[1]]);
             }
-            Kind::Lead => {
+            ControllerKind::Lead => {
                 self.base.pid.ki_per_s = 0.0;
-                self.add(Parameter::Kp, r.kp);
-                self.add(Parameter::Kd, r.kd_s);
+                self.add(TunedNumber::Kp, r.kp);
+                self.add(TunedNumber::Kd, r.kd_s);
             }
         }
     }
 
-    fn add(&mut self, parameter: Parameter, [from, to]: [f64; 2]) {
+    fn add(&mut self, parameter: TunedNumber, [from, to]: [f64; 2]) {
         if from == to {
             if let Some(number) = Self::raw(&mut self.base, parameter) {
                 *number = from;
@@ -211,22 +211,22 @@ impl Parameters {
     }
 
     /// Where the number stands; none for those of a cascade. The depth of a notch is stored as its zero damping and set by [`Self::put`].
-    fn raw(c: &mut Controller, parameter: Parameter) -> Option<&mut f64> {
+    fn raw(c: &mut Controller, parameter: TunedNumber) -> Option<&mut f64> {
         Some(match parameter {
-            Parameter::Kp => &mut c.pid.kp,
-            Parameter::Ki => &mut c.pid.ki_per_s,
-            Parameter::Kd => &mut c.pid.kd_s,
-            Parameter::DerivativeFilter => &mut c.pid.derivative_filter_s,
-            Parameter::LowpassFrequency { filter } => &mut c.lowpass[filter].frequency_hz,
-            Parameter::NotchFrequency { filter } => &mut c.notch[filter].frequency_hz,
-            Parameter::NotchDepth { filter } => &mut c.notch[filter].zero_damping_ratio,
-            Parameter::NotchPoleDamping { filter } => &mut c.notch[filter].pole_damping_ratio,
-            Parameter::PositionGain | Parameter::VelocityGain | Parameter::VelocityIntegral => return None,
+            TunedNumber::Kp => &mut c.pid.kp,
+            TunedNumber::Ki => &mut c.pid.ki_per_s,
+            TunedNumber::Kd => &mut c.pid.kd_s,
+            TunedNumber::DerivativeFilter => &mut c.pid.derivative_filter_s,
+            TunedNumber::LowpassFrequency { filter } => &mut c.lowpass[filter].frequency_hz,
+            TunedNumber::NotchFrequency { filter } => &mut c.notch[filter].frequency_hz,
+            TunedNumber::NotchDepth { filter } => &mut c.notch[filter].zero_damping_ratio,
+            TunedNumber::NotchPoleDamping { filter } => &mut c.notch[filter].pole_damping_ratio,
+            TunedNumber::PositionGain | TunedNumber::VelocityGain | TunedNumber::VelocityIntegral => return None,
         })
     }
 
     /// The free numbers, in the order of the vector.
-    pub fn free(&self) -> &[Parameter] {
+    pub fn free(&self) -> &[TunedNumber] {
         &self.free
     }
 
@@ -246,7 +246,7 @@ impl Parameters {
     }
 
     /// The kind of controller.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> ControllerKind {
         self.kind
     }
 
@@ -270,18 +270,20 @@ impl Parameters {
     /// The same, wherever it lies.
     pub(super) fn vector_outside(&self, c: &Controller) -> Vec<f64> {
         let [position, velocity, integral] = Self::cascade(&c.pid);
-        let of = |parameter: &Parameter| match *parameter {
-            Parameter::Kp => c.pid.kp,
-            Parameter::Ki => c.pid.ki_per_s,
-            Parameter::Kd => c.pid.kd_s,
-            Parameter::PositionGain => position,
-            Parameter::VelocityGain => velocity,
-            Parameter::VelocityIntegral => integral,
-            Parameter::DerivativeFilter => c.pid.derivative_filter_s,
-            Parameter::LowpassFrequency { filter } => c.lowpass[filter].frequency_hz,
-            Parameter::NotchFrequency { filter } => c.notch[filter].frequency_hz,
-            Parameter::NotchDepth { filter } => c.notch[filter].zero_damping_ratio / c.notch[filter].pole_damping_ratio,
-            Parameter::NotchPoleDamping { filter } => c.notch[filter].pole_damping_ratio,
+        let of = |parameter: &TunedNumber| match *parameter {
+            TunedNumber::Kp => c.pid.kp,
+            TunedNumber::Ki => c.pid.ki_per_s,
+            TunedNumber::Kd => c.pid.kd_s,
+            TunedNumber::PositionGain => position,
+            TunedNumber::VelocityGain => velocity,
+            TunedNumber::VelocityIntegral => integral,
+            TunedNumber::DerivativeFilter => c.pid.derivative_filter_s,
+            TunedNumber::LowpassFrequency { filter } => c.lowpass[filter].frequency_hz,
+            TunedNumber::NotchFrequency { filter } => c.notch[filter].frequency_hz,
+            TunedNumber::NotchDepth { filter } => {
+                c.notch[filter].zero_damping_ratio / c.notch[filter].pole_damping_ratio
+            }
+            TunedNumber::NotchPoleDamping { filter } => c.notch[filter].pole_damping_ratio,
         };
         self.free.iter().map(|p| of(p).max(f64::MIN_POSITIVE).ln()).collect()
     }
@@ -300,9 +302,9 @@ impl Parameters {
         for (x, &parameter) in x.iter().zip(&self.free) {
             let value = x.exp();
             match parameter {
-                Parameter::PositionGain => cascade[0] = value,
-                Parameter::VelocityGain => cascade[1] = value,
-                Parameter::VelocityIntegral => cascade[2] = value,
+                TunedNumber::PositionGain => cascade[0] = value,
+                TunedNumber::VelocityGain => cascade[1] = value,
+                TunedNumber::VelocityIntegral => cascade[2] = value,
                 _ => {
                     if let Some(number) = Self::raw(c, parameter) {
                         *number = value;
@@ -310,12 +312,12 @@ impl Parameters {
                 }
             }
         }
-        if self.kind == Kind::PPi {
+        if self.kind == ControllerKind::PPi {
             let [a, b, i] = cascade;
             (c.pid.kp, c.pid.ki_per_s, c.pid.kd_s) = (a * b + i, a * i, b);
         }
         for (x, parameter) in x.iter().zip(&self.free) {
-            if let Parameter::NotchDepth { filter } = *parameter {
+            if let TunedNumber::NotchDepth { filter } = *parameter {
                 let notch = &mut c.notch[filter];
                 notch.zero_damping_ratio = x.exp() * notch.pole_damping_ratio;
             }
@@ -332,10 +334,10 @@ impl Parameters {
     /// Index of the section that parameter `i` acts on, in the firmware's order.
     pub fn section_of(&self, i: usize) -> usize {
         match self.free[i] {
-            Parameter::LowpassFrequency { filter } => 1 + filter,
-            Parameter::NotchFrequency { filter }
-            | Parameter::NotchDepth { filter }
-            | Parameter::NotchPoleDamping { filter } => 1 + self.base.lowpass.len() + filter,
+            TunedNumber::LowpassFrequency { filter } => 1 + filter,
+            TunedNumber::NotchFrequency { filter }
+            | TunedNumber::NotchDepth { filter }
+            | TunedNumber::NotchPoleDamping { filter } => 1 + self.base.lowpass.len() + filter,
             _ => 0,
         }
     }
@@ -344,7 +346,11 @@ impl Parameters {
     pub(super) fn is_gain(&self, i: usize) -> bool {
         matches!(
             self.free[i],
-            Parameter::Kp | Parameter::Ki | Parameter::Kd | Parameter::VelocityGain | Parameter::VelocityIntegral
+            TunedNumber::Kp
+                | TunedNumber::Ki
+                | TunedNumber::Kd
+                | TunedNumber::VelocityGain
+                | TunedNumber::VelocityIntegral
         )
     }
 
@@ -353,8 +359,8 @@ impl Parameters {
         if c.pid.ki_per_s <= 0.0 {
             return None;
         }
-        let slope = |p: &Parameter| match p {
-            Parameter::Ki | Parameter::PositionGain | Parameter::VelocityIntegral => 1.0,
+        let slope = |p: &TunedNumber| match p {
+            TunedNumber::Ki | TunedNumber::PositionGain | TunedNumber::VelocityIntegral => 1.0,
             _ => 0.0,
         };
         Some((c.pid.ki_per_s.ln(), self.free.iter().map(slope).collect()))

@@ -112,8 +112,8 @@ const SAME: f64 = 1e-4;
 
 fn point(allowed: f64, outcome: &Outcome) -> ParetoPoint {
     let found: Vec<_> = outcome.after().iter().map(|p| &p.judged.found).collect();
-    let largest = |of: &dyn Fn(&super::Found) -> f64| found.iter().map(|f| of(f)).fold(0.0, f64::max);
-    let norm = |of: &dyn Fn(&super::Found) -> Option<f64>| found.iter().filter_map(|f| of(f)).reduce(f64::max);
+    let largest = |of: &dyn Fn(&super::FoundFigures) -> f64| found.iter().map(|f| of(f)).fold(0.0, f64::max);
+    let norm = |of: &dyn Fn(&super::FoundFigures) -> Option<f64>| found.iter().filter_map(|f| of(f)).reduce(f64::max);
     ParetoPoint {
         allowed,
         feasible: outcome.tuned().is_some(),

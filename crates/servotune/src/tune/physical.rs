@@ -4,7 +4,8 @@
 //! worst of them; and the judgement of a controller: margins over the amplitude, the write simulated with every effect.
 
 use super::{
-    Found, Judged, Judgement, Machine, Outcome, Requirement, Side, Spec, TuneError, TuneSettings, What, tune_jointly,
+    FoundFigures, Judged, Judgement, Machine, Outcome, Requirement, Side, Spec, TuneError, TuneSettings, What,
+    tune_jointly,
 };
 use crate::controller::Controller;
 use crate::feedback::{
@@ -86,7 +87,7 @@ pub fn judge_physical(
     let write = simulate_physical(physics, controller, profile)?;
     let f = figures(&write.pes, profile);
     let of = |k: usize| f.harmonics.iter().find(|h| h.k == k).map_or(0.0, |h| h.amplitude);
-    let found = Found {
+    let found = FoundFigures {
         unstable_poles: described.worst.unstable_poles,
         phase_margin_deg: described.worst.phase_margin_deg,
         gain_margin_db: described.worst.gain_margin_db,
@@ -97,7 +98,7 @@ pub fn judge_physical(
         dft_high: f.dft_high,
         harmonics: spec.limits.harmonics.iter().map(|h| of(h.k)).collect(),
         command_peak: Some(write.command.iter().fold(0.0, |a, u| u.abs().max(a))),
-        ..Found::default()
+        ..FoundFigures::default()
     };
     let judged = Judged::of(&Requirement::list(&spec.margins, &spec.limits), found);
     Ok(PhysicalJudgement { margins: described, linear, judged })

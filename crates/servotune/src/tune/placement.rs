@@ -7,7 +7,7 @@ use super::found::Polished;
 use super::found::order;
 use super::polish::refine;
 use super::polish::{Goal, promise};
-use super::{Minimise, Parameter, Score, TuningProblem, TuningWork};
+use super::{Minimise, Score, TunedNumber, TuningProblem, TuningWork};
 use crate::numeric::random::Random;
 
 /// Places that are weighed for one notch.
@@ -63,9 +63,9 @@ pub(super) fn placed(
         let (width, depth) = (random.uniform(), random.between(DEPTH[0], DEPTH[1]));
         for ((x, parameter), [from, to]) in moved.iter_mut().zip(p.free()).zip(p.bounds()) {
             match *parameter {
-                Parameter::NotchFrequency { filter: f } if f == filter => *x = from + (to - from) * share,
-                Parameter::NotchPoleDamping { filter: f } if f == filter => *x = from + (to - from) * width,
-                Parameter::NotchDepth { filter: f } if f == filter => *x = depth.ln().clamp(*from, *to),
+                TunedNumber::NotchFrequency { filter: f } if f == filter => *x = from + (to - from) * share,
+                TunedNumber::NotchPoleDamping { filter: f } if f == filter => *x = from + (to - from) * width,
+                TunedNumber::NotchDepth { filter: f } if f == filter => *x = depth.ln().clamp(*from, *to),
                 _ => {}
             }
         }
@@ -80,8 +80,8 @@ pub(super) fn placed(
 /// The notches that the search lays; a peak filter, which stays where it is, cannot go below a height of 1.
 pub(super) fn notches(problem: &TuningProblem) -> Vec<usize> {
     let p = problem.parameters();
-    let notch = |(parameter, [from, _]): (&Parameter, &[f64; 2])| match *parameter {
-        Parameter::NotchDepth { filter } if *from < 0.0 => Some(filter),
+    let notch = |(parameter, [from, _]): (&TunedNumber, &[f64; 2])| match *parameter {
+        TunedNumber::NotchDepth { filter } if *from < 0.0 => Some(filter),
         _ => None,
     };
     p.free().iter().zip(p.bounds()).filter_map(notch).collect()
@@ -94,7 +94,7 @@ fn idle(problem: &TuningProblem, end: &Polished, work: &mut TuningWork) -> Optio
         let mut flat = end.x.clone();
         let p = problem.parameters();
         for ((x, parameter), [_, to]) in flat.iter_mut().zip(p.free()).zip(p.bounds()) {
-            if matches!(*parameter, Parameter::NotchDepth { filter: f } if f == *filter) {
+            if matches!(*parameter, TunedNumber::NotchDepth { filter: f } if f == *filter) {
                 *x = *to;
             }
         }

@@ -8,7 +8,7 @@ use super::machine::{Buffers, Prepared};
 use super::objective::Minimise;
 use super::parameters::chain_of;
 use super::record_figures::{Asked, RecordFigure};
-use super::requirements::{CurveFound, Found, Requirement, Side, What};
+use super::requirements::{CurveFound, FoundFigures, Requirement, Side, What};
 use super::row::{Moves, Row};
 use super::score::{INSIDE, Score, UNSTABLE};
 use super::{Machine, Parameters, Ranges, Spec, TuneError};
@@ -237,7 +237,7 @@ impl TuningProblem {
     }
 
     /// The figures of the last candidate on machine `i`, as the search sees them.
-    pub fn found(&self, i: usize, work: &TuningWork) -> Found {
+    pub fn found(&self, i: usize, work: &TuningWork) -> FoundFigures {
         let b = &work.buffers[i];
         let q = &b.on.quick;
         let figure = |f: RecordFigure| self.asked.place(f).and_then(|at| b.figures.get(at).copied());
@@ -255,7 +255,7 @@ impl TuningProblem {
             let worst = rows.max_by(|a, b| a.value.total_cmp(&b.value));
             worst.map_or(CurveFound::default(), |r| CurveFound { ratio: (1.0 + r.value) * limit, hz: r.w_rad_s / TAU })
         };
-        Found {
+        FoundFigures {
             unstable_poles: q.unstable_poles,
             phase_margin_deg: gain.map(|e| e.value),
             gain_crossover_hz: gain.map(|e| e.w_rad_s / TAU),

@@ -59,7 +59,7 @@ pub struct Requirement {
 
 /// Found: the figures of one controller on one machine, in the units of [`What::unit`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Found {
+pub struct FoundFigures {
     /// Closed-loop poles outside the unit circle.
     pub unstable_poles: i64,
     /// Read off a sweep: a margin without its crossing is not known, where that of a model is unlimited.
@@ -99,7 +99,7 @@ pub struct Found {
     pub curves: Vec<CurveFound>,
 }
 
-impl Found {
+impl FoundFigures {
     /// Sum of both DFT norms (position_unit), 0 without a write.
     pub fn dft(&self) -> f64 {
         self.dft_low.unwrap_or(0.0) + self.dft_high.unwrap_or(0.0)
@@ -136,7 +136,7 @@ pub struct JudgedLimit {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Judged {
     /// What was found.
-    pub found: Found,
+    pub found: FoundFigures,
     /// Every limit, in the order of the spec.
     pub limits: Vec<JudgedLimit>,
 }
@@ -249,7 +249,7 @@ impl Requirement {
     }
 
     /// The violation of the figures; a margin without its crossing is unlimited on a model and missed on a sweep, a crossover without one is missed.
-    pub fn violation_of(&self, found: &Found, harmonic: &mut usize) -> f64 {
+    pub fn violation_of(&self, found: &FoundFigures, harmonic: &mut usize) -> f64 {
         match self.found_in(found, harmonic) {
             Some(x) if x.is_nan() => f64::INFINITY,
             Some(x) => self.violation(x),
@@ -259,7 +259,7 @@ impl Requirement {
     }
 
     /// The figure that this requirement speaks of; `harmonic` counts the harmonics met so far.
-    pub(super) fn found_in(&self, found: &Found, harmonic: &mut usize) -> Option<f64> {
+    pub(super) fn found_in(&self, found: &FoundFigures, harmonic: &mut usize) -> Option<f64> {
         match self.what {
             What::PhaseMargin => found.phase_margin_deg,
             What::GainMargin => found.gain_margin_db,
@@ -292,7 +292,7 @@ impl JudgedLimit {
 
 impl Judged {
     /// Judges what was found.
-    pub fn of(wanted: &[Requirement], found: Found) -> Judged {
+    pub fn of(wanted: &[Requirement], found: FoundFigures) -> Judged {
         let (mut a, mut b) = (0, 0);
         let limits = wanted
             .iter()

@@ -1,7 +1,7 @@
 //! The keys of spec.toml. Reader: [`super::Spec`].
 
 use super::spec::{FILTERS, GUARD};
-use crate::document::{End, FileKey as Key, KeyFile, KeyTable, Kind, Need, Range};
+use crate::document::{End, FileKey as Key, KeyFile, KeyKind, KeyTable, Need, Range};
 
 const TOP: &[Key] = &[
     Key::path("profile", "the move; needed by limits and objectives of a write").or_none(),
@@ -20,12 +20,12 @@ const TOP: &[Key] = &[
 const OBJECTIVE: &[Key] = &[
     Key::new(
         "minimise",
-        Kind::Choice(&["pes_rms", "dft", "disturbance", "bandwidth", "integral", "room"]),
+        KeyKind::Choice(&["pes_rms", "dft", "disturbance", "bandwidth", "integral", "room"]),
         "",
         "`specs/tuning.md`",
     )
     .or_else("`pes_rms` with a profile, `disturbance` without"),
-    Key::new("bands_hz", Kind::Pairs, "Hz", "bands of `dft`; of `dft_low` the first, of `dft_high` the second")
+    Key::new("bands_hz", KeyKind::Pairs, "Hz", "bands of `dft`; of `dft_low` the first, of `dft_high` the second")
         .or_toml("[[600, 1500], [1500, 3000]]")
         .above(0.0)
         .items(1, 8),
@@ -43,9 +43,9 @@ const MARGINS: &[Key] = &[
         .takes(Range::Between(End::Without(0.0), End::Without(180.0))),
     Key::number("gain_margin_db", "dB", "at least").or_none().above(0.0),
     Key::number("max_sensitivity", "", "at most").or_none().above(1.0),
-    Key::new("gain_crossover_hz", Kind::Pair, "Hz", "every gain crossing lies inside").or_none().above(0.0),
+    Key::new("gain_crossover_hz", KeyKind::Pair, "Hz", "every gain crossing lies inside").or_none().above(0.0),
     Key::number("bandwidth_hz", "Hz", "at least: -3 dB of T").or_none().above(0.0),
-    Key::new("phase_stabilised_hz", Kind::Pairs, "Hz", "there too |L| may cross 1").or_toml("[]").above(0.0),
+    Key::new("phase_stabilised_hz", KeyKind::Pairs, "Hz", "there too |L| may cross 1").or_toml("[]").above(0.0),
 ];
 
 const LIMITS: &[Key] = &[
@@ -79,22 +79,22 @@ const HARMONICS: &[Key] = &[
 ];
 
 const CURVE: &[Key] = &[
-    Key::new("of", Kind::Choice(&["L", "S", "T", "PS", "CS"]), "", "magnitude that is limited"),
-    Key::new("side", Kind::Choice(&["at_most", "at_least"]), "", "which side is good"),
-    Key::new("hz", Kind::Numbers, "Hz", "points").above(0.0).items(2, usize::MAX).also("rising"),
-    Key::new("db", Kind::Numbers, "dB", "level at each, straight between").also("as many"),
+    Key::new("of", KeyKind::Choice(&["L", "S", "T", "PS", "CS"]), "", "magnitude that is limited"),
+    Key::new("side", KeyKind::Choice(&["at_most", "at_least"]), "", "which side is good"),
+    Key::new("hz", KeyKind::Numbers, "Hz", "points").above(0.0).items(2, usize::MAX).also("rising"),
+    Key::new("db", KeyKind::Numbers, "dB", "level at each, straight between").also("as many"),
 ];
 
 const FOUND: f64 = FILTERS as f64;
 
 const STRUCTURE: &[Key] = &[
-    Key::new("controller", Kind::Choice(&["pid", "pi", "p_pi", "lead"]), "", "form").or_toml("\"pid\""),
-    Key::new("derivative_filter_s", Kind::NumberOrPair, "s", "a number is fixed, [from, to] is searched")
+    Key::new("controller", KeyKind::Choice(&["pid", "pi", "p_pi", "lead"]), "", "form").or_toml("\"pid\""),
+    Key::new("derivative_filter_s", KeyKind::NumberOrPair, "s", "a number is fixed, [from, to] is searched")
         .or_else("the start's, else 0.3 sample times, searched where no table with that meets the limits")
         .at_least(0.0)
         .also("[from, to] above 0"),
     Key::integer("peaks", "", "peak filters at run-out orders").or(0.0).within(0.0, FOUND),
-    Key::new("feedforward", Kind::Bool, "", "set to the profile's move").or_toml("false"),
+    Key::new("feedforward", KeyKind::Bool, "", "set to the profile's move").or_toml("false"),
 ];
 
 const SEARCH: &[Key] = &[
@@ -109,11 +109,11 @@ const SCALED: &str = "scaled from the plant";
 const RATE: &str = "up to 0.45 of the sample rate";
 
 const BOUNDS: &[Key] = &[
-    Key::new("kp", Kind::Pair, "cmd/pos", "proportional gain").or_else(SCALED).above(0.0),
-    Key::new("ki_per_s", Kind::Pair, "cmd/pos/s", "integral gain").or_else(SCALED).at_least(0.0).also(OFF),
-    Key::new("kd_s", Kind::Pair, "cmd s/pos", "derivative gain").or_else(SCALED).at_least(0.0).also(OFF),
-    Key::new("lowpass_hz", Kind::Pair, "Hz", "corners").or_else(RATE).above(0.0),
-    Key::new("notch_hz", Kind::Pair, "Hz", "centres").or_else(RATE).above(0.0),
+    Key::new("kp", KeyKind::Pair, "cmd/pos", "proportional gain").or_else(SCALED).above(0.0),
+    Key::new("ki_per_s", KeyKind::Pair, "cmd/pos/s", "integral gain").or_else(SCALED).at_least(0.0).also(OFF),
+    Key::new("kd_s", KeyKind::Pair, "cmd s/pos", "derivative gain").or_else(SCALED).at_least(0.0).also(OFF),
+    Key::new("lowpass_hz", KeyKind::Pair, "Hz", "corners").or_else(RATE).above(0.0),
+    Key::new("notch_hz", KeyKind::Pair, "Hz", "centres").or_else(RATE).above(0.0),
 ];
 
 /// The keys of spec.toml.

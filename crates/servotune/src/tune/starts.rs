@@ -3,7 +3,7 @@
 //! A loop is shaped by what an engineer would choose (crossover, lead, integral corner, filters); the gains follow from
 //! |L| = 1 at the crossover. Nearly every start is then stable, where random gains nearly never are.
 
-use super::{Parameter, TuningProblem};
+use super::{TunedNumber, TuningProblem};
 use crate::controller::Controller;
 use crate::feedback::SampledPlant;
 use crate::lti::{FrequencyResponse, Sections};
@@ -152,9 +152,9 @@ fn shaped(problem: &TuningProblem, machine: usize, s: &Shape) -> Vec<f64> {
     for (parameter, [from, to]) in p.free().iter().zip(p.bounds()) {
         let share = |x: f64| (from + (to - from) * x).exp();
         match *parameter {
-            Parameter::LowpassFrequency { filter } => c.lowpass[filter].frequency_hz = share(s.lowpass),
-            Parameter::DerivativeFilter => c.pid.derivative_filter_s = share(s.other),
-            Parameter::NotchFrequency { filter } => {
+            TunedNumber::LowpassFrequency { filter } => c.lowpass[filter].frequency_hz = share(s.lowpass),
+            TunedNumber::DerivativeFilter => c.pid.derivative_filter_s = share(s.other),
+            TunedNumber::NotchFrequency { filter } => {
                 let mode = |k: usize| worst_mode(m, s.crossover_hz, k).map(|hz| hz.clamp(from.exp(), to.exp()));
                 let hz = match s.notch[filter % NOTCHES] {
                     Place::At(x) => share(x),
@@ -162,7 +162,7 @@ fn shaped(problem: &TuningProblem, machine: usize, s: &Shape) -> Vec<f64> {
                 };
                 c.notch[filter].frequency_hz = hz;
             }
-            Parameter::NotchPoleDamping { filter } => {
+            TunedNumber::NotchPoleDamping { filter } => {
                 // A range beyond a notch's own is a peak filter's.
                 let damping = if to.exp() > 0.5 { s.notch_damping[filter % NOTCHES] } else { share(s.other) };
                 c.notch[filter].pole_damping_ratio = damping.clamp(from.exp(), to.exp());
@@ -171,7 +171,7 @@ fn shaped(problem: &TuningProblem, machine: usize, s: &Shape) -> Vec<f64> {
         }
     }
     for (parameter, [from, to]) in p.free().iter().zip(p.bounds()) {
-        if let Parameter::NotchDepth { filter } = *parameter {
+        if let TunedNumber::NotchDepth { filter } = *parameter {
             let depth =
                 if *to > 0.0 { (from + 0.3 * (to - from) * s.other).exp() } else { s.notch_depth[filter % NOTCHES] };
             c.notch[filter].zero_damping_ratio = depth * c.notch[filter].pole_damping_ratio;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Kind of the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum ControllerKind {
     /// Proportional, integral, derivative, parallel form.
     #[default]
     Pid,
@@ -25,7 +25,7 @@ pub enum Kind {
 /// A number that is fixed, or searched between two.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Setting {
+pub enum FixedOrSearched {
     /// Fixed.
     Fixed(f64),
     /// Searched, [from, to].
@@ -37,10 +37,10 @@ pub enum Setting {
 #[serde(deny_unknown_fields, default)]
 pub struct Structure {
     /// Kind.
-    pub controller: Kind,
+    pub controller: ControllerKind,
     /// Time constant of the derivative filter (s); without it the start controller's, else 0.3 of the sample time,
     /// and searched where that meets no limit set.
-    pub derivative_filter_s: Option<Setting>,
+    pub derivative_filter_s: Option<FixedOrSearched>,
     /// Peak filters (a notch upside down) at the strongest run-out orders of the profile, 0 to 3.
     pub peaks: usize,
     /// Velocity and acceleration feed-forward, set to the move of the profile.
@@ -50,8 +50,8 @@ pub struct Structure {
 impl Structure {
     pub(super) fn check(&self) -> Result<(), SpecError> {
         match self.derivative_filter_s {
-            Some(Setting::Range(r)) => interval("structure.derivative_filter_s", r, false),
-            Some(Setting::Fixed(found)) if !(found.is_finite() && found >= 0.0) => {
+            Some(FixedOrSearched::Range(r)) => interval("structure.derivative_filter_s", r, false),
+            Some(FixedOrSearched::Fixed(found)) if !(found.is_finite() && found >= 0.0) => {
                 let key = "structure.derivative_filter_s";
                 Err(SpecError::Range { key, found, expected: "a finite time of at least 0 s" })
             }

@@ -6,7 +6,7 @@ use super::judge::judged;
 use super::outcome::Outcome;
 use super::parameters::PID_FILTER;
 use super::problem::ranges;
-use super::structure::{Kind, Setting};
+use super::structure::{ControllerKind, FixedOrSearched};
 use super::{Machine, Parameters, SearchWatch, Spec, TuneError, TuneSettings, unwatched};
 use crate::controller::Controller;
 
@@ -86,12 +86,12 @@ fn tune_feedback(job: Job<'_>, spec: &Spec, start: Option<&Controller>) -> Resul
     let outcome = tune_as_said(job, spec, start, parameters(spec)?)?;
     let Outcome::Infeasible(missed) = &outcome else { return Ok(outcome) };
     let structure = &spec.structure;
-    if start.is_some() || structure.controller != Kind::Pid || structure.derivative_filter_s.is_some() {
+    if start.is_some() || structure.controller != ControllerKind::Pid || structure.derivative_filter_s.is_some() {
         return Ok(outcome);
     }
     let mut free = spec.clone();
     let t = missed.controller.sample_time_s;
-    free.structure.derivative_filter_s = Some(Setting::Range(PID_FILTER.map(|samples| samples * t)));
+    free.structure.derivative_filter_s = Some(FixedOrSearched::Range(PID_FILTER.map(|samples| samples * t)));
     let near: Vec<Controller> = job.near.iter().chain([&missed.controller]).cloned().collect();
     let mut searched = tune_as_said(Job { near: &near, ..job }, &free, start, parameters(&free)?)?;
     let work = match &mut searched {

@@ -13,8 +13,8 @@ use crate::feedback::{LoopOnGrid, ResponseCurve, SampledPlant, SectionGradients}
 use crate::lti::{DiscretePlant, Section};
 use crate::numeric::statistics::rms;
 use crate::pes::{
-    self, Figure, NoisePower, NoisePowerWork, PesError, Profile, QuickScene, QuickWork, Record, Slopes, SpectralPes,
-    SpectralWork, WindowDft,
+    self, Figure, NoisePower, NoisePowerWork, PesError, Profile, QuickScene, QuickWork, Slopes, SpectralPes,
+    SpectralWork, WindowDft, WriteRecord,
 };
 
 /// A write made ready for one machine.
@@ -172,7 +172,7 @@ impl ModelWrite {
     ) {
         self.scene.run(chain, c.feedforward.as_ref(), c.output_limit, self.records, &mut b.work);
         if self.records.still && asked.minimise == Minimise::Dft {
-            self.dft.amplitudes(b.work.window(Record::Still), &mut b.expected);
+            self.dft.amplitudes(b.work.window(WriteRecord::Still), &mut b.expected);
             if let Some(noise) = &self.noise {
                 noise.bins(on, &mut b.noise, &mut b.shares);
                 let powers = b.expected.iter_mut().zip(&b.shares);
@@ -180,20 +180,20 @@ impl ModelWrite {
             }
         }
         if self.records.drawn {
-            self.dft.amplitudes(b.work.window(Record::Drawn), &mut b.drawn);
+            self.dft.amplitudes(b.work.window(WriteRecord::Drawn), &mut b.drawn);
         }
         band_figures(&self.dft, asked, &b.expected, &b.drawn, figures);
         if asked.minimise == Minimise::PesRms {
-            let window = b.work.window(Record::Still);
+            let window = b.work.window(WriteRecord::Still);
             let mean = window.iter().map(|e| e * e).sum::<f64>() / window.len() as f64;
             let variance = self.noise.as_ref().map_or(0.0, |n| n.position.variance(on).max(0.0));
             figures[0] = (mean + variance).sqrt();
         }
         if let Some(at) = asked.place(RecordFigure::CommandPeak) {
-            figures[at] = b.work.peak(Record::Drawn).1;
+            figures[at] = b.work.peak(WriteRecord::Drawn).1;
         }
         if let Some(at) = asked.place(RecordFigure::CommandRms) {
-            let u = b.work.command(Record::Drawn);
+            let u = b.work.command(WriteRecord::Drawn);
             figures[at] = rms(u);
         }
     }
@@ -217,7 +217,7 @@ impl ModelWrite {
         let mut weights = std::mem::take(&mut b.weights);
         for (at, figure) in asked.figures.iter().enumerate().filter(|(at, _)| wanted[*at]) {
             let objective = *figure == RecordFigure::Objective;
-            let record = if objective { Record::Still } else { Record::Drawn };
+            let record = if objective { WriteRecord::Still } else { WriteRecord::Drawn };
             let (mut from, mut command) = (0, Vec::new());
             weights.clear();
             match figure {

@@ -1,17 +1,17 @@
 //! Records of a made-up machine under its own controller: what a person would log to find out what the model leaves out.
 //!
 //! In: a plant with effects, a controller, reference and excitation, noise. Out: rows of a recording as the contract has them. Physics
-//! acts by [`Machine`]; noise is white at the sensor and reaches the command through the loop.
+//! acts by [`SimulatedMachine`]; noise is white at the sensor and reaches the command through the loop.
 
 use super::TwinError;
-use crate::controller::{Controller, Law};
+use crate::controller::{ControlLaw, Controller};
 use crate::lti::{Plant, step_chain};
 use crate::numeric::random::Random;
-use crate::physics::{Machine, Scene, Setting};
+use crate::physics::{LawSetting, MotionScene, SimulatedMachine};
 use std::f64::consts::{PI, TAU};
 
 /// One row: reference, excitation, command, position.
-pub type Row = [f64; 4];
+pub type TwinRow = [f64; 4];
 
 /// A multisine: lines 1 to `lines` of the record's length, equal amplitudes, phases after Schroeder (IEEE Trans. Information Theory 16,
 /// 1970), of this rms.
@@ -35,8 +35,8 @@ pub fn stroke(samples: usize, begins: usize, lasts: usize, distance: f64) -> Vec
 }
 
 /// The machine of a scene as nothing but plant, rate and travel know it.
-pub fn scene(plant: &Plant, sample_time_s: f64, travel: f64, samples: usize, noise: f64) -> Scene {
-    Scene {
+pub fn scene(plant: &Plant, sample_time_s: f64, travel: f64, samples: usize, noise: f64) -> MotionScene {
+    MotionScene {
         plant: plant.clone(),
         sample_time_s,
         spindle_hz: None,
@@ -55,15 +55,15 @@ pub fn scene(plant: &Plant, sample_time_s: f64, travel: f64, samples: usize, noi
 
 /// A record in closed loop, from rest.
 pub fn record(
-    scene: &Scene,
-    effects: &[&Setting],
+    scene: &MotionScene,
+    effects: &[&LawSetting],
     controller: &Controller,
     reference: &[f64],
     excitation: &[f64],
     random: &mut Random,
-) -> Result<Vec<Row>, TwinError> {
-    let law = Law::new(controller)?;
-    let mut machine = Machine::new(&scene.plant, effects, scene)?;
+) -> Result<Vec<TwinRow>, TwinError> {
+    let law = ControlLaw::new(controller)?;
+    let mut machine = SimulatedMachine::new(&scene.plant, effects, scene)?;
     let mut memory = law.rest();
     let mut rows = Vec::with_capacity(reference.len());
     for (k, (&r, &d)) in reference.iter().zip(excitation).enumerate() {

@@ -5,7 +5,7 @@
 //! Spec: `specs/certificate.md`.
 
 use super::{
-    BoxWatch, Certificate, Inputs, LEAST_DAMPING, LimitVerdict, Source, Stability, Uncertainty, VerifyError,
+    BoxWatch, Certificate, Inputs, LEAST_DAMPING, LimitVerdict, SourceFile, Stability, Uncertainty, VerifyError,
     VerifySettings, Word, certify_watched,
 };
 use crate::controller::Controller;
@@ -19,13 +19,13 @@ use crate::tune::{
 
 /// What a table is tuned and proved on.
 #[derive(Clone, Copy, Debug)]
-pub enum Ground<'a> {
+pub enum ProvedOn<'a> {
     /// A plant model and its file.
     Plant {
         /// The model.
         plant: &'a Plant,
         /// The file that the certificate names.
-        source: &'a Source,
+        source: &'a SourceFile,
     },
     /// A sweep, with the machine made from it.
     Sweep {
@@ -40,13 +40,13 @@ pub enum Ground<'a> {
 #[derive(Clone, Debug)]
 pub struct Assurance<'a> {
     /// The machine.
-    pub ground: Ground<'a>,
+    pub ground: ProvedOn<'a>,
     /// Limits and objective.
     pub spec: &'a Spec,
     /// The spec's file, and the profile's.
-    pub spec_source: &'a Source,
+    pub spec_source: &'a SourceFile,
     /// See above.
-    pub profile: Option<&'a Source>,
+    pub profile: Option<&'a SourceFile>,
     /// Box around the plant; of a sweep the gain alone.
     pub uncertainty: Uncertainty,
     /// Controller to start from.
@@ -105,14 +105,14 @@ pub fn tune_assured(
     watch: &Watched<'_>,
 ) -> Result<Assured, VerifyError> {
     let corners: Vec<Plant> = match &job.ground {
-        Ground::Plant { plant, .. } => corners(plant, &job.uncertainty),
-        Ground::Sweep { .. } => Vec::new(),
+        ProvedOn::Plant { plant, .. } => corners(plant, &job.uncertainty),
+        ProvedOn::Sweep { .. } => Vec::new(),
     };
     let machines: Vec<Machine<'_>> = match &job.ground {
-        Ground::Plant { plant, .. } => {
+        ProvedOn::Plant { plant, .. } => {
             std::iter::once(Machine::Model(plant)).chain(corners.iter().map(Machine::Model)).collect()
         }
-        Ground::Sweep { machine, .. } => vec![*machine],
+        ProvedOn::Sweep { machine, .. } => vec![*machine],
     };
     let settings = TuneSettings { nominal_first: true, ..*settings };
     let later = TuneSettings { starts: settings.starts.div_ceil(LATER), rounds: 2, ..settings };
@@ -168,11 +168,11 @@ fn assured(job: &Assurance<'_>, outcome: Outcome, table: GainTable, rounds: usiz
 
 /// The certificate of a table that lies in no file yet.
 fn prove(job: &Assurance<'_>, table: &GainTable, watch: &Watched<'_>) -> Result<Certificate, VerifyError> {
-    let gains = Source { file: job.gains.to_owned(), text: table.text()? };
+    let gains = SourceFile { file: job.gains.to_owned(), text: table.text()? };
     let (mut plants, mut sweeps) = (Vec::new(), Vec::new());
     match &job.ground {
-        Ground::Plant { source, .. } => plants.push((*source).clone()),
-        Ground::Sweep { sweep, .. } => sweeps.push((*sweep).clone()),
+        ProvedOn::Plant { source, .. } => plants.push((*source).clone()),
+        ProvedOn::Sweep { sweep, .. } => sweeps.push((*sweep).clone()),
     }
     let inputs = Inputs {
         gains: &gains,

@@ -18,7 +18,7 @@ pub enum Stability {
 /// A figure between two bounds; an end without a number is not bounded on that side.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Bounded {
+pub struct BoundedFigure {
     /// No loop of the set has less.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub low: Option<f64>,
@@ -55,19 +55,19 @@ pub struct LoopBounds {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub encirclements: Option<i64>,
     /// |phase margin| (deg); no low end where |L| never reaches 1.
-    pub phase_margin_deg: Bounded,
+    pub phase_margin_deg: BoundedFigure,
     /// |gain margin| (dB); no low end where L never reaches the negative real axis.
-    pub gain_margin_db: Bounded,
+    pub gain_margin_db: BoundedFigure,
     /// Where the named gain crossing may lie (Hz).
-    pub gain_crossover_hz: Bounded,
+    pub gain_crossover_hz: BoundedFigure,
     /// Ms (ratio).
-    pub max_sensitivity: Bounded,
+    pub max_sensitivity: BoundedFigure,
     /// 1/Ms.
-    pub modulus_margin: Bounded,
+    pub modulus_margin: BoundedFigure,
     /// Dead time that the loop would still bear (s).
-    pub delay_margin_s: Bounded,
+    pub delay_margin_s: BoundedFigure,
     /// Balanced disk margin, 2/max|S - T|.
-    pub disk_margin: Bounded,
+    pub disk_margin: BoundedFigure,
     /// Every gain crossing.
     pub gain_crossings: Vec<ProvenCrossing>,
     /// Every phase crossing.

@@ -2,12 +2,12 @@
 //!
 //! In: the table, the sections that the firmware holds, a plant or a sweep. Out: [`CaseProof`] with findings. Spec: `specs/certificate.md`.
 
-use super::bounds::{Bounded, LoopBounds, Stability};
+use super::bounds::{BoundedFigure, LoopBounds, Stability};
 use super::case_proof::CaseProof;
 use super::prove::prove;
 use super::proven_limits::{Known, Magnitudes, proven_limits};
 use super::step_box::Members;
-use super::table::{self, Finding};
+use super::table::{self, TableFinding};
 use super::write::{Bands, write};
 use super::write_box::{BoxSettings, BoxWatch, BoxedLoop, bound_write};
 use super::{Uncertainty, VerifyError, VerifySettings, modelled, step, taken};
@@ -37,7 +37,7 @@ pub(super) struct Job<'a> {
 
 impl Job<'_> {
     /// The case of a plant model.
-    pub fn of_plant(&self, plant: &Plant, sha256: String) -> Result<(CaseProof, Vec<Finding>), VerifyError> {
+    pub fn of_plant(&self, plant: &Plant, sha256: String) -> Result<(CaseProof, Vec<TableFinding>), VerifyError> {
         let (c, u, t) = (self.controller, self.uncertainty, self.controller.sample_time_s);
         let (profile, bands_hz) = (self.spec.profile.as_ref(), self.bands_hz());
         let l = modelled(plant, self.held, t, u)?;
@@ -82,7 +82,7 @@ impl Job<'_> {
     }
 
     /// The case of a sweep.
-    pub fn of_sweep(&self, sweep: &Sweep) -> Result<(CaseProof, Vec<Finding>), VerifyError> {
+    pub fn of_sweep(&self, sweep: &Sweep) -> Result<(CaseProof, Vec<TableFinding>), VerifyError> {
         let t = self.controller.sample_time_s;
         let swept = |sections, u| taken(&sweep.frf, sections, t, self.least_damping, u);
         let l = swept(self.held, self.uncertainty)?;
@@ -102,7 +102,7 @@ impl Job<'_> {
             write_box: None,
             step: Default::default(),
             at_end: Default::default(),
-            command_rms: Bounded::default(),
+            command_rms: BoundedFigure::default(),
         };
         let limits = proven_limits(self.spec, self.wanted, &known);
         // Without a limit on Ms, a hidden mode that brings L this near to -1 is one to look for.
@@ -124,7 +124,7 @@ impl Job<'_> {
 
     /// Overshoot and settling of a step and of the move, and the command's rms under the disturbance, where limits ask for them: the last one of a box by the
     /// plant as it stands only, which bounds from below.
-    fn records(&self, plant: &Plant, bounds: &LoopBounds) -> ([Bounded; 2], [Bounded; 2], Bounded) {
+    fn records(&self, plant: &Plant, bounds: &LoopBounds) -> ([BoundedFigure; 2], [BoundedFigure; 2], BoundedFigure) {
         let (c, limits) = (self.controller, &self.spec.limits);
         let members = Members {
             plant,
@@ -134,7 +134,7 @@ impl Job<'_> {
             max_sensitivity: bounds.max_sensitivity.high,
         };
         let members = self.uncertainty.any().then_some(&members);
-        let own = |b: Bounded| if self.uncertainty.any() { Bounded { high: None, ..b } } else { b };
+        let own = |b: BoundedFigure| if self.uncertainty.any() { BoundedFigure { high: None, ..b } } else { b };
         let stepped = limits.overshoot_percent.is_some() || limits.settling_s.is_some();
         let of_step = if stepped { step::step(plant, self.held, c, members) } else { Default::default() };
         let of_end = match &self.spec.profile {
@@ -151,7 +151,7 @@ impl Job<'_> {
                 own(step::command_rms(plant, self.held, c, *rms, *corner_hz))
             }
             // The sum over a tabulated density is not bounded.
-            _ => Bounded::default(),
+            _ => BoundedFigure::default(),
         };
         (of_step, of_end, command)
     }

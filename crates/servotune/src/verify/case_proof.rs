@@ -2,7 +2,7 @@
 //!
 //! In: bounds and limits. Out: verdicts, a row a limit. Spec: `specs/certificate.md`.
 
-use super::bounds::{Bounded, LoopBounds};
+use super::bounds::{BoundedFigure, LoopBounds};
 use super::swept::SweepAgain;
 use super::write::WriteFigures;
 use super::write_box::WriteBox;
@@ -33,7 +33,7 @@ pub struct ProvenLimit {
     /// Its unit.
     pub unit: String,
     /// What is proved.
-    pub proven: Bounded,
+    pub proven: BoundedFigure,
     /// Whether that is enough.
     pub verdict: LimitVerdict,
 }

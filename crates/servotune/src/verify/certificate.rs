@@ -4,7 +4,7 @@ use super::bounds::Stability;
 use super::case::Job;
 use super::case_proof::{CaseProof, LimitVerdict};
 use super::size::fits;
-use super::table::{self, Finding};
+use super::table::{self, TableFinding};
 use super::write_box::BoxWatch;
 use super::{SweepAssumption, Uncertainty, VerifyError, VerifySettings, Word};
 use crate::document::{parse_toml, read_text, sha256_hex};
@@ -44,24 +44,24 @@ pub struct Certificate {
     /// Every machine.
     pub cases: Vec<CaseProof>,
     /// What in the table does not fit its inputs.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<TableFinding>,
     /// Everything is proved and nothing was found.
     pub proved: bool,
 }
 
 /// A file and its text.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Source {
+pub struct SourceFile {
     /// Named in errors.
     pub file: PathBuf,
     /// What stands in it.
     pub text: String,
 }
 
-impl Source {
+impl SourceFile {
     /// The file as it stands on disk.
-    pub fn read(file: &Path) -> Result<Source, VerifyError> {
-        Ok(Source { file: file.into(), text: read_text(file)? })
+    pub fn read(file: &Path) -> Result<SourceFile, VerifyError> {
+        Ok(SourceFile { file: file.into(), text: read_text(file)? })
     }
 
     /// SHA-256 of its bytes.
@@ -74,17 +74,17 @@ impl Source {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inputs<'a> {
     /// The gain table.
-    pub gains: &'a Source,
+    pub gains: &'a SourceFile,
     /// Plants: the machine itself, and its temperature or other cases.
-    pub plants: &'a [Source],
+    pub plants: &'a [SourceFile],
     /// Sweeps, each a case like a plant.
     pub sweeps: &'a [Sweep],
     /// No mode that hides between the points of a sweep has less damping.
     pub least_damping: f64,
     /// The spec, and the profile that it names.
-    pub spec: &'a Source,
+    pub spec: &'a SourceFile,
     /// See above.
-    pub profile: Option<&'a Source>,
+    pub profile: Option<&'a SourceFile>,
     /// How the firmware holds the coefficients.
     pub word: Word,
     /// Box around every plant.
@@ -161,7 +161,7 @@ pub fn certify_watched(
         program: env!("CARGO_PKG_VERSION").into(),
         gains_sha256: i.gains.sha256(),
         spec_sha256,
-        profile_sha256: i.profile.map(Source::sha256),
+        profile_sha256: i.profile.map(SourceFile::sha256),
         word: i.word,
         uncertainty: i.uncertainty,
         sweep: (!i.sweeps.is_empty()).then(|| taken(i)),
@@ -183,12 +183,12 @@ fn within_range(u: &Uncertainty) -> Result<(), VerifyError> {
 }
 
 /// The table in a file. Its own reader would refuse what a certificate is to report.
-fn table_of(gains: &Source) -> Result<GainTable, VerifyError> {
+fn table_of(gains: &SourceFile) -> Result<GainTable, VerifyError> {
     Ok(parse_toml(&gains.file, &gains.text).map_err(|e| e.expecting(GainTable::EXPECTED))?)
 }
 
 /// Clock of the controller in a gain table (s).
-pub fn table_clock_s(gains: &Source) -> Result<f64, VerifyError> {
+pub fn table_clock_s(gains: &SourceFile) -> Result<f64, VerifyError> {
     Ok(table_of(gains)?.controller().sample_time_s)
 }
 
@@ -237,7 +237,7 @@ impl Certificate {
     }
 
     /// Lines of an older certificate, `text`, that this proof does not repeat.
-    pub fn compare(&self, file: &Path, text: &str) -> Result<Vec<Finding>, VerifyError> {
+    pub fn compare(&self, file: &Path, text: &str) -> Result<Vec<TableFinding>, VerifyError> {
         let old: serde_json::Value =
             serde_json::from_str(text).map_err(|source| VerifyError::CertificateText { file: file.into(), source })?;
         let new = serde_json::to_value(self)?;
@@ -245,13 +245,17 @@ impl Certificate {
         differences("", &old, &new, &mut all);
         // Spaces and keys given twice are no numbers, but a certificate is its bytes.
         if all.is_empty() && text != self.text()? {
-            all.push(Finding::Certificate { path: "the text".into(), stated: String::new(), proven: String::new() });
+            all.push(TableFinding::Certificate {
+                path: "the text".into(),
+                stated: String::new(),
+                proven: String::new(),
+            });
         }
         Ok(all)
     }
 }
 
-fn differences(path: &str, old: &serde_json::Value, new: &serde_json::Value, all: &mut Vec<Finding>) {
+fn differences(path: &str, old: &serde_json::Value, new: &serde_json::Value, all: &mut Vec<TableFinding>) {
     use serde_json::Value;
     match (old, new) {
         (Value::Object(a), Value::Object(b)) => {
@@ -269,7 +273,9 @@ fn differences(path: &str, old: &serde_json::Value, new: &serde_json::Value, all
             }
         }
         _ if old == new => {}
-        _ => all.push(Finding::Certificate { path: path.into(), stated: old.to_string(), proven: new.to_string() }),
+        _ => {
+            all.push(TableFinding::Certificate { path: path.into(), stated: old.to_string(), proven: new.to_string() })
+        }
     }
 }
 

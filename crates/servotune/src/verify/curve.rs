@@ -4,7 +4,7 @@
 //! to its limit, and the frequency up to which |T| stays above -3 dB, each between two bounds. P S is T/C and C S is C times S, so that the plant is
 //! asked for nothing else. Spec: `specs/certificate.md`.
 
-use super::bounds::Bounded;
+use super::bounds::BoundedFigure;
 use super::model::Enclosed;
 use super::patch::{Patch, SPREAD_SHARE, largest_turn, least_turn};
 use super::{Interval, VerifySettings};
@@ -144,20 +144,20 @@ impl<E: Enclosed> Question<'_, E> {
 
 /// Bounds the largest ratio of a magnitude to its curve (of the curve to the magnitude for "at least"): low is what the nominal loop surely has, high what no
 /// loop of the set exceeds. No bound where the curve goes beyond what is known of the loop.
-pub(super) fn bound_curve(l: &impl Enclosed, curve: &CurveLimit, settings: &VerifySettings) -> Bounded {
+pub(super) fn bound_curve(l: &impl Enclosed, curve: &CurveLimit, settings: &VerifySettings) -> BoundedFigure {
     let t = l.sample_time_s();
     let angle = |hz: &f64| hz * TAU * t;
     let (Some(from), Some(to)) = (curve.hz.first().map(angle), curve.hz.last().map(angle)) else {
-        return Bounded::default();
+        return BoundedFigure::default();
     };
     let known = [if l.ends_at_half_rate() { 0.0 } else { l.places().first().copied().unwrap_or(0.0) }, l.end()];
     if l.ends_at_half_rate() && from > known[1] {
         // Above half the sample rate there is nothing that the curve could hold.
-        return Bounded { low: Some(0.0), high: Some(0.0), hz: None };
+        return BoundedFigure { low: Some(0.0), high: Some(0.0), hz: None };
     }
     let to = if l.ends_at_half_rate() { to.min(known[1]) } else { to };
     if from < known[0] * (1.0 - 1e-12) || to > known[1] * (1.0 + 1e-12) {
-        return Bounded::default();
+        return BoundedFigure::default();
     }
     let mut edges: Vec<f64> = curve.hz.iter().map(angle).chain(l.places()).filter(|a| *a > from && *a < to).collect();
     let mut x = from;
@@ -186,19 +186,19 @@ pub(super) fn bound_curve(l: &impl Enclosed, curve: &CurveLimit, settings: &Veri
         cells += 2;
     }
     match heap.peek() {
-        Some(top) => Bounded {
+        Some(top) => BoundedFigure {
             low: Some(q.sure),
             high: top.most.is_finite().then_some(top.most),
             hz: Some(0.5 * (top.from + top.to) / (TAU * t)),
         },
-        None => Bounded::default(),
+        None => BoundedFigure::default(),
     }
 }
 
 /// Bounds the bandwidth (Hz), the lowest frequency at which |T| falls below -3 dB: below `low` no loop of the set has fallen, at `high` the nominal one has.
-pub(super) fn bound_bandwidth(l: &impl Enclosed, settings: &VerifySettings) -> Bounded {
+pub(super) fn bound_bandwidth(l: &impl Enclosed, settings: &VerifySettings) -> BoundedFigure {
     let t = l.sample_time_s();
-    let Ok(start) = l.start() else { return Bounded::default() };
+    let Ok(start) = l.start() else { return BoundedFigure::default() };
     let mut buffer = Vec::new();
     l.patches(start.angle, start.angle, &mut buffer);
     // Below the first cell L is large, or has hardly moved: by less than 2 % (`prove.rs`), 4 % of T where |1 + L| is no less than a half.
@@ -206,7 +206,7 @@ pub(super) fn bound_bandwidth(l: &impl Enclosed, settings: &VerifySettings) -> B
         start.integrators > 0 && p.size().low > 4.0 || p.beside().low > 0.5 && p.complementary().low > 1.1 * LEVEL
     };
     if start.expected.is_some() || !buffer.iter().all(still) {
-        return Bounded::default();
+        return BoundedFigure::default();
     }
     let (mut low, mut high): (Option<f64>, Option<f64>) = (None, None);
     let mut edges = vec![start.angle, l.end()];
@@ -246,5 +246,5 @@ pub(super) fn bound_bandwidth(l: &impl Enclosed, settings: &VerifySettings) -> B
     let hz = |angle: f64| angle / (TAU * t);
     // A |T| that never falls has half the rate for its bandwidth.
     let low = low.unwrap_or(l.end());
-    Bounded { low: Some(hz(low)), high: high.map(hz), hz: Some(hz(low)) }
+    BoundedFigure { low: Some(hz(low)), high: high.map(hz), hz: Some(hz(low)) }
 }

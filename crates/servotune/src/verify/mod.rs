@@ -46,14 +46,14 @@ mod write_piece;
 mod write_record;
 
 pub use crate::numeric::interval::Interval;
-pub use assured::{Assurance, Assured, Ground, Watched, tune_assured};
-pub use bounds::{Bounded, LoopBounds, ProvenCrossing, Stability};
+pub use assured::{Assurance, Assured, ProvedOn, Watched, tune_assured};
+pub use bounds::{BoundedFigure, LoopBounds, ProvenCrossing, Stability};
 pub use case_proof::{CaseProof, LimitVerdict, ProvenLimit};
-pub use certificate::{Certificate, Inputs, SCHEMA, Source, certify, certify_watched, choices, table_clock_s};
+pub use certificate::{Certificate, Inputs, SCHEMA, SourceFile, certify, certify_watched, choices, table_clock_s};
 pub use error::VerifyError;
 pub use settings::VerifySettings;
 pub use swept::{LEAST_DAMPING, SweepAgain, SweepAssumption};
-pub use table::Finding;
+pub use table::TableFinding;
 pub use uncertain::Uncertainty;
 pub use word::Word;
 pub use write::{Bands, WriteFigures};

@@ -3,7 +3,7 @@
 //! Depth first from rest to half the rate, so nothing is kept but the figures. Each cell's patch holds the whole of L over the cell:
 //! no sampled point decides anything.
 
-use super::bounds::{Bounded, LoopBounds, ProvenCrossing, Stability};
+use super::bounds::{BoundedFigure, LoopBounds, ProvenCrossing, Stability};
 use super::clusters::Clusters;
 use super::model::{Enclosed, Start};
 use super::patch::{Patch, largest_turn, least_lag, least_turn};
@@ -295,7 +295,7 @@ impl Tally {
         let gain_crossings = self.gain_crossings.list(hz, degrees);
         let phase_crossings = self.phase_crossings.list(hz, decibels);
         let named = named(&gain_crossings);
-        let margin = |least: &Least, all: &[ProvenCrossing]| Bounded {
+        let margin = |least: &Least, all: &[ProvenCrossing]| BoundedFigure {
             low: least.low.is_finite().then_some(least.low),
             high: all.iter().filter(|c| c.certain).map(|c| c.value.high).min_by(f64::total_cmp),
             hz: least.low.is_finite().then(|| hz(least.at)),
@@ -312,19 +312,19 @@ impl Tally {
             encirclements: (!self.open).then_some(encirclements),
             phase_margin_deg: margin(&self.phase, &gain_crossings),
             gain_margin_db: margin(&self.gain, &phase_crossings),
-            gain_crossover_hz: Bounded {
+            gain_crossover_hz: BoundedFigure {
                 low: named.map(|n| n.low),
                 high: named.map(|n| n.high),
                 hz: named.map(|n| 0.5 * (n.low + n.high)),
             },
-            max_sensitivity: Bounded { low: finite(1.0 / modulus.high), high: finite(1.0 / modulus.low), hz: at },
-            modulus_margin: Bounded { low: Some(modulus.low), high: finite(modulus.high), hz: at },
-            delay_margin_s: Bounded {
+            max_sensitivity: BoundedFigure { low: finite(1.0 / modulus.high), high: finite(1.0 / modulus.low), hz: at },
+            modulus_margin: BoundedFigure { low: Some(modulus.low), high: finite(modulus.high), hz: at },
+            delay_margin_s: BoundedFigure {
                 low: if stable { finite(self.delay.low * t) } else { None },
                 high: if stable { finite(self.delay.high * t) } else { None },
                 hz: finite(self.delay.low).map(|_| hz(self.delay.at)),
             },
-            disk_margin: Bounded {
+            disk_margin: BoundedFigure {
                 low: Some(if stable { 2.0 * self.balance.low } else { 0.0 }),
                 // Of a loop whose stability is open only this much is known.
                 high: Some(if stability == Stability::Unstable { 0.0 } else { 2.0 * self.balance.high.min(1.0) }),

@@ -4,7 +4,7 @@
 //! proved. Spec: `specs/certificate.md`.
 
 use super::VerifySettings;
-use super::bounds::{Bounded, LoopBounds, ProvenCrossing, Stability};
+use super::bounds::{BoundedFigure, LoopBounds, ProvenCrossing, Stability};
 use super::case_proof::{LimitVerdict, ProvenLimit};
 use super::curve::{bound_bandwidth, bound_curve};
 use super::model::Enclosed;
@@ -20,13 +20,13 @@ const MEMBERS: f64 = 10.0;
 const TOUCH: f64 = 1e-4;
 
 /// Where every gain crossing outside these ranges (Hz) may lie. One that only may be counts on the side where it would miss.
-fn every_crossing(b: &LoopBounds, stabilised: &[[f64; 2]]) -> Bounded {
+fn every_crossing(b: &LoopBounds, stabilised: &[[f64; 2]]) -> BoundedFigure {
     let free = |c: &&ProvenCrossing| !stabilised.iter().any(|[from, to]| *from <= c.hz.low && c.hz.high <= *to);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for c in b.gain_crossings.iter().filter(free) {
         (low, high) = (low.min(c.hz.low), high.max(c.hz.high));
     }
-    if low <= high { Bounded { low: Some(low), high: Some(high), hz: None } } else { Bounded::default() }
+    if low <= high { BoundedFigure { low: Some(low), high: Some(high), hz: None } } else { BoundedFigure::default() }
 }
 
 /// What is proved of one machine.
@@ -39,18 +39,18 @@ pub(super) struct Known<'a> {
     pub write: Option<&'a WriteFigures>,
     pub write_box: Option<&'a WriteBox>,
     /// Overshoot (%), settling time (s) and the command's rms under the disturbance; an end without a number where a box is asked for.
-    pub step: [Bounded; 2],
+    pub step: [BoundedFigure; 2],
     /// Beyond the end of the move (position_unit), and the settling time after it (s).
-    pub at_end: [Bounded; 2],
-    pub command_rms: Bounded,
+    pub at_end: [BoundedFigure; 2],
+    pub command_rms: BoundedFigure,
 }
 
 /// Bounds of magnitudes over frequency.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Magnitudes {
     /// In the order of the spec's curves.
-    pub curves: Vec<Bounded>,
-    pub bandwidth_hz: Bounded,
+    pub curves: Vec<BoundedFigure>,
+    pub bandwidth_hz: BoundedFigure,
 }
 
 impl Magnitudes {
@@ -58,18 +58,18 @@ impl Magnitudes {
     pub fn of(l: &impl Enclosed, spec: &Spec, settings: &VerifySettings) -> Magnitudes {
         let curves = spec.limits.curve.iter().map(|c| bound_curve(l, c, settings)).collect();
         let asked = spec.margins.bandwidth_hz.is_some();
-        let bandwidth_hz = if asked { bound_bandwidth(l, settings) } else { Bounded::default() };
+        let bandwidth_hz = if asked { bound_bandwidth(l, settings) } else { BoundedFigure::default() };
         Magnitudes { curves, bandwidth_hz }
     }
 }
 
 pub(super) fn proven_limits(spec: &Spec, wanted: &[Requirement], known: &Known<'_>) -> Vec<ProvenLimit> {
     let (b, w, over) = (known.bounds, known.write, known.write_box);
-    let around = |x: f64, e: f64| Bounded { low: Some(x - e), high: Some(x + e), hz: None };
+    let around = |x: f64, e: f64| BoundedFigure { low: Some(x - e), high: Some(x + e), hz: None };
     // Over a box the lower end stays a member's own, as with the margins: what that member misses is missed. Members round much as the plant does.
-    let boxed = |own: Bounded, e: f64, figure: &dyn Fn(&WriteBox) -> Option<BoxFigure>| match over {
+    let boxed = |own: BoundedFigure, e: f64, figure: &dyn Fn(&WriteBox) -> Option<BoxFigure>| match over {
         None => own,
-        Some(o) => figure(o).map_or(Bounded { high: None, ..own }, |f| Bounded {
+        Some(o) => figure(o).map_or(BoundedFigure { high: None, ..own }, |f| BoundedFigure {
             low: own.low.map(|l| l.max(f.seen - MEMBERS * e)),
             high: Some(f.most + MEMBERS * e),
             hz: None,
@@ -90,17 +90,17 @@ pub(super) fn proven_limits(spec: &Spec, wanted: &[Requirement], known: &Known<'
                 What::MoveOvershoot => known.at_end[0],
                 What::MoveSettling => known.at_end[1],
                 What::CommandRms if w.is_none() => known.command_rms,
-                what => w.map_or(Bounded::default(), |w| match what {
+                what => w.map_or(BoundedFigure::default(), |w| match what {
                     What::DftLow => boxed(around(w.dft_low, w.error), w.error, &|o| o.dft_low),
                     What::DftHigh => boxed(around(w.dft_high, w.error), w.error, &|o| o.dft_high),
                     What::Harmonic { k } => w
                         .harmonics
                         .get(k - 1)
-                        .map_or(Bounded::default(), |a| boxed(around(*a, w.error), w.error, &|o| o.harmonic(k))),
+                        .map_or(BoundedFigure::default(), |a| boxed(around(*a, w.error), w.error, &|o| o.harmonic(k))),
                     // Over a box no bound of it is computed.
-                    What::CommandRms => w.command_rms.map_or(Bounded::default(), |x| {
+                    What::CommandRms => w.command_rms.map_or(BoundedFigure::default(), |x| {
                         let own = around(x, w.command_error());
-                        if over.is_some() { Bounded { high: None, ..own } } else { own }
+                        if over.is_some() { BoundedFigure { high: None, ..own } } else { own }
                     }),
                     _ => boxed(around(w.command_peak, w.command_error()), w.command_error(), &|o| o.command_peak),
                 }),

@@ -4,7 +4,7 @@
 //! over frequency. A step's record goes on until the loop has come to rest, a move's to the end of the write. Spec: `specs/certificate.md`.
 
 use super::Interval;
-use super::bounds::Bounded;
+use super::bounds::BoundedFigure;
 use super::cascade::Loop;
 use super::path::{Path, run};
 use super::step_box::{Members, tube};
@@ -28,7 +28,12 @@ const SAMPLES: [usize; 2] = [4096, 1 << 20];
 
 /// Overshoot (%) and settling time (s) of a unit step of the reference; without numbers where the loop does not come to rest. Where members of a box are
 /// asked for, the upper ends are theirs.
-pub(super) fn step(plant: &Plant, sections: &[Section], c: &Controller, members: Option<&Members<'_>>) -> [Bounded; 2] {
+pub(super) fn step(
+    plant: &Plant,
+    sections: &[Section],
+    c: &Controller,
+    members: Option<&Members<'_>>,
+) -> [BoundedFigure; 2] {
     let t = c.sample_time_s;
     let mut samples = SAMPLES[0];
     while samples <= SAMPLES[1] {
@@ -43,11 +48,11 @@ pub(super) fn step(plant: &Plant, sections: &[Section], c: &Controller, members:
                 let watched = (rests + rests / 2 + LEAST).min(samples);
                 tube(m, &Path::step(c, watched)).map_or([None; 2], |tube| step_figures(&tube, t))
             });
-            return [0, 1].map(|i| Bounded { low: low[i], high: high[i], hz: None });
+            return [0, 1].map(|i| BoundedFigure { low: low[i], high: high[i], hz: None });
         }
         samples *= 2;
     }
-    [Bounded::default(); 2]
+    [BoundedFigure::default(); 2]
 }
 
 /// How far a spiral's move goes beyond its end (position_unit), and the time from that end after which the error stays within `band` (s); `members` as for
@@ -59,7 +64,7 @@ pub(super) fn move_end(
     profile: &Profile,
     band: f64,
     members: Option<&Members<'_>>,
-) -> [Bounded; 2] {
+) -> [BoundedFigure; 2] {
     let (t, s) = (c.sample_time_s, &profile.spiral);
     let wanted = |k: i64| reference(profile, k as f64 * t);
     let path = Path::of(c, [0, (s.duration_s / t) as i64], &wanted);
@@ -73,7 +78,7 @@ pub(super) fn move_end(
     let own = |rounding: f64| figures(&thin(&y, rounding * s.distance));
     let (low, high) = (own(-ROUNDING), own(ROUNDING));
     let high = members.map_or(high, |m| tube(m, &path).map_or([None; 2], |tube| figures(&tube)));
-    [0, 1].map(|i| Bounded { low: low[i], high: high[i], hz: None })
+    [0, 1].map(|i| BoundedFigure { low: low[i], high: high[i], hz: None })
 }
 
 /// A record with its rounding; a negative one takes it away from what is judged.
@@ -99,7 +104,13 @@ fn settled(tube: &[Interval], wanted: &dyn Fn(usize) -> f64, band: f64, t: f64) 
 
 /// The command's rms (command_unit) under a disturbance at the plant's input of this rms and corner (Hz; white where it is infinite): the answer to one innovation,
 /// squared and summed.
-pub(super) fn command_rms(plant: &Plant, sections: &[Section], c: &Controller, rms: f64, corner_hz: f64) -> Bounded {
+pub(super) fn command_rms(
+    plant: &Plant,
+    sections: &[Section],
+    c: &Controller,
+    rms: f64,
+    corner_hz: f64,
+) -> BoundedFigure {
     let l = Loop::of(plant, sections, c);
     let keep = (-TAU * corner_hz * c.sample_time_s).exp();
     let mut state = l.at_rest();
@@ -117,10 +128,10 @@ pub(super) fn command_rms(plant: &Plant, sections: &[Section], c: &Controller, r
             // What the second half has added bounds what is left of a loop that decays.
             if late <= REST * REST * sum {
                 let value = rms * ((1.0 - keep * keep) * sum).sqrt();
-                return Bounded { low: Some(value * (1.0 - REST)), high: Some(value * (1.0 + REST)), hz: None };
+                return BoundedFigure { low: Some(value * (1.0 - REST)), high: Some(value * (1.0 + REST)), hz: None };
             }
             (late, half) = (0.0, 2 * half);
         }
     }
-    Bounded::default()
+    BoundedFigure::default()
 }

@@ -1,6 +1,6 @@
 //! A gain table against itself: sections recomputed from the gains, stated figures against proven bounds, digests against files.
 
-use super::bounds::{Bounded, LoopBounds, ProvenCrossing, Stability};
+use super::bounds::{BoundedFigure, LoopBounds, ProvenCrossing, Stability};
 use super::write::WriteFigures;
 use crate::controller::Controller;
 use crate::lti::Section;
@@ -12,13 +12,13 @@ use std::f64::consts::PI;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "what", deny_unknown_fields)]
 #[allow(missing_docs, reason = "each field is named in the report")]
-pub enum Finding {
+pub enum TableFinding {
     /// The number of sections.
     Count { found: usize, expected: usize },
     /// A coefficient that the gains do not make.
     Section { index: usize, key: String, found: f64, expected: f64 },
     /// A figure of `[after]` outside its proven bounds on every machine given.
-    Figure { name: String, stated: Option<f64>, proven: Bounded },
+    Figure { name: String, stated: Option<f64>, proven: BoundedFigure },
     /// An input of the table that was not given, or not as it was.
     Digest { role: String, stated: String },
     /// A line of the certificate that the proof does not repeat.
@@ -73,7 +73,7 @@ fn bilinear(hz: f64, t: f64, [n2, n1, n0]: [f64; 3], damping: f64) -> Section {
 }
 
 /// Compares the sections of a table with those that its gains make.
-pub(super) fn sections(c: &Controller, found: &[Section]) -> Vec<Finding> {
+pub(super) fn sections(c: &Controller, found: &[Section]) -> Vec<TableFinding> {
     let t = c.sample_time_s;
     let mut expected = vec![pid(c)];
     expected.extend(c.lowpass.iter().map(|l| bilinear(l.frequency_hz, t, [0.0, 0.0, 1.0], l.damping_ratio)));
@@ -83,7 +83,7 @@ pub(super) fn sections(c: &Controller, found: &[Section]) -> Vec<Finding> {
     expected.extend(c.notch.iter().map(notch));
     expected.extend(&c.biquad);
     if found.len() != expected.len() {
-        return vec![Finding::Count { found: found.len(), expected: expected.len() }];
+        return vec![TableFinding::Count { found: found.len(), expected: expected.len() }];
     }
     let mut all = Vec::new();
     for (index, (f, e)) in found.iter().zip(&expected).enumerate() {
@@ -92,7 +92,7 @@ pub(super) fn sections(c: &Controller, found: &[Section]) -> Vec<Finding> {
             [("b0", f.b0, e.b0), ("b1", f.b1, e.b1), ("b2", f.b2, e.b2), ("a1", f.a1, e.a1), ("a2", f.a2, e.a2)]
         {
             if found.is_nan() || (found - expected).abs() > SAME * size {
-                all.push(Finding::Section { index, key: key.into(), found, expected });
+                all.push(TableFinding::Section { index, key: key.into(), found, expected });
             }
         }
     }
@@ -100,9 +100,9 @@ pub(super) fn sections(c: &Controller, found: &[Section]) -> Vec<Finding> {
 }
 
 /// Figures of `[after]` that lie outside the proven bounds of one machine.
-pub(super) fn figures(s: &Summary, b: &LoopBounds, write: Option<&WriteFigures>) -> Vec<Finding> {
+pub(super) fn figures(s: &Summary, b: &LoopBounds, write: Option<&WriteFigures>) -> Vec<TableFinding> {
     let mut all = Vec::new();
-    let mut check = |name: &str, stated: Option<f64>, proven: Bounded| {
+    let mut check = |name: &str, stated: Option<f64>, proven: BoundedFigure| {
         let inside = |x: f64| {
             let slack = PRINTED * x.abs();
             proven.low.is_some_and(|l| x >= l - slack) && proven.high.is_none_or(|h| x <= h + slack)
@@ -110,20 +110,20 @@ pub(super) fn figures(s: &Summary, b: &LoopBounds, write: Option<&WriteFigures>)
         // Without a crossing there is no bound either.
         let good = stated.map_or(proven.high.is_none(), inside);
         if !good {
-            all.push(Finding::Figure { name: name.into(), stated, proven });
+            all.push(TableFinding::Figure { name: name.into(), stated, proven });
         }
     };
     let flag = |x: bool| f64::from(u8::from(x));
     // What is not decided contradicts nothing.
     let [low, high] = [Stability::Stable, Stability::Unstable].map(|s| flag(b.stability == s));
-    check("stable", Some(flag(s.stable)), Bounded { low: Some(low), high: Some(1.0 - high), hz: None });
+    check("stable", Some(flag(s.stable)), BoundedFigure { low: Some(low), high: Some(1.0 - high), hz: None });
     check("phase_margin_deg", s.phase_margin_deg.map(f64::abs), b.phase_margin_deg);
     check("gain_crossover_hz", s.gain_crossover_hz, b.gain_crossover_hz);
     // Half the sample rate, where L is real, is a crossing of the proof and not of the table: from above it binds nothing.
     check(
         "gain_margin_db",
         s.gain_margin_db.map(f64::abs),
-        Bounded { high: s.gain_margin_db.and(None), ..b.gain_margin_db },
+        BoundedFigure { high: s.gain_margin_db.and(None), ..b.gain_margin_db },
     );
     check("max_sensitivity", Some(s.max_sensitivity), b.max_sensitivity);
     check("modulus_margin", Some(s.modulus_margin), b.modulus_margin);
@@ -132,7 +132,7 @@ pub(super) fn figures(s: &Summary, b: &LoopBounds, write: Option<&WriteFigures>)
         check("disk_margin", Some(s.disk_margin), b.disk_margin);
     }
     if let Some(w) = write {
-        let around = |x: f64, e: f64| Bounded { low: Some(x - e), high: Some(x + e), hz: None };
+        let around = |x: f64, e: f64| BoundedFigure { low: Some(x - e), high: Some(x + e), hz: None };
         for (name, stated, found) in [("dft_low", s.dft_low, w.dft_low), ("dft_high", s.dft_high, w.dft_high)] {
             // A band without a bin of the DFT sums to nothing, and the table has no figure of it.
             if stated.is_some() || found != 0.0 {
@@ -152,22 +152,22 @@ pub(super) fn figures(s: &Summary, b: &LoopBounds, write: Option<&WriteFigures>)
         ("phase_crossings", &b.phase_crossings, &s.phase_crossings),
     ] {
         if let Some((hz, value)) = places(all_proven, rows) {
-            let proven = Bounded { hz: Some(hz), ..Bounded::default() };
-            all.push(Finding::Figure { name: name.into(), stated: Some(value), proven });
+            let proven = BoundedFigure { hz: Some(hz), ..BoundedFigure::default() };
+            all.push(TableFinding::Figure { name: name.into(), stated: Some(value), proven });
         }
     }
     all
 }
 
 /// Inputs of the table that are not among the digests given.
-pub(super) fn digests(table: &GainTable, spec: &str, machines: &[String]) -> Vec<Finding> {
+pub(super) fn digests(table: &GainTable, spec: &str, machines: &[String]) -> Vec<TableFinding> {
     let mut all = Vec::new();
     if table.provenance.spec_sha256 != spec {
-        all.push(Finding::Digest { role: "spec".into(), stated: table.provenance.spec_sha256.clone() });
+        all.push(TableFinding::Digest { role: "spec".into(), stated: table.provenance.spec_sha256.clone() });
     }
     for i in table.provenance.inputs.iter().filter(|i| i.role == "plant" || i.role == "frf") {
         if !machines.contains(&i.sha256) {
-            all.push(Finding::Digest { role: i.role.clone(), stated: i.sha256.clone() });
+            all.push(TableFinding::Digest { role: i.role.clone(), stated: i.sha256.clone() });
         }
     }
     all

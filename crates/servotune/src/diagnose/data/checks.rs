@@ -6,10 +6,10 @@
 
 use super::run::Run;
 use super::stacked_records::NuisanceBasis;
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::rules::{JUMP_STEPS, REPLAY_ERROR, SHIFT_BROKEN, STUCK_STEPS};
 use crate::lti::step_chain;
-use crate::numeric::golden::{Bound, golden_section};
+use crate::numeric::golden::{IntervalEnd, golden_section};
 use crate::numeric::least_squares::dot;
 use crate::recording::ClockGap;
 use rayon::prelude::*;
@@ -66,7 +66,7 @@ const END: usize = 16;
 /// Squares of recorded less replayed commands off the limit, and of the recorded ones.
 ///
 /// The ends are left out: a shifted log lacks samples there.
-pub(super) fn misfit(law: &Law, run: &Run, reference: &[f64], position: &dyn Fn(usize) -> f64) -> (f64, f64) {
+pub(super) fn misfit(law: &ControlLaw, run: &Run, reference: &[f64], position: &dyn Fn(usize) -> f64) -> (f64, f64) {
     let n = run.len();
     let inside = if n > 20 * END { END..n - END } else { 0..n };
     let error: Vec<f64> = inside.clone().map(|k| reference[k] - position(k)).collect();
@@ -81,7 +81,7 @@ const SHIFT: i32 = 6;
 
 /// Whether the recorded commands follow from the documented controller; none where no record has a reference. `smooth` is the
 /// motion behind each record without the sensor's noise.
-pub fn replay_records(law: &Law, runs: &[&Run], smooth: &[Vec<f64>]) -> Option<Replay> {
+pub fn replay_records(law: &ControlLaw, runs: &[&Run], smooth: &[Vec<f64>]) -> Option<Replay> {
     let with: Vec<(&Run, &[f64], &[f64])> =
         runs.iter().zip(smooth).filter_map(|(r, s)| r.reference.as_deref().map(|f| (*r, f, &s[..]))).collect();
     if with.is_empty() {
@@ -129,7 +129,7 @@ pub fn replay_records(law: &Law, runs: &[&Run], smooth: &[Vec<f64>]) -> Option<R
         }
         let m = golden_section(&error, best.0 - 1.0, best.0 + 1.0, 1e-3);
         // A real-valued shift only where it is clearly better than the whole one.
-        if m.value < SHIFT_BROKEN * best.1 && m.at_bound == Bound::Inside {
+        if m.value < SHIFT_BROKEN * best.1 && m.at_bound == IntervalEnd::Inside {
             best = (m.x, m.value);
         }
         if best.1 < out.error_shifted {
@@ -144,7 +144,7 @@ pub fn replay_records(law: &Law, runs: &[&Run], smooth: &[Vec<f64>]) -> Option<R
 
 /// The factors of reference and position under which the command follows best, the law's memory free in each record, and the
 /// relative error that they leave.
-fn factors(law: &Law, with: &[(&Run, &[f64])]) -> (f64, f64, f64) {
+fn factors(law: &ControlLaw, with: &[(&Run, &[f64])]) -> (f64, f64, f64) {
     let (mut rr, mut rp, mut pp, mut ru, mut pu, mut uu, mut all) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for (run, reference) in with {
         let n = run.len();

@@ -7,7 +7,7 @@
 use super::run::Run;
 use super::stacked_records::NuisanceBasis;
 use super::time_shift::shifted;
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::rules::{FILTER_GAIN, FILTER_RAISES, FILTER_WEAKENS};
 use crate::lti::step_chain;
 use crate::numeric::least_squares::{Qr, dot};
@@ -56,7 +56,7 @@ const NEAR_HALF: f64 = 0.98;
 
 impl LogFilter {
     /// The low-pass under which the recorded commands of some runs, each with its reference, follow best from the documented law.
-    pub fn of(law: &Law, with: &[(&Run, &[f64])]) -> Option<LogFilter> {
+    pub fn of(law: &ControlLaw, with: &[(&Run, &[f64])]) -> Option<LogFilter> {
         let means = (2..=LONGEST).map(|n| (Numerator::Mean(n), 0));
         let all = SHAPES.map(|(zeros, poles)| (Numerator::Zeros(zeros), poles)).into_iter().chain(means);
         let all: Vec<(Numerator, usize)> = all.collect();
@@ -134,7 +134,7 @@ fn without_alternation(y: &mut [f64], zeros: usize) {
 }
 
 /// The filter of one shape under which the commands follow best, the law's memory free in each record.
-fn fitted(law: &Law, with: &[(&Run, &[f64])], numerator: Numerator, poles: usize) -> Option<LogFilter> {
+fn fitted(law: &ControlLaw, with: &[(&Run, &[f64])], numerator: Numerator, poles: usize) -> Option<LogFilter> {
     let reach = numerator.reach();
     let (mut columns, mut right, mut all) = (vec![Vec::new(); poles + 1], Vec::new(), 0.0);
     for (run, reference) in with {
@@ -205,9 +205,9 @@ mod tests {
     const SAMPLES: usize = 3000;
 
     /// Does something with a law and a run whose commands it made from its positions, under a reference that stands still.
-    fn heard(of: impl Fn(&Law, &Run, &[f64])) {
+    fn heard(of: impl Fn(&ControlLaw, &Run, &[f64])) {
         let controller = nominal_controller().unwrap();
-        let law = Law::new(&controller).unwrap();
+        let law = ControlLaw::new(&controller).unwrap();
         let mut random = Random::new(4);
         let at = |k: usize| 3.0 * (k as f64 * 0.01).sin() + 0.2 * (k as f64 * 0.23).cos();
         let position: Vec<f64> = (0..SAMPLES).map(|k| at(k) + 0.003 * random.normal()).collect();

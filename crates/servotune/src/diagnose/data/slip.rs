@@ -7,7 +7,7 @@
 use super::checks::{SampleFault, between};
 use super::run::Run;
 use super::stacked_records::NuisanceBasis;
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::rules::{
     REPLAY_FAILS, REPLAY_FAILS_OF_COMMAND, ROWS_MOVE, ROWS_WHOLE, SHIFT_LEFT, SLIP_TAKEN, SLIPS_LEFT, STILL_SAMPLES,
 };
@@ -33,7 +33,7 @@ struct Break {
 
 /// Places in a record where the replay starts to fail, each with the shift behind it that makes the replay right again; the next
 /// one from there on.
-pub fn breaks_of_replay(law: &Law, run: &Run, sample_time_s: f64) -> Vec<SampleFault> {
+pub fn breaks_of_replay(law: &ControlLaw, run: &Run, sample_time_s: f64) -> Vec<SampleFault> {
     let mut all: Vec<SampleFault> = Vec::new();
     let (mut from, mut shift) = (0, 0.0);
     while all.len() < MOST {
@@ -50,7 +50,7 @@ pub fn breaks_of_replay(law: &Law, run: &Run, sample_time_s: f64) -> Vec<SampleF
 }
 
 /// The first break behind sample `from`, the position being late by `shift` samples already.
-fn first_break(law: &Law, run: &Run, from: usize, shift: f64) -> Option<Break> {
+fn first_break(law: &ControlLaw, run: &Run, from: usize, shift: f64) -> Option<Break> {
     let reference = &run.reference.as_deref()?[from..];
     let command = &run.command[from..];
     let n = reference.len();

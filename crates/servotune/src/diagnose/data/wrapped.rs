@@ -5,7 +5,7 @@
 
 use super::checks::{misfit, quantum};
 use super::run::Run;
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::rules::{WRAP_ALIKE, WRAP_JUMP, WRAP_ONWARD, WRAP_STEP};
 use crate::numeric::statistics::median;
 
@@ -16,7 +16,7 @@ const HEARD: f64 = 1e-3;
 
 /// Lays wrapped positions end to end; the length of a lap (position_unit), none where nothing wraps. Jumps tell it as well as the noise lets them,
 /// the commands of a known controller to their last digit.
-pub(in crate::diagnose) fn unwrap(runs: &mut [Run], law: Option<&Law>) -> Option<f64> {
+pub(in crate::diagnose) fn unwrap(runs: &mut [Run], law: Option<&ControlLaw>) -> Option<f64> {
     let all = || runs.iter().flat_map(|r| &r.position).copied();
     let span = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
     let steps = || runs.iter().flat_map(|r| r.position.windows(2).map(|w| w[1] - w[0]));
@@ -53,7 +53,7 @@ pub(in crate::diagnose) fn unwrap(runs: &mut [Run], law: Option<&Law>) -> Option
 
 /// The lap under which the law's commands follow best from the positions; none without a reference. Commands are linear in the lap, their misfit a
 /// parabola of it.
-fn heard(law: &Law, lap: f64, laid: impl Fn(f64) -> Vec<Run>) -> Option<f64> {
+fn heard(law: &ControlLaw, lap: f64, laid: impl Fn(f64) -> Vec<Run>) -> Option<f64> {
     let off = HEARD * lap;
     let misfit = |lap: f64| -> f64 {
         let of = |r: &Run| Some(misfit(law, r, r.reference.as_deref()?, &|k| r.position[k]).0);

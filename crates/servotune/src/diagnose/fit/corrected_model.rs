@@ -10,7 +10,7 @@ use crate::diagnose::data::linear_form::{LinearForm, body_numbers};
 use crate::diagnose::rules::FREE_BODY;
 use crate::lti::{Body, PhysicsEntry, Plant};
 use crate::physics::cable_spring::CableSpring;
-use crate::physics::{Scene, Setting};
+use crate::physics::{LawSetting, MotionScene};
 
 /// The plant and the effects that simulate it.
 #[derive(Clone)]
@@ -18,7 +18,7 @@ pub struct Corrected {
     /// The plant, physics entries included.
     pub plant: Plant,
     /// The effects of the entries.
-    pub effects: Vec<Setting>,
+    pub effects: Vec<LawSetting>,
 }
 
 impl Corrected {
@@ -29,15 +29,15 @@ impl Corrected {
 }
 
 /// The entry of an effect with named parameters.
-pub(in crate::diagnose) fn entry(setting: &Setting, scene: &Scene) -> PhysicsEntry {
+pub(in crate::diagnose) fn entry(setting: &LawSetting, scene: &MotionScene) -> PhysicsEntry {
     let parameters = setting.parameters(scene).into_iter().map(|q| (q.name.to_owned(), q.value));
     PhysicsEntry { effect: setting.facts().name.into(), parameters: parameters.collect(), curve: None }
 }
 
 /// Makes the corrected model of a fit; `per_record` effects belong to records, not to the machine, and stay out.
-pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[SelectedEffect], scene: &Scene) -> Corrected {
+pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[SelectedEffect], scene: &MotionScene) -> Corrected {
     let mut plant = form.plant(p);
-    let mut effects: Vec<Setting> = Vec::new();
+    let mut effects: Vec<LawSetting> = Vec::new();
     let mut entries = Vec::new();
     for c in chosen.iter().filter(|c| !c.setting.facts().per_record) {
         entries.push(entry(&c.setting, scene));
@@ -50,7 +50,7 @@ pub fn corrected(form: &LinearForm, p: &[f64], chosen: &[SelectedEffect], scene:
         let viscous = c0 - nominal.damper * b * form.given.resonance_gain;
         plant.body = Body::FreeInertia { acceleration_gain: b, viscous_rate_per_s: viscous.max(0.0) };
         let strength = stiffness / (b * form.given.resonance_gain);
-        let spring = Setting::new(CableSpring { creep_time_s: None, centre: 0.0 }, vec![strength, 0.0]);
+        let spring = LawSetting::new(CableSpring { creep_time_s: None, centre: 0.0 }, vec![strength, 0.0]);
         entries.push(entry(&spring, scene));
         effects.push(spring);
     }

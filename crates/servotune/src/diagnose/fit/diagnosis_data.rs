@@ -19,7 +19,7 @@ use crate::diagnose::rules::{FAR_FROM_REPEATS, FAR_FROM_SENSOR, ROUNDING_ALIKE};
 use crate::lti::{Body, LtiError, Plant};
 use crate::numeric::least_squares::Qr;
 use crate::numeric::statistics::rms;
-use crate::physics::{Entry, Port, Scene};
+use crate::physics::{Entry, MotionScene, Port};
 use crate::recording::Role;
 use std::f64::consts::TAU;
 
@@ -47,7 +47,7 @@ pub struct DiagnosisData {
     /// Repeats together.
     pub stack: StackedRecords,
     /// Machine and size of its motion.
-    pub scene: Scene,
+    pub scene: MotionScene,
     /// What repeats differ by, whitened, with the run it belongs to; empty without repeats.
     pub repeats: Vec<(usize, Vec<f64>)>,
     /// What repeats differ by but for their starts, rms (position_unit); NaN without repeats.
@@ -67,7 +67,7 @@ fn count(runs: &[Run], which: &[usize]) -> Option<Grid> {
 }
 
 /// Machine and size of its motion in the fit records; speed and noise come later.
-pub fn scene(given: &Plant, runs: &[Run], sample_time_s: f64, spindle_hz: Option<f64>) -> Scene {
+pub fn scene(given: &Plant, runs: &[Run], sample_time_s: f64, spindle_hz: Option<f64>) -> MotionScene {
     let fit: Vec<&Run> = runs.iter().filter(|r| r.role == Role::Fit).collect();
     let extremes = |of: &dyn Fn(&Run) -> &[f64]| {
         let all = fit.iter().flat_map(|r| of(r).iter().copied());
@@ -76,7 +76,7 @@ pub fn scene(given: &Plant, runs: &[Run], sample_time_s: f64, spindle_hz: Option
     let (low, high) = extremes(&|r| &r.position);
     let (least, most) = extremes(&|r| &r.input);
     let step = fit.iter().flat_map(|r| r.input.windows(2).map(|w| (w[1] - w[0]).abs())).fold(0.0f64, f64::max);
-    Scene {
+    MotionScene {
         plant: given.clone(),
         sample_time_s,
         spindle_hz,

@@ -10,7 +10,7 @@ use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::{NuisanceBasis, Segment};
 use crate::lti::Plant;
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
-use crate::physics::{AnyLaw, Setting};
+use crate::physics::{AnyLaw, LawSetting};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -61,8 +61,8 @@ struct Problem<'a, 'f> {
 }
 
 impl Problem<'_, '_> {
-    fn settings(&self, x: &[f64]) -> Vec<Setting> {
-        let mut all: Vec<Setting> = self.fit.chosen.iter().map(|c| c.setting.clone()).collect();
+    fn settings(&self, x: &[f64]) -> Vec<LawSetting> {
+        let mut all: Vec<LawSetting> = self.fit.chosen.iter().map(|c| c.setting.clone()).collect();
         let p = self.fit.form.free_parameters.len();
         for (v, &(e, i)) in x[p..].iter().zip(&self.strengths) {
             all[e].strengths[i] = *v;
@@ -121,7 +121,7 @@ impl Problem<'_, '_> {
     }
 
     /// Every direction of each record's own.
-    fn taken(&self, settings: &[Setting]) -> Cow<'_, NuisanceBasis> {
+    fn taken(&self, settings: &[LawSetting]) -> Cow<'_, NuisanceBasis> {
         let chosen: Vec<&AnyLaw> = settings.iter().map(|s| &s.law).collect();
         let mut basis = Cow::Borrowed(&self.local);
         for (start, column) in self.fit.free(&chosen) {

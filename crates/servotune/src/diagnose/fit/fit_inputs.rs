@@ -7,7 +7,7 @@ use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::StackedRecords;
 use crate::diagnose::noise::lines::Line;
 use crate::diagnose::noise::whitening::Whitener;
-use crate::physics::Scene;
+use crate::physics::MotionScene;
 
 /// What a refit works on.
 pub struct Fit<'a> {
@@ -24,7 +24,7 @@ pub struct Fit<'a> {
     /// Lines of a phase of their own in every record.
     pub lines: &'a [Line],
     /// Machine and size of its motion.
-    pub scene: &'a Scene,
+    pub scene: &'a MotionScene,
     /// Effects in the model.
     pub chosen: Vec<SelectedEffect>,
 }

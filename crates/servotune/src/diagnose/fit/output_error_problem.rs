@@ -9,7 +9,7 @@ use super::model::Model;
 use super::selected_effect::SelectedEffect;
 use super::simulated_model::SimulatedModel;
 use super::simulation::{Begun, Felt, error_from};
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::data::linear_form::FreeParameter;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::{NuisanceBasis, Segment};
@@ -40,7 +40,7 @@ pub(in crate::diagnose) enum Error<'a> {
     /// Open loop, whitened, the mean over the repeats of each segment.
     Whitened,
     /// As it is reported: plain, in closed loop where a law is given.
-    Plain(Option<&'a Law<'a>>),
+    Plain(Option<&'a ControlLaw<'a>>),
 }
 
 /// A fit by simulation.
@@ -99,7 +99,7 @@ impl Problem<'_> {
         (p, chosen)
     }
 
-    fn law(&self) -> Option<&Law<'_>> {
+    fn law(&self) -> Option<&ControlLaw<'_>> {
         match self.error {
             Error::Whitened => None,
             Error::Plain(law) => law,
@@ -323,7 +323,7 @@ impl<'a> Problem<'a> {
     pub fn plain_error(
         data: &'a DiagnosisData,
         model: &'a Model,
-        law: Option<&'a Law<'a>>,
+        law: Option<&'a ControlLaw<'a>>,
         runs: &[(&'a Run, usize)],
     ) -> Problem<'a> {
         let mut layout: Vec<Segment> = Vec::with_capacity(runs.len());

@@ -4,7 +4,7 @@ use super::diagnosis_data::DiagnosisData;
 use super::model::Model;
 use super::output_error_problem::{Problem, is_of_body};
 use super::simulation::size;
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::data::run::Run;
 use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
 
@@ -17,7 +17,7 @@ const ROUGH: f64 = 1e-3;
 pub(in crate::diagnose) fn descended(
     data: &DiagnosisData,
     model: &Model,
-    law: Option<&Law>,
+    law: Option<&ControlLaw>,
     runs: &[(&Run, usize)],
 ) -> Option<Model> {
     descended_from(Problem::plain_error(data, model, law, runs), TOLERANCE)

@@ -7,7 +7,7 @@ use super::trajectory::Trajectory;
 use crate::diagnose::data::linear_form::Sampled;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::noise::whitening::Whitener;
-use crate::physics::{AnyLaw, COLUMNS, Entry, Sample, Scene};
+use crate::physics::{AnyLaw, COLUMNS, Entry, MotionScene, Sample};
 
 /// What an effect's law gives along every mean run, before strengths.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ impl Drive {
 }
 
 /// The law of an effect along every trajectory.
-pub fn drive(law: &AnyLaw, scene: &Scene, trajectories: &[Trajectory]) -> Drive {
+pub fn drive(law: &AnyLaw, scene: &MotionScene, trajectories: &[Trajectory]) -> Drive {
     let facts = law.facts();
     Drive {
         entry: facts.entry,
@@ -80,7 +80,7 @@ pub(super) fn entering(
 ///
 /// Repeats differ by what the controller made of the noise, and what a bent law does to each is not what it would do to their mean: the mean's
 /// peaks stay below a limit that every one of them meets, the mean turns round once where each turns at a time of its own.
-pub fn raw_columns(law: &AnyLaw, scene: &Scene, trajectory: &Trajectory) -> Vec<Vec<f64>> {
+pub fn raw_columns(law: &AnyLaw, scene: &MotionScene, trajectory: &Trajectory) -> Vec<Vec<f64>> {
     let samples = &trajectory.samples;
     if !law.effect().is_hard_nonlinearity() || trajectory.repeats.is_empty() {
         return columns_along(law, scene, samples, &trajectory.turned);
@@ -98,7 +98,7 @@ pub fn raw_columns(law: &AnyLaw, scene: &Scene, trajectory: &Trajectory) -> Vec<
 /// The columns of an effect along a motion that turned there before.
 pub(in crate::diagnose) fn columns_along(
     law: &AnyLaw,
-    scene: &Scene,
+    scene: &MotionScene,
     samples: &[Sample],
     turned: &[f64],
 ) -> Vec<Vec<f64>> {
@@ -127,7 +127,12 @@ pub(in crate::diagnose) fn columns_along(
 }
 
 /// The same in the recorded position.
-pub fn position_columns(law: &AnyLaw, scene: &Scene, trajectory: &Trajectory, sampled: &Sampled) -> Vec<Vec<f64>> {
+pub fn position_columns(
+    law: &AnyLaw,
+    scene: &MotionScene,
+    trajectory: &Trajectory,
+    sampled: &Sampled,
+) -> Vec<Vec<f64>> {
     let raw = raw_columns(law, scene, trajectory);
     let through = match law.facts().entry {
         Entry::Position => return raw,
@@ -146,7 +151,7 @@ pub fn position_columns(law: &AnyLaw, scene: &Scene, trajectory: &Trajectory, sa
 /// The same, whitened.
 pub fn white_columns(
     law: &AnyLaw,
-    scene: &Scene,
+    scene: &MotionScene,
     trajectory: &Trajectory,
     sampled: &Sampled,
     whitener: &Whitener,

@@ -11,7 +11,7 @@ use crate::diagnose::noise::torque_noise::Differences;
 use crate::diagnose::rules::HEARD_BETTER;
 use crate::lti::{LtiError, Plant};
 use crate::numeric::statistics::rms;
-use crate::physics::Scene;
+use crate::physics::MotionScene;
 
 /// What repeats differ by around each of some plants, each plant once, lines taken out as around the plant of `data`; nothing without repeats.
 pub(in crate::diagnose) fn repeats_around(
@@ -57,7 +57,7 @@ impl DiagnosisData {
         }
         let (t, spindle_hz) = (self.scene.sample_time_s, self.scene.spindle_hz);
         let heard = DiagnosisData::new(plant, self.runs.clone(), t, spindle_hz).ok()?;
-        let scene = Scene { plant: self.scene.plant.clone(), ..heard.scene.clone() };
+        let scene = MotionScene { plant: self.scene.plant.clone(), ..heard.scene.clone() };
         let same = DiagnosisData { form: self.form.clone(), scene, foretold: self.foretold.clone(), ..heard };
         (same.repeats_rms < HEARD_BETTER * self.repeats_rms).then_some(same)
     }

@@ -1,12 +1,12 @@
 //! An effect that is part of a model, with its numbers.
 
-use crate::physics::{Effect, Setting};
+use crate::physics::{Effect, LawSetting};
 
 /// An effect that is part of the model, with its numbers.
 #[derive(Clone)]
 pub struct SelectedEffect {
     /// Its law, with numbers and strengths.
-    pub setting: Setting,
+    pub setting: LawSetting,
     /// Which numbers of the law may be refined.
     pub continuous: Vec<bool>,
     /// Range of each number's magnitude.

@@ -4,13 +4,13 @@ use super::diagnosis_data::DiagnosisData;
 use super::model::Model;
 use super::regressors::raw_columns;
 use super::trajectory::Trajectory;
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::data::linear_form::{Sampled, carried_over, free_motions};
 use crate::diagnose::data::run::Run;
 use crate::diagnose::noise::lines::Line;
 use crate::lti::{Body, LtiError, Plant, step_chain};
 use crate::numeric::random::Random;
-use crate::physics::{AnyLaw, Entry, Machine, Sample, Scene, Setting};
+use crate::physics::{AnyLaw, Entry, LawSetting, MotionScene, Sample, SimulatedMachine};
 use std::f64::consts::TAU;
 
 /// A model to be judged.
@@ -18,7 +18,7 @@ pub struct SimulatedModel<'a> {
     /// The plant.
     pub plant: &'a Plant,
     /// Its effects.
-    pub effects: Vec<&'a Setting>,
+    pub effects: Vec<&'a LawSetting>,
     /// Effects whose strengths are each record's own, as their laws: fitted to the record that is judged, like
     /// its start.
     pub own: Vec<&'a AnyLaw>,
@@ -28,12 +28,12 @@ pub struct SimulatedModel<'a> {
     /// then found along the recorded motion.
     pub fit: Option<(&'a DiagnosisData, &'a Model)>,
     /// Machine and size of its motion.
-    pub scene: &'a Scene,
+    pub scene: &'a MotionScene,
 }
 
 impl<'a> SimulatedModel<'a> {
     /// A plant with effects and nothing that is a record's own.
-    pub fn of(plant: &'a Plant, effects: &'a [Setting], scene: &'a Scene) -> SimulatedModel<'a> {
+    pub fn of(plant: &'a Plant, effects: &'a [LawSetting], scene: &'a MotionScene) -> SimulatedModel<'a> {
         SimulatedModel { plant, effects: effects.iter().collect(), own: vec![], lines: &[], fit: None, scene }
     }
 
@@ -95,12 +95,12 @@ impl<'a> SimulatedModel<'a> {
 pub(super) fn simulate(
     model: &SimulatedModel,
     run: &Run,
-    closed: Option<&Law>,
+    closed: Option<&ControlLaw>,
     constant_torque: Option<f64>,
     free: Vec<f64>,
     mut noise: Option<Random>,
 ) -> Result<Vec<f64>, LtiError> {
-    let mut machine = Machine::new(model.plant, &model.effects, model.scene)?
+    let mut machine = SimulatedMachine::new(model.plant, &model.effects, model.scene)?
         .begun_at(run.began_s)
         .started_at(run.origin, run.before);
     if let Some(torque) = constant_torque {

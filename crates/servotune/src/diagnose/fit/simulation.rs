@@ -4,7 +4,7 @@
 //! command otherwise. The start of each record is estimated.
 
 use super::simulated_model::{SimulatedModel, simulate};
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::data::linear_form::carried_over;
 use crate::diagnose::data::run::Run;
 use crate::lti::{DiscretePlant, LtiError, PlantState, step_chain};
@@ -35,7 +35,7 @@ const NUDGE: f64 = 0.5;
 /// The machine starts at rest where the record does, the controller with the memory that the first recorded commands ask for;
 /// what is left of the start is taken out as free motions of body or loop, by least squares. Laws beyond the linear feel the
 /// start: with them the simulation is made again with the free motions in it, until they stay (Gauss and Newton).
-pub fn error(model: &SimulatedModel, run: &Run, closed: Option<&Law>) -> Result<Vec<f64>, LtiError> {
+pub fn error(model: &SimulatedModel, run: &Run, closed: Option<&ControlLaw>) -> Result<Vec<f64>, LtiError> {
     let constant = model.constant_torque(run)?;
     let begun = Begun::new(model, run, closed, constant)?;
     let rest = vec![0.0; run.len()];
@@ -116,7 +116,7 @@ pub struct Started {
 pub struct Begun<'a> {
     model: &'a SimulatedModel<'a>,
     run: &'a Run,
-    closed: Option<&'a Law<'a>>,
+    closed: Option<&'a ControlLaw<'a>>,
     /// The constant torque on it (command_unit); none for a record that begins at rest.
     constant: Option<f64>,
     /// What the start is made of, in the position.
@@ -132,7 +132,7 @@ impl<'a> Begun<'a> {
     pub fn new(
         model: &'a SimulatedModel<'a>,
         run: &'a Run,
-        closed: Option<&'a Law<'a>>,
+        closed: Option<&'a ControlLaw<'a>>,
         constant: Option<f64>,
     ) -> Result<Begun<'a>, LtiError> {
         let closed = closed.filter(|_| run.reference.is_some());
@@ -251,7 +251,7 @@ impl<'a> Begun<'a> {
 pub fn error_from(
     model: &SimulatedModel,
     run: &Run,
-    closed: Option<&Law>,
+    closed: Option<&ControlLaw>,
     constant: Option<f64>,
     start: &[f64],
     felt: &Felt,
@@ -268,7 +268,7 @@ pub fn error_from(
 }
 
 /// What a disturbance of the position leaves in closed loop, no limit met.
-fn in_loop(plant: &DiscretePlant, law: &Law, disturbance: &[f64]) -> Vec<f64> {
+fn in_loop(plant: &DiscretePlant, law: &ControlLaw, disturbance: &[f64]) -> Vec<f64> {
     let mut state = PlantState::at_rest(plant);
     let mut memory = law.rest();
     disturbance
@@ -283,7 +283,7 @@ fn in_loop(plant: &DiscretePlant, law: &Law, disturbance: &[f64]) -> Vec<f64> {
 }
 
 /// Errors of several records; infinite where the simulation cannot run or runs away.
-pub fn errors(model: &SimulatedModel, runs: &[&Run], closed: Option<&Law>) -> Vec<Vec<f64>> {
+pub fn errors(model: &SimulatedModel, runs: &[&Run], closed: Option<&ControlLaw>) -> Vec<Vec<f64>> {
     runs.par_iter()
         .map(|run| {
             error(model, run, closed)

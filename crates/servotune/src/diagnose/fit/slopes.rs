@@ -139,7 +139,7 @@ mod tests {
     use crate::physics::dead_band::DeadBand;
     use crate::physics::offset_drift::OffsetDrift;
     use crate::physics::pivot_friction::{Loading, PivotFriction};
-    use crate::physics::{AnyLaw, Setting};
+    use crate::physics::{AnyLaw, LawSetting};
     use crate::twin::recording::{multisine, record, scene, stroke};
     use crate::twin::{MachineClass, nominal_controller, paper_machine};
 
@@ -187,7 +187,7 @@ mod tests {
     }
 
     fn chosen(law: impl Into<AnyLaw>, strengths: &[f64]) -> SelectedEffect {
-        let setting = Setting::new(law, strengths.to_vec());
+        let setting = LawSetting::new(law, strengths.to_vec());
         let count = setting.law.numbers().len();
         SelectedEffect { setting, continuous: vec![false; count], range: vec![[0.1, 10.0]; count], step: 0 }
     }

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// The curve as diagnosis.json carries it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FreeForm {
+pub struct FreeFormFound {
     /// The part of the machine.
     pub port: &'static str,
     /// What it goes over.

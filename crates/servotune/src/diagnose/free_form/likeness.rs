@@ -20,6 +20,9 @@ pub struct Likeness {
     pub effect: &'static str,
     /// Share of the curve's square that its shape holds.
     pub share: f64,
+    /// Whether its two sides are alike.
+    #[serde(skip)]
+    pub even: bool,
     /// One plain sentence.
     pub says: String,
 }
@@ -29,12 +32,17 @@ impl Likeness {
     pub(super) fn far(facts: &Facts, words: &str, share: f64) -> Likeness {
         let percent = 100.0 * share;
         let says = format!("like none of the named laws: the nearest, {words}, holds {percent:.0} % of the curve");
-        Likeness { effect: facts.name, share, says }
+        Likeness { effect: facts.name, share, even: false, says }
     }
 
     /// Like none of them.
     pub(super) fn none() -> Likeness {
-        Likeness { effect: unexplained::FACTS.name, share: 0.0, says: "like none of the named laws".into() }
+        Likeness {
+            effect: unexplained::FACTS.name,
+            share: 0.0,
+            even: false,
+            says: "like none of the named laws".into(),
+        }
     }
 }
 
@@ -237,10 +245,11 @@ pub(in crate::diagnose) fn likeness(c: &Plain, unit: &str) -> Likeness {
         return Likeness::far(form.facts, &form.words, share);
     }
     let percent = 100.0 * share;
+    let even = beside.is_none();
     let joint = if form.words == TWO_GAINS { ": it is" } else { ", but" };
     let beside = beside.map_or(String::new(), |text| format!("{joint} {text}"));
     let says = format!("like {}{beside}; that shape holds {percent:.0} % of the curve", form.words);
-    Likeness { effect: form.facts.name, share, says }
+    Likeness { effect: form.facts.name, share, even, says }
 }
 
 /// How much weaker a shape is on one side than on the other, and the sum of squares that it leaves with a strength of its own on either.

@@ -6,7 +6,7 @@
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::physics::amplifier_lag::AmplifierLag;
 use crate::physics::sensor_curve::SensorCurve;
-use crate::physics::{CurvePort, Knots, Setting};
+use crate::physics::{CurvePort, Knots, LawSetting};
 use nalgebra::DMatrix;
 
 /// What stands beside the linear plant.
@@ -50,14 +50,14 @@ impl Shape {
     }
 
     /// The effect that it is; none where it is none.
-    pub fn effect(&self) -> Option<Setting> {
+    pub fn effect(&self) -> Option<LawSetting> {
         match self {
             Shape::Linear => None,
-            Shape::Fold([lowest, at]) => Some(Setting::fixed(SensorCurve::Folded { lowest: *lowest, at: *at })),
+            Shape::Fold([lowest, at]) => Some(LawSetting::fixed(SensorCurve::Folded { lowest: *lowest, at: *at })),
             Shape::Limits([low, high]) => {
-                Some(Setting::fixed(SensorCurve::Limited { low: *low, high: low.max(*high) }))
+                Some(LawSetting::fixed(SensorCurve::Limited { low: *low, high: low.max(*high) }))
             }
-            Shape::Curve(port, knots, value) => Some(Setting::fixed(port.curve(knots, value))),
+            Shape::Curve(port, knots, value) => Some(LawSetting::fixed(port.curve(knots, value))),
         }
     }
 
@@ -145,13 +145,13 @@ impl Shape {
 }
 
 /// The amplifier's lag as an effect of the plant file.
-pub(in crate::diagnose) fn lag(seconds: f64) -> Setting {
-    Setting::fixed(AmplifierLag { time_constant_s: seconds })
+pub(in crate::diagnose) fn lag(seconds: f64) -> LawSetting {
+    LawSetting::fixed(AmplifierLag { time_constant_s: seconds })
 }
 
 /// The effects of a lag of the amplifier, a shape and a reading behind it, in this order. The lag stands behind the amplifier's own curve,
 /// or behind none, so that a record may begin while it still fades.
-pub(in crate::diagnose) fn effects(lag_s: Option<f64>, shape: &Shape, reading: &Shape) -> Vec<Setting> {
+pub(in crate::diagnose) fn effects(lag_s: Option<f64>, shape: &Shape, reading: &Shape) -> Vec<LawSetting> {
     let mut own = shape.effect();
     let mut all = Vec::new();
     if let Some(lag_s) = lag_s {
@@ -163,7 +163,7 @@ pub(in crate::diagnose) fn effects(lag_s: Option<f64>, shape: &Shape, reading: &
             }
             _ => port.curve(&Knots::line(vec![-1.0, 1.0]), &[-1.0, 1.0]),
         };
-        all.push(Setting::fixed(curve.lagged(lag_s)));
+        all.push(LawSetting::fixed(curve.lagged(lag_s)));
     }
     all.extend(own);
     all.extend(reading.effect());

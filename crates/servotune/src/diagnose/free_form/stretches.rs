@@ -3,7 +3,7 @@
 //!
 //! In: the diagnosis data. Out: runs, and which of them are left out together.
 
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 
@@ -26,7 +26,7 @@ pub(in crate::diagnose) struct Stretches<'a> {
     /// One after the other.
     pub runs: Vec<Run>,
     /// The controller, where they are simulated in the loop that they were recorded in.
-    pub closed: Option<&'a Law<'a>>,
+    pub closed: Option<&'a ControlLaw<'a>>,
     /// Blocks of consecutive samples of the runs in their order: samples, and the part that it is left out with.
     pub blocks: Vec<(usize, usize)>,
 }
@@ -54,7 +54,7 @@ impl<'a> Stretches<'a> {
     }
 
     /// The same in the loop that they were recorded in, which holds motions together that a law would drive apart.
-    pub fn in_loop(&self, law: &'a Law<'a>) -> Stretches<'a> {
+    pub fn in_loop(&self, law: &'a ControlLaw<'a>) -> Stretches<'a> {
         Stretches { runs: self.runs.clone(), closed: Some(law), blocks: self.blocks.clone() }
     }
 

@@ -95,5 +95,5 @@ pub(in crate::diagnose) fn surface_likeness(c: &Plain, unit: &str) -> Likeness {
         says += &format!(" and {text}");
     }
     says += &format!("; that shape holds {percent:.0} % of the curve");
-    Likeness { effect: drag.facts.name, share, says }
+    Likeness { effect: drag.facts.name, share, even: false, says }
 }

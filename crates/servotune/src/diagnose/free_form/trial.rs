@@ -13,7 +13,7 @@ use crate::diagnose::fit::simulated_model::SimulatedModel;
 use crate::diagnose::fit::simulation::{Begun, Felt, error_from};
 use crate::lti::{Body, Plant};
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
-use crate::physics::{CurvePort, Setting};
+use crate::physics::{CurvePort, LawSetting};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -68,7 +68,7 @@ struct Start {
 /// A trial's model, ready to be simulated.
 struct Made {
     plant: Plant,
-    effects: Vec<Setting>,
+    effects: Vec<LawSetting>,
 }
 
 /// Linear parameters that the shape leaves free: what it can hold itself stays.

@@ -71,13 +71,20 @@ pub(super) fn spare(
             let mut chosen = model.chosen.clone();
             chosen.remove(at);
             let less = fitted(data, chosen, &model.refitted.p, iterations);
-            let dear = |m: &Model| {
-                m.cost - by_simulation.cost > ROUGH_TELLS * worth(&model.chosen[at], price, before - m.cost)
+            let lost = |m: &Model| m.cost - by_simulation.cost;
+            let worth = |m: &Model| worth(&model.chosen[at], price, before - m.cost);
+            let near = |start: &Model| {
+                let rough = roughly_simulated(data, start).filter(|m| lost(m) <= ROUGH_TELLS * worth(m));
+                rough.and_then(|_| simulated(data, start))
             };
-            let near = roughly_simulated(data, &less).filter(|m| !dear(m));
-            if let Some(s) = near.and_then(|_| simulated(data, &less)) {
-                without.push((at, less, s));
+            let mut found = near(&less);
+            // From where the fit with it ended the others may go on: along the motion a drag alone ends elsewhere.
+            if found.as_ref().is_none_or(|s| lost(s) > worth(s)) {
+                let mut warm = by_simulation.clone();
+                warm.chosen.remove(at);
+                found = near(&warm).into_iter().chain(found).min_by(|a, b| a.cost.total_cmp(&b.cost));
             }
+            without.extend(found.map(|s| (at, less, s)));
         }
         let Some((at, less, s)) = without.into_iter().min_by(|a, b| a.2.cost.total_cmp(&b.2.cost)) else { return };
         if s.cost - by_simulation.cost > worth(&model.chosen[at], price, before - s.cost) {

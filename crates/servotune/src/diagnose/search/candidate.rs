@@ -3,7 +3,7 @@
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::noise::chance::log_tail;
 use crate::diagnose::rules::{PUSH_MOVES, PUSH_TOGETHER};
-use crate::physics::{Effect, Port, Setting};
+use crate::physics::{Effect, LawSetting, Port};
 
 /// Whether no other law's form makes it: what turns with the disk, and a wave over the position.
 pub(super) fn has_own_period(e: &dyn Effect) -> bool {
@@ -14,7 +14,7 @@ pub(super) fn has_own_period(e: &dyn Effect) -> bool {
 #[derive(Clone)]
 pub struct Candidate {
     /// Its law with its best numbers.
-    pub setting: Setting,
+    pub setting: LawSetting,
     /// Fall of the sum of squares of the whitened error.
     pub gain: f64,
     /// Its gain over the median of the grid's points around it: how far it stands out among laws of its kind with other numbers.

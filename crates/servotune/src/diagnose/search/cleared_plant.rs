@@ -20,7 +20,7 @@ use crate::diagnose::rules::{
     CLEARED_ALONE, CLEARED_BETTER, CLEARED_BY_CURVE, CLEARED_DONE, CLEARED_FAR, CLEARED_FULLER, CLEARED_TELLS,
 };
 use crate::lti::Plant;
-use crate::physics::Setting;
+use crate::physics::LawSetting;
 use std::cell::LazyCell;
 use std::ops::Deref;
 
@@ -50,6 +50,11 @@ pub(in crate::diagnose) struct Cleared {
 }
 
 impl Cleared {
+    /// A plant that was fitted together with a curve.
+    pub fn beside_curve(plant: Plant, left: Vec<Vec<f64>>) -> Cleared {
+        Cleared { plant, law: None, curve: true, given_stands: false, left }
+    }
+
     /// Whether a law or a curve stands beside the plant: what both leave is noise, what a plant leaves alone may be anything.
     pub fn bends(&self) -> bool {
         self.law.is_some() || self.curve
@@ -111,8 +116,10 @@ pub(in crate::diagnose) fn cleared(
     let widths = smoothings(&means);
     let balances = widths.iter().flat_map(|&w| SLIDES.map(|s| Balance::of(data, &means, w, s)));
     let mut laws: Vec<(f64, Balanced)> = balances.flat_map(|b| b.laws()).collect();
+    // Where nothing bends the records a given plant that is far from them is only far off.
+    let off = || tried.unbent(&means, least);
     if laws.is_empty() {
-        return None;
+        return off();
     }
     let bent = LazyCell::new(|| -> Vec<Curved> {
         let all = curves(&widths.iter().map(|&w| Balance::of(data, &means, w, 0.0)).collect::<Vec<_>>());
@@ -121,7 +128,7 @@ pub(in crate::diagnose) fn cleared(
     let zero = vec![0.0; data.form.free_parameters.len()];
     let near = data.fit(vec![]).cost(&zero) < CLEARED_FAR * CLEARED_FAR * data.stack.total as f64;
     if near && laws.iter().all(|(share, _)| *share >= CLEARED_TELLS) && bent.is_empty() {
-        return None;
+        return off();
     }
     laws.sort_by(|a, b| a.0.total_cmp(&b.0));
     laws.truncate(TRIED);
@@ -135,7 +142,8 @@ pub(in crate::diagnose) fn cleared(
         return Some(Cleared { given_stands: true, ..firsts.cleared(&stands) });
     }
     let best = tried.of_curves(&bent, tried.of_laws(&laws)).map(|best| tried.with_modes(best));
-    let best = tried.alone(best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least)?);
+    let Some(best) = best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least) else { return off() };
+    let best = tried.alone(best);
     if !(repeated && best.drags()) {
         return Some(tried.cleared(&best));
     }
@@ -306,7 +314,7 @@ impl Tried<'_> {
             let mut better = false;
             for (full, range) in law.setting.law.fuller(&self.own.scene) {
                 let continuous = full.numbers().iter().map(Option::is_some).collect();
-                let setting = Setting::new(full, law.setting.strengths.clone());
+                let setting = LawSetting::new(full, law.setting.strengths.clone());
                 let chosen = vec![SelectedEffect { setting, continuous, range, ..law.clone() }];
                 let Some(fitted) = self.fitted(&best.ground, &Model { chosen, ..plain.clone() }) else { continue };
                 let left = self.left(&best.ground, &fitted);

@@ -3,7 +3,7 @@
 
 use super::candidate::Candidate;
 use super::residual_effect::ResidualEffect;
-use super::scan::Ground;
+use super::scan::ScanGround;
 use super::selection::Step;
 use super::shortlist::hums;
 use super::step_scan::scan;
@@ -59,6 +59,6 @@ pub(super) fn in_simulation(data: &DiagnosisData, library: &[&'static dyn Effect
     let mut error = simulation_error(data, model);
     basis.project(&mut error);
     let plant = data.form.nominal(&model.refitted.p).plant;
-    let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
+    let Some(ground) = ScanGround::new(&fit, &plant, error, basis) else { return Vec::new() };
     ground.best(library)
 }

@@ -14,7 +14,7 @@ use crate::diagnose::fit::regressors::{raw_columns, white_columns};
 use crate::lti::Plant;
 use crate::numeric::least_squares::dot;
 use crate::numeric::statistics::median;
-use crate::physics::{AnyLaw, Effect, Entry, Setting};
+use crate::physics::{AnyLaw, Effect, Entry, LawSetting};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -99,7 +99,7 @@ pub(in crate::diagnose) fn freedom(grid: &[AnyLaw], law: &AnyLaw) -> (Vec<bool>,
 }
 
 /// A scan's ground: the error that is left, and what fits have used up.
-pub struct Ground<'a, 'f> {
+pub struct ScanGround<'a, 'f> {
     fit: &'a Fit<'f>,
     sampled: Sampled,
     error: Vec<f64>,
@@ -125,9 +125,9 @@ const PEAKS: usize = 3;
 const RISES: f64 = 0.4;
 const BESIDE: usize = 1;
 
-impl<'a, 'f> Ground<'a, 'f> {
+impl<'a, 'f> ScanGround<'a, 'f> {
     /// The ground of a fit: `error` is whitened and has `basis` taken out; torques and commands are seen through `plant`.
-    pub fn new(fit: &'a Fit<'f>, plant: &Plant, error: Vec<f64>, basis: NuisanceBasis) -> Option<Ground<'a, 'f>> {
+    pub fn new(fit: &'a Fit<'f>, plant: &Plant, error: Vec<f64>, basis: NuisanceBasis) -> Option<ScanGround<'a, 'f>> {
         let sampled = Sampled::of(plant, fit.scene.sample_time_s).ok()?;
         // The adjoint of a filter from rest is the same filter backwards in time.
         let back = |entry: Entry| {
@@ -146,12 +146,12 @@ impl<'a, 'f> Ground<'a, 'f> {
             out
         };
         let seen = [Entry::Command, Entry::Torque, Entry::Position].map(back);
-        Some(Ground { fit, sampled, error, basis, seen, repeats: None })
+        Some(ScanGround { fit, sampled, error, basis, seen, repeats: None })
     }
 
     /// With what repeats differ by as further evidence.
-    pub fn beside(self, repeats: &'a DiagnosisData) -> Ground<'a, 'f> {
-        Ground { repeats: Some(repeats), ..self }
+    pub fn beside(self, repeats: &'a DiagnosisData) -> ScanGround<'a, 'f> {
+        ScanGround { repeats: Some(repeats), ..self }
     }
 
     /// What an effect shows in what repeats differ by.
@@ -296,7 +296,7 @@ impl<'a, 'f> Ground<'a, 'f> {
                     concealed: s.concealed,
                     points: grid.len(),
                     strengths: if fixed { 1 } else { s.strengths.len() },
-                    setting: Setting { law: grid[class[i]].clone(), strengths: s.strengths },
+                    setting: LawSetting { law: grid[class[i]].clone(), strengths: s.strengths },
                     continuous: continuous(grid, class),
                     range: range(grid, class),
                 };
@@ -311,7 +311,7 @@ impl<'a, 'f> Ground<'a, 'f> {
         let s = self.explain(&law);
         candidate.gain = s.gain;
         candidate.concealed = s.concealed;
-        candidate.setting = Setting { law, strengths: s.strengths };
+        candidate.setting = LawSetting { law, strengths: s.strengths };
     }
 
     /// Moves the continuous numbers of a candidate to where it explains most: one at a time, by steps that shrink.
@@ -333,7 +333,7 @@ impl<'a, 'f> Ground<'a, 'f> {
                     if s.gain > candidate.gain {
                         candidate.gain = s.gain;
                         candidate.concealed = s.concealed;
-                        candidate.setting = Setting { law, strengths: s.strengths };
+                        candidate.setting = LawSetting { law, strengths: s.strengths };
                         better = true;
                         break;
                     }

@@ -10,7 +10,7 @@ use super::step_scan::scan;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::rules::{CONFOUNDED, CONFOUNDED_NEAR_NOISE, FAR_FROM_NOISE, GAIN_WITHOUT_REPEATS, NEAR_NOISE};
-use crate::physics::{Effect, Setting, effect};
+use crate::physics::{Effect, LawSetting, effect};
 
 /// What the candidates of one step are judged by.
 pub(super) struct Shortlist<'a> {
@@ -112,7 +112,7 @@ pub(in crate::diagnose) fn hums(data: &DiagnosisData, c: &Candidate, gain: f64, 
 }
 
 /// Whether a second one of the same effect can be another thing: another line, another mode.
-fn again(c: &Candidate, first: &Setting) -> bool {
+fn again(c: &Candidate, first: &LawSetting) -> bool {
     c.effect().may_occur_several_times()
         && (first.law.first_number() - c.setting.law.first_number()).abs() > 0.02 * first.law.first_number().abs()
 }

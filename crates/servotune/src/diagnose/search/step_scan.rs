@@ -1,7 +1,7 @@
 //! The scan of a step: every law around where the model stands.
 
 use super::candidate::Candidate;
-use super::scan::Ground;
+use super::scan::ScanGround;
 use super::selection::Step;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::model::Model;
@@ -19,7 +19,7 @@ pub(super) fn scan_at(
     let (error, basis) = fit.screen_basis(p);
     let plant = data.form.nominal(p).plant;
     let ahead = model.cost - error.iter().map(|e| e * e).sum::<f64>();
-    let Some(ground) = Ground::new(&fit, &plant, error, basis) else { return Vec::new() };
+    let Some(ground) = ScanGround::new(&fit, &plant, error, basis) else { return Vec::new() };
     let mut candidates = ground.beside(data).best(library);
     candidates.iter_mut().for_each(|c| c.gain += ahead.min(0.0));
     candidates

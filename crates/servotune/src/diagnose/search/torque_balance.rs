@@ -8,7 +8,7 @@ use crate::diagnose::fit::regressors::columns_along;
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::lti::{Body, Plant};
 use crate::numeric::least_squares::Qr;
-use crate::physics::{AnyLaw, Effect, Entry, Sample, Scene, Setting, library};
+use crate::physics::{AnyLaw, Effect, Entry, LawSetting, MotionScene, Sample, library};
 use rayon::prelude::*;
 
 /// Standard deviations of the smoothing (samples): wide for slow machines, narrow for fast ones.
@@ -155,7 +155,7 @@ pub(in crate::diagnose) struct Balance<'a> {
     /// Mean runs as recorded: what was taken out of them around a bent plant (lines) is none of theirs.
     pub means: &'a [Run],
     /// The machine with the size of the motion as it is seen here.
-    pub scene: Scene,
+    pub scene: MotionScene,
     pub width: f64,
     pub parts: Vec<Smoothed>,
 }
@@ -177,7 +177,7 @@ impl<'a> Balance<'a> {
         let moving = parts.iter().flat_map(|p| p.rows.iter().map(|&k| p.samples[k].v.abs()));
         let speed = moving.fold(0.0f64, f64::max).max(1e-12);
         let noise = roughness(means).min(data.levels.sensor_rms);
-        let scene = Scene { speed, noise, ..data.scene.clone() };
+        let scene = MotionScene { speed, noise, ..data.scene.clone() };
         Balance { data, means, scene, width, parts }
     }
 
@@ -244,7 +244,7 @@ impl<'a> Balance<'a> {
                 true => vec![1.0],
                 false => numbers[4..4 + own].iter().map(|s| s / gain).collect(),
             };
-            let setting = Setting::new(law.clone(), strengths);
+            let setting = LawSetting::new(law.clone(), strengths);
             with_freedom(SelectedEffect { setting, continuous: Vec::new(), range: Vec::new(), step: 0 }, scene)
         });
         if law.as_ref().is_some_and(|l| !l.setting.is_possible(&[])) {
@@ -300,7 +300,7 @@ impl<'a> Balance<'a> {
 }
 
 /// A law with the numbers that its effect's grid leaves free.
-pub(super) fn with_freedom(law: SelectedEffect, scene: &Scene) -> SelectedEffect {
+pub(super) fn with_freedom(law: SelectedEffect, scene: &MotionScene) -> SelectedEffect {
     let own = &law.setting.law;
     let (continuous, range) = super::scan::freedom(&own.effect().grid(scene), own);
     SelectedEffect { continuous, range, ..law }

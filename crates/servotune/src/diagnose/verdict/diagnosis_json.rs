@@ -5,7 +5,7 @@ use super::finding::{Finding, FitReport, NextExperiment, Tried, Verdict};
 use super::held_out::HeldOut;
 use crate::diagnose::data::checks::{Replay, SampleFault};
 use crate::diagnose::fit::coupling::Coupling;
-use crate::diagnose::free_form::curve::FreeForm;
+use crate::diagnose::free_form::curve::FreeFormFound;
 use crate::diagnose::noise::whitening::NoiseLevels;
 use crate::diagnose::search::bootstrap_chance::Bootstrap;
 use crate::diagnose::search::residual_effect::ResidualEffect;
@@ -26,7 +26,7 @@ pub struct Diagnosis {
     pub fit: FitReport,
     /// A curve without a name that stands in for the missing law.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub free_form: Option<FreeForm>,
+    pub free_form: Option<FreeFormFound>,
     /// File of the corrected model, in the output folder.
     pub corrected_model: Option<String>,
     /// What to record next.

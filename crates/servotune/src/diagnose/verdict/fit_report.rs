@@ -2,7 +2,7 @@
 
 use super::finding::{FitFigures, FitReport, RecordFigures};
 use super::offered_models::{Offer, Reported, Reporting};
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::{Simulation, floor, rms};
@@ -24,7 +24,7 @@ pub(in crate::diagnose) fn fit_report(
     let given = Offer::of(given);
     // What further inputs move is an error of the given model, and a linear part of the other two.
     let recorded: Vec<&Run> = reporting.recorded.iter().collect();
-    let two = |closed: Option<&Law>| {
+    let two = |closed: Option<&ControlLaw>| {
         [reporting.errors(&given, &recorded, closed), reporting.errors(&reported.refitted, &every, closed)]
     };
     let [before, refit] = two(closed);

@@ -45,6 +45,12 @@ impl Judgement {
         Judgement { remarks, ..self }
     }
 
+    /// Whether it says that nothing is missing but these.
+    pub fn only(&self, names: &[String]) -> bool {
+        let says = matches!(self.verdict, Verdict::Named | Verdict::NoMismatch);
+        says && self.findings.iter().all(|f| names.contains(&f.effect))
+    }
+
     /// Names of the findings.
     pub fn names(&self) -> String {
         self.findings.iter().map(|f| f.effect.as_str()).collect::<Vec<_>>().join(", ")

@@ -16,7 +16,7 @@ use crate::diagnose::search::selection::Selection;
 use crate::numeric::digits::said;
 use crate::physics::amplifier_lag::AmplifierLag;
 use crate::physics::sensor_lag::SensorLag;
-use crate::physics::{self, AnyLaw, Parameter, Setting, extra_delay, misalignment};
+use crate::physics::{self, AnyLaw, LawSetting, Parameter, extra_delay, misalignment};
 use std::collections::BTreeMap;
 
 /// How a restricted model is fitted.
@@ -90,7 +90,7 @@ const ITERATIONS: usize = 16;
 /// A lag whose time constant is looked for near a delay.
 fn lag(law: AnyLaw, near_s: f64) -> SelectedEffect {
     let range = vec![[0.1 * near_s, 10.0 * near_s]];
-    SelectedEffect { setting: Setting::fixed(law), continuous: vec![true], range, step: 0 }
+    SelectedEffect { setting: LawSetting::fixed(law), continuous: vec![true], range, step: 0 }
 }
 
 /// A lag in the place of every change of the linear parameters.
@@ -126,7 +126,7 @@ impl Lag {
         let given = &data.form.given;
         let parameters = |by: f64| {
             let law = &self.chosen.setting.law;
-            Setting::fixed(law.with_number(0, law.first_number() * by.exp())).parameters(&data.scene)
+            LawSetting::fixed(law.with_number(0, law.first_number() * by.exp())).parameters(&data.scene)
         };
         let off = 1.96 * self.spread;
         let ends = parameters(-off).into_iter().zip(parameters(off));

@@ -1,7 +1,7 @@
 //! What the logs of a case say before any model is fitted: sound, cut off, filtered, slipped, in other units, or made by another controller.
 
 use super::finding::Finding;
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::data::checks::{Replay, SampleFault, replay_records, sample_faults};
 use crate::diagnose::data::log_filter::{LogFilter, Numerator};
 use crate::diagnose::data::plant_check::Answers;
@@ -37,7 +37,7 @@ pub(in crate::diagnose) fn check(
     case: &Case,
     runs: &mut [Run],
     given: &Plant,
-    law: Option<&Law>,
+    law: Option<&ControlLaw>,
     sample_time_s: f64,
 ) -> Result<LogChecks, LtiError> {
     let lap = unwrap(runs, law);
@@ -125,7 +125,7 @@ fn bent_reading(runs: &[Run], heard: Option<bool>, given: &Plant, sample_time_s:
 }
 
 /// The low-pass between controller and log, where that explains a failing replay far better than a shift or a factor.
-fn filter(law: &Law, failing: &[&Run], replay: &Replay) -> Option<LogFilter> {
+fn filter(law: &ControlLaw, failing: &[&Run], replay: &Replay) -> Option<LogFilter> {
     let with: Vec<(&Run, &[f64])> = failing.iter().filter_map(|r| Some((*r, r.reference.as_deref()?))).collect();
     let else_left = replay.error.min(replay.error_shifted).min(replay.error_scaled);
     LogFilter::of(law, &with).filter(|f| f.error < FILTER_HELPS * else_left)

@@ -7,12 +7,12 @@
 use super::finding::{Estimate, Finding};
 use super::judgement::{Judgement, Later};
 use super::naming::everywhere;
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, entry};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::{errors, rms};
-use crate::diagnose::free_form::curve::FreeForm;
+use crate::diagnose::free_form::curve::FreeFormFound;
 use crate::diagnose::free_form::estimation::{Curved, Estimated, Foretelling, estimated, grounds};
 use crate::diagnose::free_form::gauge::Plain;
 use crate::diagnose::free_form::likeness::likeness;
@@ -27,7 +27,7 @@ use crate::diagnose::search::selection::Selection;
 use crate::diagnose::search::torque_balance::{Balance, SMOOTHINGS, recorded_means};
 use crate::lti::{CurveKnot, Plant};
 use crate::physics::sensor_curve::{self, SensorCurve};
-use crate::physics::{CurvePort, Facts, Setting, coulomb_friction, pivot_friction, shortest_loop};
+use crate::physics::{CurvePort, Facts, LawSetting, coulomb_friction, pivot_friction, shortest_loop};
 
 /// A model with a curve.
 pub(in crate::diagnose) struct StandIn {
@@ -36,7 +36,7 @@ pub(in crate::diagnose) struct StandIn {
     /// Recorded less simulated position of every run: as the report shows it, and in open loop.
     pub errors: [Vec<Vec<f64>>; 2],
     /// What is said of it; none where what was found has a name.
-    pub curve: Option<FreeForm>,
+    pub curve: Option<FreeFormFound>,
     /// What was found, where it has a name.
     pub finding: Option<Finding>,
 }
@@ -44,7 +44,7 @@ pub(in crate::diagnose) struct StandIn {
 /// What both figures of a simulation are judged by.
 pub(in crate::diagnose) struct Standing<'a> {
     /// The controller, where records are shown in closed loop.
-    pub closed: Option<&'a Law<'a>>,
+    pub closed: Option<&'a ControlLaw<'a>>,
     /// Errors of all runs under the given plant, the linear refit and the laws that were found.
     pub errors: &'a [Vec<Vec<f64>>; 3],
     /// What of the records counts as noise (rms).
@@ -120,7 +120,7 @@ fn shown(
     model: &Corrected,
     best: &Foretelling,
     one_place: &Stretches,
-    closed: Option<&Law>,
+    closed: Option<&ControlLaw>,
 ) -> Vec<Vec<f64>> {
     if best.trial.reads() && closed.is_none() {
         // Where the arm stands is not known from what is read: every place that gives the first reading is a start.
@@ -154,13 +154,13 @@ fn model(data: &DiagnosisData, best: &Foretelling, c: &Plain) -> Corrected {
     let mut plant: Plant = data.form.plant(if curved { &c.p } else { &trial.p });
     let (position, command) = (plant.position_unit.clone(), plant.command_unit.clone());
     let behind = trial.lag_s.filter(|_| curved && c.port == CurvePort::AmplifierOverCommand);
-    let mut effects: Vec<Setting> = trial.lag_s.filter(|_| behind.is_none()).map(lag).into_iter().collect();
+    let mut effects: Vec<LawSetting> = trial.lag_s.filter(|_| behind.is_none()).map(lag).into_iter().collect();
     plant.physics = effects.iter().map(|s| entry(s, &data.scene)).collect();
     if curved {
         let mut curve = c.port.curve(&c.knots, &c.value);
         curve.lag_s = behind;
         plant.physics.push(c.port.entry(knots(c), behind, &position, &command));
-        effects.push(Setting::fixed(curve));
+        effects.push(LawSetting::fixed(curve));
     }
     if let Some(s) = trial.reading.effect() {
         plant.physics.push(entry(&s, &data.scene));
@@ -182,7 +182,7 @@ pub fn curve_title(port: &str, argument: &str) -> String {
     }
 }
 
-fn described(data: &DiagnosisData, found: &Estimated, explained_share: f64, named: bool) -> FreeForm {
+fn described(data: &DiagnosisData, found: &Estimated, explained_share: f64, named: bool) -> FreeFormFound {
     let c = &found.plain;
     let form = &data.form.given;
     let [port, argument] = c.port.names();
@@ -203,7 +203,7 @@ fn described(data: &DiagnosisData, found: &Estimated, explained_share: f64, name
         100.0 * explained_share
     );
     let root = |f: f64| f.max(0.0).sqrt();
-    FreeForm {
+    FreeFormFound {
         port,
         argument,
         argument_unit,
@@ -220,7 +220,7 @@ fn described(data: &DiagnosisData, found: &Estimated, explained_share: f64, name
 /// The finding of a reading that folds or ends at limits.
 fn reading_finding(data: &DiagnosisData, best: &Foretelling, found: &Estimated) -> Finding {
     let &Facts { name: effect, says, port, .. } = &sensor_curve::FACTS;
-    let none = || Setting::fixed(SensorCurve::Folded { lowest: 0.0, at: 0.0 });
+    let none = || LawSetting::fixed(SensorCurve::Folded { lowest: 0.0, at: 0.0 });
     let setting = best.trial.reading.effect().unwrap_or_else(none);
     let from = best.trial.reading_from();
     let unit = &data.form.given.position_unit;
@@ -303,7 +303,7 @@ impl StandIn {
 /// A curve beside a linear plant and nothing else.
 pub struct MissingCurve {
     /// It.
-    pub curve: FreeForm,
+    pub curve: FreeFormFound,
     /// Recorded less simulated position of every run in open loop.
     pub errors: Vec<Vec<f64>>,
 }

@@ -17,7 +17,7 @@ use crate::diagnose::search::selection::Selection;
 use crate::diagnose::search::shortlist::same_drag;
 use crate::numeric::digits::said;
 use crate::physics::{
-    AnyLaw, Effect, Entry, Facts, Parameter, Setting, Share, coulomb_friction, facts, library, line_disturbance,
+    AnyLaw, Effect, Entry, Facts, LawSetting, Parameter, Share, coulomb_friction, facts, library, line_disturbance,
     linear_parameters, repeatable_runout, unexplained,
 };
 use std::collections::BTreeMap;
@@ -121,14 +121,14 @@ pub(in crate::diagnose) fn finding(data: &DiagnosisData, selection: &Selection, 
 /// Effects that do the same to the recorded position from another place of a linear machine: where a lag sits, before the plant or behind
 /// it, no record of the two ends tells.
 fn twins<'a>(data: &'a DiagnosisData, chosen: &'a SelectedEffect) -> impl Iterator<Item = &'static str> + 'a {
-    let ratio = |s: &Setting, w: f64| match s.response_share(&data.scene, w) {
+    let ratio = |s: &LawSetting, w: f64| match s.response_share(&data.scene, w) {
         Share::Ratio(r) => Some(r),
         _ => None,
     };
     let same = move |e: &dyn Effect| {
         let numbers: Vec<f64> = chosen.setting.law.numbers().into_iter().flatten().collect();
         let Some(other) = e.grid(&data.scene).first().map(|l| l.with_numbers(&numbers)) else { return false };
-        let other = Setting::fixed(other);
+        let other = LawSetting::fixed(other);
         let share = [0.1, 1.0, 2.5].map(|a| a / data.scene.sample_time_s);
         share.iter().all(|&w| {
             let own = ratio(&chosen.setting, w);
@@ -161,7 +161,7 @@ fn effect_signal(data: &DiagnosisData, selection: &Selection, at: usize) -> Vec<
 }
 
 /// The frequency that carries a run-out nearly alone (Hz).
-fn single_order(setting: &Setting) -> Option<f64> {
+fn single_order(setting: &LawSetting) -> Option<f64> {
     let sizes: Vec<f64> = setting.strengths.chunks_exact(2).map(|s| s[0].hypot(s[1])).collect();
     let (k, most) = sizes.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
     let alone = sizes.iter().enumerate().all(|(i, s)| i == k || *s < ORDER_BESIDE * most);
@@ -188,7 +188,7 @@ fn estimates(data: &DiagnosisData, selection: &Selection, at: usize) -> BTreeMap
         + before.iter().map(moving).sum::<usize>();
     let moved = |direction: &Vec<f64>| -> Vec<Parameter> {
         let by = |i: usize| direction.get(i).copied().unwrap_or(0.0) * widen;
-        let mut s: Setting = chosen.setting.clone();
+        let mut s: LawSetting = chosen.setting.clone();
         (0..strengths_of(chosen)).for_each(|i| s.strengths[i] += by(strength + i));
         let free = (0..chosen.continuous.len()).filter(|&i| chosen.continuous[i]);
         for (k, i) in free.enumerate() {

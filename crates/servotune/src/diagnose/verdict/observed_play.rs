@@ -17,7 +17,7 @@ use crate::diagnose::fit::simulation::errors;
 use crate::diagnose::rules::{Consulted, PLAY_CLEARLY, PLAY_HELD_OUT, PLAY_LEAST, PLAY_TOUCHES, asked};
 use crate::lti::{PhysicsEntry, Plant};
 use crate::physics::backlash::{Backlash, Contact, FACTS};
-use crate::physics::{Parametric, PlayObserver, Port, Readings, Setting};
+use crate::physics::{LawSetting, Parametric, PlayObserver, Port, Readings};
 use std::collections::BTreeMap;
 
 /// Shortest record.
@@ -201,7 +201,7 @@ fn told(data: &DiagnosisData, best: &Found, gain: f64, touching: f64) -> Observe
     let mut corrected = best.plant.clone();
     let entries = parameters.iter().map(|(name, e)| (name.clone(), e.value)).collect();
     corrected.plant.physics.push(PhysicsEntry { effect: FACTS.name.into(), parameters: entries, curve: None });
-    corrected.effects.push(Setting::new(law, vec![read]));
+    corrected.effects.push(LawSetting::new(law, vec![read]));
     let side = if behind { "behind the play" } else { "on the driven side of it" };
     let finding = Finding {
         effect: FACTS.name.into(),

@@ -4,7 +4,7 @@
 //! no worse than the given plant's; where the search's own are, they are fitted once more by the reported error itself, and what still is worse
 //! is not adopted, with the reason. Records that were held out may withdraw a model; they never choose one.
 
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, corrected};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
@@ -61,7 +61,7 @@ pub(in crate::diagnose) struct Reporting<'a> {
     pub runs: &'a [Run],
     /// The same as recorded, what further inputs move included.
     pub recorded: &'a [Run],
-    pub closed: Option<&'a Law<'a>>,
+    pub closed: Option<&'a ControlLaw<'a>>,
     /// Whether the logs are: nothing is fitted once more to those that are not.
     pub sound: bool,
 }
@@ -78,7 +78,7 @@ fn error_said(v: f64) -> String {
 
 impl<'a> Reporting<'a> {
     /// Errors of a model on runs.
-    pub fn errors(&self, offer: &Offer, runs: &[&Run], closed: Option<&Law>) -> Vec<Vec<f64>> {
+    pub fn errors(&self, offer: &Offer, runs: &[&Run], closed: Option<&ControlLaw>) -> Vec<Vec<f64>> {
         let made = &offer.made;
         if offer.full {
             return errors(&made.judged(self.data, self.selection), runs, closed);

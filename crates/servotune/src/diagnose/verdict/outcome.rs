@@ -13,16 +13,18 @@ use crate::diagnose::fit::corrected_model::Corrected;
 use crate::diagnose::fit::coupling::Coupling;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::rms;
-use crate::diagnose::free_form::curve::FreeForm;
-use crate::diagnose::rules::{Answer, NAME_FAR, asked};
+use crate::diagnose::free_form::curve::FreeFormFound;
+use crate::diagnose::rules::{Answer, CURVE_FORETELLS, NAME_FAR, asked};
+use crate::diagnose::search::cleared_plant::Cleared;
 use crate::diagnose::search::selection::Selection;
 use crate::lti::Plant;
+use crate::physics::library;
 
 /// What a search came to.
 pub(in crate::diagnose) struct Outcome {
     pub judgement: Judgement,
     pub next_experiment: NextExperiment,
-    pub free_form: Option<FreeForm>,
+    pub free_form: Option<FreeFormFound>,
     pub fit: FitReport,
     /// Recorded less simulated position of every run under given plant, refit and corrected model: as the report shows it, and in open loop.
     pub errors: Errors,
@@ -64,6 +66,28 @@ impl Outcome {
             & asked!(f.rms_after / f.noise_floor, NAME_FAR: f.rms_after > NAME_FAR * f.noise_floor)
     }
 
+    /// Whether this law has a name among what was found.
+    pub fn names(&self, law: &str) -> bool {
+        let named = matches!(self.judgement.verdict, Verdict::Named | Verdict::Family);
+        named && self.judgement.findings.iter().any(|f| f.effect == law)
+    }
+
+    /// The same with the rules that led to it.
+    pub fn by(self, answer: Answer) -> Outcome {
+        let consulted = [self.judgement.consulted, answer.consulted].concat();
+        Outcome { judgement: Judgement { consulted, ..self.judgement }, ..self }
+    }
+
+    /// The law that the curve is like that stands in for what has no name, and the plant beside that curve.
+    pub fn like_a_law(&self) -> Option<(&'static str, Cleared)> {
+        let curve = self.free_form.as_ref().filter(|c| c.like.even && c.like.share >= CURVE_FORETELLS)?;
+        let nameless = self.judgement.verdict == Verdict::LocatedUnexplained && self.data.levels.from_repeats;
+        let law = library().iter().map(|e| e.facts().name).find(|n| *n == curve.like.effect).filter(|_| nameless)?;
+        let plant = Plant { physics: Vec::new(), ..self.corrected.plant.clone() };
+        let left = self.data.fit_runs.iter().map(|&r| self.open[2][r].clone()).collect();
+        Some((law, Cleared::beside_curve(plant, left)))
+    }
+
     /// The same with another corrected model and its errors: as the report shows them, in open loop.
     pub fn corrected_by(self, corrected: Corrected, errors: [Vec<Vec<f64>>; 2], closed: bool) -> Outcome {
         let [after, open_after] = errors;
@@ -72,6 +96,17 @@ impl Outcome {
         let every: Vec<&Run> = self.data.runs.iter().collect();
         let fit = figures_of(&self.data, &every, [&open, &errors], closed);
         Outcome { corrected, errors, open, fit, ..self }
+    }
+
+    /// The same with a linear plant for the corrected model: what was found is noise, and laws that were not named do not stay in. The refit, unless
+    /// the given plant simulates the fit records or those that were held out better.
+    pub fn linear(self, given: &Plant, closed: bool) -> Outcome {
+        let better = |f: &FitFigures| f.rms_before < f.rms_refit_linear;
+        let given_stays = better(&self.fit.fit) || self.fit.holdout.as_ref().is_some_and(better);
+        let (plant, model) = if given_stays { (given, 0) } else { (&self.refitted, 1) };
+        let corrected = Corrected { plant: plant.clone(), effects: Vec::new() };
+        let errors = [self.errors[model].clone(), self.open[model].clone()];
+        self.corrected_by(corrected, errors, closed)
     }
 
     /// The diagnosis of a case.

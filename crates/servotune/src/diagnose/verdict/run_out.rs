@@ -10,7 +10,7 @@ use super::judgement::Later;
 use super::localisation::place;
 use super::naming::RUNOUT;
 use super::outcome::Outcome;
-use crate::controller::Law;
+use crate::controller::ControlLaw;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, entry};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
@@ -23,7 +23,7 @@ use crate::diagnose::rules::Answer;
 use crate::numeric::digits::said;
 use crate::numeric::least_squares::Qr;
 use crate::physics::repeatable_runout::{FACTS, RepeatableRunout};
-use crate::physics::{Facts, Setting};
+use crate::physics::{Facts, LawSetting};
 use crate::recording::Role;
 use std::collections::BTreeMap;
 
@@ -80,7 +80,7 @@ impl RunOut {
     }
 
     /// As effects: base orders with their harmonics, the lowest first.
-    fn effects(&self, phasors: &[[f64; 2]]) -> Vec<Setting> {
+    fn effects(&self, phasors: &[[f64; 2]]) -> Vec<LawSetting> {
         let number = |l: &Line| l.order.unwrap_or(0);
         let mut rest: Vec<usize> = (0..self.orders.len()).collect();
         rest.sort_by_key(|&i| number(&self.orders[i]));
@@ -92,13 +92,13 @@ impl RunOut {
                 let own = (1..=FACTS.columns / 2).find(|h| h * number(base) == number(&self.orders[i]));
                 own.inspect(|h| strengths[2 * h - 2..2 * h].copy_from_slice(&phasors[i])).is_none()
             });
-            all.push(Setting::new(RepeatableRunout { base_hz: base.hz }, strengths));
+            all.push(LawSetting::new(RepeatableRunout { base_hz: base.hz }, strengths));
         }
         all
     }
 
     /// What was found in records without it, made an outcome of the records as they are; `helps` is the rule by which it stays.
-    pub fn entered(&self, made: Outcome, recorded: &[Run], closed: Option<&Law>, helps: Answer) -> Outcome {
+    pub fn entered(&self, made: Outcome, recorded: &[Run], closed: Option<&ControlLaw>, helps: Answer) -> Outcome {
         let own = self.effects(&self.phasors);
         let findings = own.iter().enumerate().map(|(i, setting)| self.finding(&made.data, i, setting)).collect();
         let Corrected { mut plant, effects } = made.corrected;
@@ -118,7 +118,7 @@ impl RunOut {
         Outcome { judgement, corrected, fit, errors: shown, open, data, ..made }
     }
 
-    fn finding(&self, data: &DiagnosisData, at: usize, setting: &Setting) -> Finding {
+    fn finding(&self, data: &DiagnosisData, at: usize, setting: &LawSetting) -> Finding {
         let &Facts { name: effect, says, port, .. } = &FACTS;
         let mut signal = data.stack.series(|i| {
             let mut motion = self.motion(&data.means[i], data.scene.sample_time_s);
@@ -160,7 +160,7 @@ fn heard(made: &Outcome) -> Option<DiagnosisData> {
 }
 
 /// The frequencies of a run-out's harmonics, as a person says them.
-fn frequencies(setting: &Setting) -> String {
+fn frequencies(setting: &LawSetting) -> String {
     let base = setting.law.first_number();
     let all = setting.strengths.chunks(2).enumerate().filter(|(_, s)| *s != [0.0; 2]);
     let all: Vec<String> = all.map(|(h, _)| said((h + 1) as f64 * base, 3)).collect();

@@ -20,7 +20,7 @@ const LOG: &str = "log.toml";
 
 /// What lies in a folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Found {
+pub struct FolderContents {
     /// Machine folders, by name.
     pub machines: Vec<PathBuf>,
     /// Entries that are no machine folder, by name.
@@ -28,9 +28,9 @@ pub struct Found {
 }
 
 /// The machine folders in `folder`: those that hold at least one of the three files.
-pub fn machine_folders(folder: &Path) -> Result<Found, FeatureError> {
+pub fn machine_folders(folder: &Path) -> Result<FolderContents, FeatureError> {
     let fail = |source| FeatureError::Folder { folder: folder.into(), source };
-    let mut found = Found::default();
+    let mut found = FolderContents::default();
     for entry in std::fs::read_dir(folder).map_err(fail)? {
         let path = entry.map_err(fail)?.path();
         let holds = |name: &&str| path.join(name).exists();

@@ -21,7 +21,7 @@ mod view;
 
 pub use body::{BodyFit, body_fit};
 pub use error::{FeatureError, Problem, Reason};
-pub use folder::{Found, machine_folders, read_files, read_machine, read_machines};
+pub use folder::{FolderContents, machine_folders, read_files, read_machine, read_machines};
 pub use machine::{LogEntry, PesRecord, RawMachine};
 pub use resonance::{Resonance, resonances};
 pub use row::Row;

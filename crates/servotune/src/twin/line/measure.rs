@@ -7,7 +7,7 @@ use crate::controller::Feedforward;
 use crate::gate::features::{PesRecord, RawMachine};
 use crate::lti::{Body, DiscretePlant};
 use crate::numeric::random::Random;
-use crate::pes::{Noise, Scene};
+use crate::pes::{Noise, WriteScene};
 use crate::twin::plants::{log_grid, measure};
 use crate::twin::{MachineClass, TwinError, paper_machine};
 
@@ -30,7 +30,7 @@ pub(in crate::twin) fn measured(id: String, truth: Truth, random: &mut Random) -
     let write = |noise: Noise, forward: Option<&Feedforward>| -> Result<Vec<f64>, TwinError> {
         let mut profile = profile.clone();
         profile.noise = noise;
-        let scene = Scene::new(&profile, &sampled)?;
+        let scene = WriteScene::new(&profile, &sampled)?;
         let mut work = scene.workspace(&sampled, chain.len());
         scene.run(&sampled, &chain, forward, limit, &mut work);
         let start = profile.first_servo_sample();
