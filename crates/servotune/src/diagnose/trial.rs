@@ -16,11 +16,12 @@ use crate::diagnose::noise::torque_noise::torque_noise;
 use crate::diagnose::rules::{Answer, CLEAN, NAME_YIELDS, asked};
 use crate::diagnose::search::select::select;
 use crate::diagnose::search::select_settings::SelectSettings;
+use crate::diagnose::search::selection::Selection;
 use crate::diagnose::verdict::confirmation::confirm;
 use crate::diagnose::verdict::decision::decide;
 use crate::diagnose::verdict::facts::Facts;
-use crate::diagnose::verdict::finding::Verdict;
-use crate::diagnose::verdict::fit_report::fit_report;
+use crate::diagnose::verdict::finding::{FitReport, Verdict};
+use crate::diagnose::verdict::fit_report::{Errors, fit_report};
 use crate::diagnose::verdict::held_out::{held_out, mean};
 use crate::diagnose::verdict::judgement::{Judgement, Later};
 use crate::diagnose::verdict::log_checks::LogChecks;
@@ -29,11 +30,22 @@ use crate::diagnose::verdict::naming::unexplained;
 use crate::diagnose::verdict::next_experiment::propose;
 use crate::diagnose::verdict::noise_finding::noise_findings;
 use crate::diagnose::verdict::observed_play::{observed_play, open_to_play};
-use crate::diagnose::verdict::offered_models::Reporting;
+use crate::diagnose::verdict::offered_models::{Reported, Reporting};
 use crate::diagnose::verdict::outcome::{Outcome, judged};
 use crate::lti::Plant;
 use crate::numeric::digits::said;
 use crate::physics::library;
+
+/// The remark where a simulation in closed loop is no measure of a law.
+const HUNTS: &str = "figures are of open loop, where this model leaves the noise alone: in closed loop the simulation of a law with a threshold hunts at other times than the machine";
+
+/// What is offered, and how it simulates the records.
+struct Shown {
+    reported: Reported,
+    figures: (FitReport, Errors, Errors),
+    /// Whether the simulated loop hunts, and the figures are of open loop for it.
+    hunts: Answer,
+}
 
 /// What every search of a case has in common.
 #[derive(Clone, Copy)]
@@ -158,6 +170,26 @@ impl Trial<'_> {
         )
     }
 
+    /// The offered models, simulated in closed loop where the records are; in open loop where a law's threshold lets the simulated loop hunt.
+    fn shown(&self, data: &DiagnosisData, selection: &Selection, recorded: &[Run], sound: bool) -> Shown {
+        let shown = |closed| {
+            let reporting = Reporting { data, selection, runs: self.whole, recorded, closed, sound };
+            let reported = reporting.offered(self.given);
+            let figures = fit_report(data, self.given, &reporting, &reported);
+            (reported, figures)
+        };
+        let (reported, figures) = shown(self.closed);
+        let threshold = selection.last().chosen.iter().any(|c| c.effect().is_hard_nonlinearity());
+        let left = Answer::from(threshold) & figures.0.left_in_loop();
+        let open = left.yes.then(|| shown(None));
+        match open {
+            Some((reported, figures)) if figures.0.down_to_noise().yes => {
+                Shown { reported, hunts: left & figures.0.down_to_noise(), figures }
+            }
+            _ => Shown { reported, figures, hunts: false.into() },
+        }
+    }
+
     /// One search and what it comes to.
     fn made(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Outcome, DiagnoseError> {
         // Records whose samples slipped hold nothing that a model could be fitted to.
@@ -179,12 +211,11 @@ impl Trial<'_> {
         let fixed = corrected(&data.form, &last.refitted.p, &last.chosen, &data.scene);
         let refitted = corrected(&data.form, &selection.baseline.refitted.p, &[], &data.scene);
         let recorded = if self.decoupled.recorded.is_empty() { self.whole } else { &self.decoupled.recorded };
-        let reporting =
-            Reporting { data: &data, selection: &selection, runs: self.whole, recorded, closed: self.closed, sound };
-        let reported = reporting.offered(self.given);
-        let (fit, errors, open) = fit_report(&data, self.given, &reporting, &reported);
+        let Shown { reported, figures: (fit, errors, open), hunts } = self.shown(&data, &selection, recorded, sound);
         let torque_says = torque_noise.as_ref().map(|u| u.says(&self.given.command_unit));
-        let before = self.remarks.iter().cloned().chain(torque_says).chain(reported.remarks.iter().cloned());
+        let said =
+            torque_says.into_iter().chain(reported.remarks.iter().cloned()).chain(hunts.yes.then(|| HUNTS.into()));
+        let before = self.remarks.iter().cloned().chain(said);
         let held_out = held_out(&data, &selection, &fixed)?;
         let confirmed = confirm(&data, &selection, &fixed, &held_out, self.settings.select.iterations)?;
         let linear = SimulatedModel { plant: &refitted.plant, effects: Vec::new(), ..fixed.judged(&data, &selection) };
@@ -205,7 +236,8 @@ impl Trial<'_> {
             noise,
             coupled: !self.decoupled.couplings.is_empty(),
         });
-        let judgement = Judgement { remarks: before.chain(judgement.remarks).collect(), ..judgement };
+        let consulted = [judgement.consulted, hunts.consulted].concat();
+        let judgement = Judgement { remarks: before.chain(judgement.remarks).collect(), consulted, ..judgement };
         let next_experiment = propose(&judgement, &data, &selection);
         // Pictures are of the whole records.
         let data = DiagnosisData { runs: self.whole.to_vec(), ..data };
@@ -226,8 +258,7 @@ impl Trial<'_> {
             selection,
         };
         // Laws that have no name do not stay in a model of which nothing but noise is said.
-        let unnamed = !made.judgement.findings.is_empty() || !made.selection.best().chosen.is_empty();
-        let linear = unnamed && self.decoupled.couplings.is_empty() && made.judgement.only(&noises);
+        let linear = self.decoupled.couplings.is_empty() && made.judgement.only(&noises);
         Ok(if linear { made.linear(self.given, self.closed.is_some()) } else { made })
     }
 }

@@ -6,6 +6,7 @@ use crate::controller::ControlLaw;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::{Simulation, floor, rms};
+use crate::diagnose::rules::{Answer, LOOP_HUNTS, LOOP_LEFT, asked};
 use crate::lti::Plant;
 use crate::recording::Role;
 
@@ -37,6 +38,24 @@ pub(in crate::diagnose) fn fit_report(
         None => chosen.clone(),
     };
     (figures_of(data, &every, [&open, &chosen], closed.is_some()), chosen, open)
+}
+
+impl FitReport {
+    /// Error of the records that judge over their noise, under the corrected model.
+    fn times_noise(&self) -> f64 {
+        let f = self.holdout.unwrap_or(self.fit);
+        f.rms_after / f.noise_floor
+    }
+
+    /// Whether the corrected model leaves several times the noise in closed loop.
+    pub(in crate::diagnose) fn left_in_loop(&self) -> Answer {
+        Answer::from(self.simulation == Simulation::ClosedLoop) & asked!(self.times_noise(), > LOOP_LEFT)
+    }
+
+    /// Whether it leaves the noise alone.
+    pub(in crate::diagnose) fn down_to_noise(&self) -> Answer {
+        asked!(self.times_noise(), LOOP_HUNTS: self.times_noise() <= LOOP_HUNTS)
+    }
 }
 
 /// The figures of these errors: given, refit, corrected; in open loop and as the report shows them.
