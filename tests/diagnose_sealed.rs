@@ -37,10 +37,10 @@ fn nothing_is_seen_where_nothing_is_missing_and_what_is_missing_is_named() {
 }
 
 /// Sound machines of the count of false alarms whose given gain is nonsense. The program named laws on such machines, or said that it set out
-/// from a plant with one beside it.
+/// from a plant with one beside it; of the last two no record was repeated.
 #[test]
 fn a_nonsensical_plant_of_a_sound_machine_is_refitted_and_cleared_of_nothing() {
-    let said: Vec<serde_json::Value> = [0, 10, 12]
+    let said: Vec<serde_json::Value> = [0, 10, 12, 55, 215]
         .into_par_iter()
         .map(|place| serde_json::from_str(&false_alarm_line(20_261_129, place).unwrap().unwrap()).unwrap())
         .collect();
@@ -64,4 +64,13 @@ fn a_refit_that_stops_on_its_way_is_begun_again_where_torques_balance() {
         row.findings,
         row.holdout
     );
+}
+
+/// A wind of the tenth published set, whose model carried laws without a name and simulated worse than the given one.
+#[test]
+fn a_wind_leaves_the_better_of_two_linear_models() {
+    let row = sealed_set(20_261_217, 27, 2400)[26].row().unwrap();
+    let told = format!("{} {} {:?}", row.verdict, row.findings, row.holdout);
+    assert_eq!((row.kind.as_str(), row.outcome), ("wind", Outcome::Right), "{told}");
+    assert!(row.holdout[2] <= row.holdout[0].min(row.holdout[1]), "{told}");
 }
