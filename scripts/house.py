@@ -192,9 +192,9 @@ def aims(kept: Path) -> str:
     clock = {what: now[what]["clock"] for what in ("program", "tests")}
     return (
         "## Aims that are missed\n\n"
-        f"- *Installing* takes {clock['program']} s for 160 s, half of what it took before the workspace on a slower machine. The product has grown by half since. "
+        f"- *Installing* takes {clock['program']} s for 160 s, half of the 320 s that were measured before the workspace, on a slower machine. The product has grown by half since. "
         "Without optimisation across the pieces of a crate it would take 152 s, and tuning three times as long (`specs/decisions/crates.md`).\n"
-        f"- *The README's test command* takes {clock['tests']} s for 600 s. Some 300 s build, the longest tests are whole diagnoses.\n"
+        f"- *The README's test command* takes {clock['tests']} s for 600 s. Its longest tests are whole diagnoses.\n"
         "- *Test lines* are fewer than 35 in 100: the table says how many. Diagnoses are mostly tried on drawn sets, which are data and not lines of tests.\n"
     )
 

@@ -69,7 +69,7 @@ pub fn diagnose(
             whole = whole.iter().map(Run::measured).collect();
         }
     }
-    let first = ground.searched(data, whole.clone(), &decoupled, &mut progress)?;
+    let first = ground.searched(data, &whole, &decoupled, &mut progress)?;
     let made = ground.with_run_out(first, whole, &decoupled, &mut progress)?;
     Ok(made.diagnosed(&case.id, &ground.log_checks, &decoupled.couplings))
 }
@@ -119,18 +119,18 @@ impl Ground<'_> {
     fn searched(
         &self,
         data: DiagnosisData,
-        whole: Vec<Run>,
+        whole: &[Run],
         decoupled: &Decoupled,
         progress: &mut dyn FnMut(&str),
     ) -> Result<Outcome, DiagnoseError> {
         let sound = self.log_checks.finding.is_none();
         let start = sound.then(|| cleared(&data, self.settings.select.iterations, progress)).flatten();
         let cut = data.runs.clone();
-        let first = self.begun(start, data, whole.clone(), decoupled, progress)?;
+        let first = self.begun(start, data, whole, decoupled, progress)?;
         let Some((law, beside)) = first.like_a_law() else { return Ok(first) };
         progress(&format!("{AGAIN}, from the plant beside a curve like that of {law}"));
         let second = self.begun(Some(beside), self.data(self.given, cut)?, whole, decoupled, progress)?;
-        let left = second.judged() / second.figures().noise_floor;
+        let left = second.fit.times_noise();
         let holds = Answer::from(second.names(law)) & asked!(left, CURVE_NAMED: left <= CURVE_NAMED);
         Ok(if holds.yes { second.by(holds) } else { first })
     }
@@ -140,7 +140,7 @@ impl Ground<'_> {
         &self,
         start: Option<Cleared>,
         mut data: DiagnosisData,
-        mut whole: Vec<Run>,
+        whole: &[Run],
         decoupled: &Decoupled,
         progress: &mut dyn FnMut(&str),
     ) -> Result<Outcome, DiagnoseError> {
@@ -162,6 +162,7 @@ impl Ground<'_> {
             data.foretold = start.law;
         }
         let (data, shocks) = set_aside(data, self.given, self.case.spindle_hz, iterations)?;
+        let mut whole = whole.to_vec();
         whole.iter_mut().zip(&data.runs).for_each(|(w, r)| w.shocked = r.shocked);
         let trial = Trial {
             given: self.given,
@@ -190,10 +191,12 @@ impl Ground<'_> {
         let clean = found.taken_out_of(&whole, self.sample_time_s);
         let aside = Decoupled { recorded, ..decoupled.clone() };
         let cut = excerpts(&clean, self.sample_time_s).unwrap_or_else(|| clean.clone());
-        let second = self.searched(self.data(self.given, cut)?, clean, &aside, progress)?;
+        let second = self.searched(self.data(self.given, cut)?, &clean, &aside, progress)?;
         // A law with a threshold may hunt in a loop that hears no noise, whatever the run-out: open loop tells it as well.
         let [shown, open] = [Outcome::judged, Outcome::judged_open].map(|left| left(&second) / left(&first));
-        let helps = asked!(shown.min(open), < RUN_OUT_HELPS);
+        // Figures of closed and of open loop do not compare.
+        let ratio = if first.in_loop() == second.in_loop() { shown.min(open) } else { open };
+        let helps = asked!(ratio, < RUN_OUT_HELPS);
         if !helps.yes {
             return Ok(first);
         }

@@ -136,7 +136,7 @@ impl Trial<'_> {
     fn offered(&self, made: Outcome, model: Corrected) -> Outcome {
         let every: Vec<&Run> = made.data.runs.iter().collect();
         let simulated = |closed: Option<&ControlLaw>| errors(&model.alone(&made.data), &every, closed);
-        let shown = simulated(self.closed);
+        let shown = simulated(self.closed_of(&made));
         let (offered, after) = (made.judged(), judged(&made.data, &shown));
         let worse = after.is_nan() || after > offered;
         let remark = worse.then(|| {
@@ -144,7 +144,7 @@ impl Trial<'_> {
         });
         let errors = (!worse).then(|| [shown, simulated(None)]);
         let made = match errors {
-            Some(errors) => made.corrected_by(model, errors, self.closed.is_some()),
+            Some(errors) => made.corrected_by(model, errors),
             None => made,
         };
         let Outcome { judgement, .. } = made;
@@ -152,9 +152,15 @@ impl Trial<'_> {
         Outcome { next_experiment: propose(&judgement, &made.data, &made.selection), judgement, ..made }
     }
 
+    /// The controller, where the figures of what was found are of closed loop.
+    fn closed_of(&self, made: &Outcome) -> Option<&ControlLaw<'_>> {
+        self.closed.filter(|_| made.in_loop())
+    }
+
     /// A curve in the place of the law that has no name, where one is worth it.
     fn curve(&self, made: &Outcome, searched: &DiagnosisData, progress: &mut dyn FnMut(&str)) -> Option<StandIn> {
-        let standing = Standing { closed: self.closed, errors: &made.errors, floor: made.figures().noise_floor };
+        let standing =
+            Standing { closed: self.closed_of(made), errors: &made.errors, floor: made.figures().noise_floor };
         stand_in([searched, &made.data], &made.selection, &standing, progress)
     }
 
@@ -163,11 +169,8 @@ impl Trial<'_> {
         let Outcome { judgement, .. } = made;
         let judgement = found.entered(judgement);
         let next_experiment = propose(&judgement, &made.data, &made.selection);
-        Outcome { judgement, next_experiment, free_form: found.curve, ..made }.corrected_by(
-            found.corrected,
-            found.errors,
-            self.closed.is_some(),
-        )
+        Outcome { judgement, next_experiment, free_form: found.curve, ..made }
+            .corrected_by(found.corrected, found.errors)
     }
 
     /// The offered models, simulated in closed loop where the records are; in open loop where a law's threshold lets the simulated loop hunt.
@@ -181,13 +184,14 @@ impl Trial<'_> {
         let (reported, figures) = shown(self.closed);
         let threshold = selection.last().chosen.iter().any(|c| c.effect().is_hard_nonlinearity());
         let left = Answer::from(threshold) & figures.0.left_in_loop();
-        let open = left.yes.then(|| shown(None));
-        match open {
-            Some((reported, figures)) if figures.0.down_to_noise().yes => {
-                Shown { reported, hunts: left & figures.0.down_to_noise(), figures }
+        if left.yes {
+            let (reported, figures) = shown(None);
+            let hunts = left & figures.0.down_to_noise();
+            if hunts.yes {
+                return Shown { reported, figures, hunts };
             }
-            _ => Shown { reported, figures, hunts: false.into() },
         }
+        Shown { reported, figures, hunts: false.into() }
     }
 
     /// One search and what it comes to.
@@ -259,6 +263,6 @@ impl Trial<'_> {
         };
         // Laws that have no name do not stay in a model of which nothing but noise is said.
         let linear = self.decoupled.couplings.is_empty() && made.judgement.only(&noises);
-        Ok(if linear { made.linear(self.given, self.closed.is_some()) } else { made })
+        Ok(if linear { made.linear(self.given) } else { made })
     }
 }

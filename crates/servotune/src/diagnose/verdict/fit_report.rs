@@ -42,7 +42,7 @@ pub(in crate::diagnose) fn fit_report(
 
 impl FitReport {
     /// Error of the records that judge over their noise, under the corrected model.
-    fn times_noise(&self) -> f64 {
+    pub(in crate::diagnose) fn times_noise(&self) -> f64 {
         let f = self.holdout.unwrap_or(self.fit);
         f.rms_after / f.noise_floor
     }

@@ -12,7 +12,7 @@ use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::Corrected;
 use crate::diagnose::fit::coupling::Coupling;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
-use crate::diagnose::fit::simulation::rms;
+use crate::diagnose::fit::simulation::{Simulation, rms};
 use crate::diagnose::free_form::curve::FreeFormFound;
 use crate::diagnose::rules::{Answer, CURVE_FORETELLS, NAME_FAR, asked};
 use crate::diagnose::search::cleared_plant::Cleared;
@@ -66,6 +66,11 @@ impl Outcome {
             & asked!(f.rms_after / f.noise_floor, NAME_FAR: f.rms_after > NAME_FAR * f.noise_floor)
     }
 
+    /// Whether the figures are of closed loop.
+    pub fn in_loop(&self) -> bool {
+        self.fit.simulation == Simulation::ClosedLoop
+    }
+
     /// Whether this law has a name among what was found.
     pub fn names(&self, law: &str) -> bool {
         let named = matches!(self.judgement.verdict, Verdict::Named | Verdict::Family);
@@ -89,7 +94,8 @@ impl Outcome {
     }
 
     /// The same with another corrected model and its errors: as the report shows them, in open loop.
-    pub fn corrected_by(self, corrected: Corrected, errors: [Vec<Vec<f64>>; 2], closed: bool) -> Outcome {
+    pub fn corrected_by(self, corrected: Corrected, errors: [Vec<Vec<f64>>; 2]) -> Outcome {
+        let closed = self.in_loop();
         let [after, open_after] = errors;
         let ([given, refit, _], [open_given, open_refit, _]) = (self.errors, self.open);
         let (errors, open) = ([given, refit, after], [open_given, open_refit, open_after]);
@@ -100,13 +106,13 @@ impl Outcome {
 
     /// The same with a linear plant for the corrected model: what was found is noise, and laws that were not named do not stay in. The refit, unless
     /// the given plant simulates the fit records or those that were held out better.
-    pub fn linear(self, given: &Plant, closed: bool) -> Outcome {
+    pub fn linear(self, given: &Plant) -> Outcome {
         let better = |f: &FitFigures| f.rms_before < f.rms_refit_linear;
         let given_stays = better(&self.fit.fit) || self.fit.holdout.as_ref().is_some_and(better);
         let (plant, model) = if given_stays { (given, 0) } else { (&self.refitted, 1) };
         let corrected = Corrected { plant: plant.clone(), effects: Vec::new() };
         let errors = [self.errors[model].clone(), self.open[model].clone()];
-        self.corrected_by(corrected, errors, closed)
+        self.corrected_by(corrected, errors)
     }
 
     /// The diagnosis of a case.
