@@ -6,6 +6,7 @@
 mod architecture;
 mod architecture_imports;
 mod command_line;
+mod diagnose_bench;
 mod diagnose_cases;
 mod diagnose_common;
 mod diagnose_coupling;

@@ -97,7 +97,7 @@ enum StudyName {
     SealedDigests,
     /// The diagnosis on a sealed set of other forms
     Sealed,
-    /// Real recordings: EMPS, Silverbox, motor bench, mirror, diagnosed from a linear model
+    /// Real recordings: EMPS, Silverbox, motor bench, pulley drive, linear guide, diagnosed from a linear model; the mirror's response
     Recordings,
     /// The motor bench with flexible coupling, measured
     Motor,
@@ -176,7 +176,7 @@ fn run(a: &StudyArguments, say: &mut (dyn FnMut(&str) + Send)) -> Result<Vec<Pat
             None => study::false_alarms(a.seed, a.count, say)?,
         }),
         StudyName::Mismatch => Pages(study::mismatch(&a.data)?),
-        StudyName::Recordings => Pages(study::recordings(&a.data)?),
+        StudyName::Recordings => Pages(study::recordings(&a.data, say)?),
         StudyName::Motor => Pages(study::motor(&a.data)?),
         StudyName::Hdd => Pages(study::hdd(&a.data)?),
     };

@@ -14,7 +14,8 @@ use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
 use crate::diagnose::fit::shock::set_aside;
 use crate::diagnose::fit::simulation::rms;
-use crate::diagnose::search::cleared_plant::{Cleared, cleared};
+use crate::diagnose::search::cleared_plant::Departure;
+use crate::diagnose::search::clearing::departure;
 use crate::diagnose::verdict::diagnosed::Diagnosed;
 use crate::diagnose::verdict::log_checks::{LogChecks, check};
 use crate::diagnose::verdict::outcome::Outcome;
@@ -124,12 +125,14 @@ impl Ground<'_> {
         progress: &mut dyn FnMut(&str),
     ) -> Result<Outcome, DiagnoseError> {
         let sound = self.log_checks.finding.is_none();
-        let start = sound.then(|| cleared(&data, self.settings.select.iterations, progress)).flatten();
+        let begins =
+            if sound { departure(&data, self.settings.select.iterations, progress) } else { Departure::default() };
         let cut = data.runs.clone();
-        let first = self.begun(start, data, whole, decoupled, progress)?;
+        let first = self.begun(begins, data, whole, decoupled, progress)?;
         let Some((law, beside)) = first.like_a_law() else { return Ok(first) };
         progress(&format!("{AGAIN}, from the plant beside a curve like that of {law}"));
-        let second = self.begun(Some(beside), self.data(self.given, cut)?, whole, decoupled, progress)?;
+        let begins = Departure { from: Some(beside), ..Departure::default() };
+        let second = self.begun(begins, self.data(self.given, cut)?, whole, decoupled, progress)?;
         let left = second.fit.times_noise();
         let holds = Answer::from(second.names(law)) & asked!(left, CURVE_NAMED: left <= CURVE_NAMED);
         Ok(if holds.yes { second.by(holds) } else { first })
@@ -138,28 +141,30 @@ impl Ground<'_> {
     /// The search that sets out from a plant, the given one unless told.
     fn begun(
         &self,
-        start: Option<Cleared>,
+        begins: Departure,
         mut data: DiagnosisData,
         whole: &[Run],
         decoupled: &Decoupled,
         progress: &mut dyn FnMut(&str),
     ) -> Result<Outcome, DiagnoseError> {
         let (iterations, mut remarks) = (self.settings.select.iterations, self.remarks.clone());
-        if let Some(start) = start {
+        let (mut left, mut bends) = (begins.linear, false);
+        if let Some(start) = begins.from {
             remarks.push(start.says().into());
             data = self.data(&start.plant, data.runs)?;
-            if start.bends() {
-                let left = rms(&start.left);
-                if !data.noise_known {
-                    data = data.with_noise(start.left);
-                }
-                // In closed loop it is not the open-loop simulation that is reported.
-                if self.controller.is_none() && data.is_far(left) {
-                    data = data.judged_plainly(left);
-                    remarks.push(PLAIN.into());
-                }
+            (left, bends) = (rms(&start.left), start.bends());
+            if bends && !data.noise_known {
+                data = data.with_noise(start.left);
             }
             data.foretold = start.law;
+        }
+        remarks.extend(begins.remark);
+        // In closed loop it is not the open-loop simulation that is reported.
+        if self.controller.is_none() && bends && data.is_far(left) {
+            data = data.judged_plainly(left);
+            remarks.push(PLAIN.into());
+        } else if self.controller.is_none() {
+            data = data.no_finer_than(left);
         }
         let (data, shocks) = set_aside(data, self.given, self.case.spindle_hz, iterations)?;
         let mut whole = whole.to_vec();
@@ -201,7 +206,9 @@ impl Ground<'_> {
             return Ok(first);
         }
         let found = found.bettered(&second).unwrap_or(found);
-        Ok(found.entered(second, &whole, self.closed(), helps))
+        // Where the law is judged in open loop, so is the run-out beside it.
+        let closed = self.closed().filter(|_| second.in_loop());
+        Ok(found.entered(second, &whole, closed, helps))
     }
 }
 

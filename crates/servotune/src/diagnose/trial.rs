@@ -13,10 +13,11 @@ use crate::diagnose::fit::simulated_model::SimulatedModel;
 use crate::diagnose::fit::simulation::errors;
 use crate::diagnose::free_form::estimation::may_fold;
 use crate::diagnose::noise::torque_noise::torque_noise;
-use crate::diagnose::rules::{Answer, CLEAN, NAME_YIELDS, asked};
+use crate::diagnose::rules::{ALONE_LEFT, Answer, CLEAN, NAME_YIELDS, asked};
 use crate::diagnose::search::select::select;
 use crate::diagnose::search::select_settings::SelectSettings;
 use crate::diagnose::search::selection::Selection;
+use crate::diagnose::search::shortlist::same_drag;
 use crate::diagnose::verdict::confirmation::confirm;
 use crate::diagnose::verdict::decision::decide;
 use crate::diagnose::verdict::facts::Facts;
@@ -34,7 +35,7 @@ use crate::diagnose::verdict::offered_models::{Reported, Reporting};
 use crate::diagnose::verdict::outcome::{Outcome, judged};
 use crate::lti::Plant;
 use crate::numeric::digits::said;
-use crate::physics::library;
+use crate::physics::{Effect, library};
 
 /// The remark where a simulation in closed loop is no measure of a law.
 const HUNTS: &str = "figures are of open loop, where this model leaves the noise alone: in closed loop the simulation of a law with a threshold hunts at other times than the machine";
@@ -72,7 +73,7 @@ impl Trial<'_> {
     /// worth it.
     pub fn best(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Outcome, DiagnoseError> {
         let cut = data.runs.clone();
-        let first = self.made(data, progress)?;
+        let first = self.named_by(data, progress)?;
         if self.log_checks.lossy {
             return Ok(first);
         }
@@ -86,7 +87,7 @@ impl Trial<'_> {
         let searched = DiagnosisData { runs: cut, ..first.data.clone() };
         // A reading that folds turns round like a play; simulated, it leaves nothing.
         let folds = may_fold(&searched);
-        let mut curve = if folds { self.curve(&first, &searched, progress) } else { None };
+        let mut curve = if folds { self.curve(&first, &searched, far.yes, progress) } else { None };
         if let Some(found) = curve.take_if(|found| found.finding.is_some() && !far.yes) {
             return Ok(self.with_curve(first, found));
         }
@@ -104,13 +105,79 @@ impl Trial<'_> {
             return Ok(first);
         }
         if !folds {
-            curve = self.curve(&first, &searched, progress);
+            curve = self.curve(&first, &searched, far.yes, progress);
         }
         Ok(match curve {
             Some(found) if far.yes => self.unless_outdone(first, found, far),
             Some(found) => self.with_curve(first, found),
             None => first,
         })
+    }
+
+    /// The search of all laws, and once more of fewer where its end says so.
+    fn named_by(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Outcome, DiagnoseError> {
+        // Along a position that has lost a part of itself every law is told wrong.
+        let every = if self.log_checks.lossy { &[] } else { library() };
+        let (again, foretold) = (data.clone(), data.foretold.as_ref().map(|l| l.effect().facts().name));
+        let first = self.made(data, every, progress)?;
+        match foretold {
+            Some(law) if first.judgement.verdict == Verdict::LocatedUnexplained => {
+                self.law_alone(first, again, law, progress)
+            }
+            _ => self.without_last(first, again, progress),
+        }
+    }
+
+    /// What was found, or by the law alone that the plant was cleared of, where that has a name then: other laws may come nearer along the recorded motion,
+    /// and simulate nothing.
+    fn law_alone(
+        &self,
+        first: Outcome,
+        data: DiagnosisData,
+        law: &str,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Outcome, DiagnoseError> {
+        progress(&format!("the search again, with {law} alone"));
+        let of_kind = |e: &&'static dyn Effect| e.facts().name == law || same_drag(e.facts().name, law);
+        let kind: Vec<&'static dyn Effect> = library().iter().copied().filter(of_kind).collect();
+        let alone = self.made(data, &kind, progress)?;
+        let left = alone.fit.times_noise();
+        let named = matches!(alone.judgement.verdict, Verdict::Named | Verdict::Family);
+        let holds = Answer::from(named) & asked!(left, ALONE_LEFT: left <= ALONE_LEFT);
+        Ok(if holds.yes { alone.by(holds) } else { first })
+    }
+
+    /// What was found, without the law that was taken last where several in open loop leave several times the noise, and the records that were not used
+    /// are simulated no worse without it.
+    fn without_last(
+        &self,
+        first: Outcome,
+        data: DiagnosisData,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Outcome, DiagnoseError> {
+        let laws = &first.selection.model.chosen;
+        let last = laws.iter().max_by_key(|c| c.step).map(|c| c.setting.facts().name).filter(|_| laws.len() > 1);
+        let (Some(last), Some(_), None) = (last, first.fit.holdout, self.closed) else { return Ok(first) };
+        if !first.named_far_from_noise().yes {
+            return Ok(first);
+        }
+        progress(&format!("the search again, without {last}"));
+        let found: Vec<&'static dyn Effect> =
+            laws.iter().map(|c| c.effect()).filter(|e| e.facts().name != last).collect();
+        let fewer = self.made(data, &found, progress)?;
+        let named = matches!(fewer.judgement.verdict, Verdict::Named | Verdict::Family);
+        let [with, without] = [&first, &fewer].map(Outcome::judged);
+        if !(named && without <= with) {
+            return Ok(first);
+        }
+        let unit = &self.given.position_unit;
+        let remark = format!(
+            "the records that were not used deny {last}: without it they are simulated to {} {unit} rms, with it to {} {unit}",
+            said(without, 3),
+            said(with, 3)
+        );
+        let Outcome { judgement, .. } = fewer;
+        Ok(Outcome { judgement: judgement.said(Some(remark)), ..fewer })
     }
 
     /// What was found with its names, or with a curve in their place that leaves far less of the records that were not used.
@@ -127,7 +194,7 @@ impl Trial<'_> {
             "{} is not named: a model with it leaves {names_leave} times the noise on the records that judge, one with a free curve in its place {curve_leaves} times",
             named.judgement.names()
         );
-        let nameless = unexplained(&named.data, &named.selection, f.explained_share.clamp(0.0, 1.0));
+        let nameless = unexplained(&named.data, &named.selection, Some(f.explained_share.clamp(0.0, 1.0)));
         let judgement = named.judgement.said(Some(remark)).after(Later::Nameless(nameless), by.consulted);
         self.with_curve(Outcome { judgement, ..named }, found)
     }
@@ -158,9 +225,15 @@ impl Trial<'_> {
     }
 
     /// A curve in the place of the law that has no name, where one is worth it.
-    fn curve(&self, made: &Outcome, searched: &DiagnosisData, progress: &mut dyn FnMut(&str)) -> Option<StandIn> {
+    fn curve(
+        &self,
+        made: &Outcome,
+        searched: &DiagnosisData,
+        named: bool,
+        progress: &mut dyn FnMut(&str),
+    ) -> Option<StandIn> {
         let standing =
-            Standing { closed: self.closed_of(made), errors: &made.errors, floor: made.figures().noise_floor };
+            Standing { closed: self.closed_of(made), errors: &made.errors, floor: made.figures().noise_floor, named };
         stand_in([searched, &made.data], &made.selection, &standing, progress)
     }
 
@@ -194,14 +267,17 @@ impl Trial<'_> {
         Shown { reported, figures, hunts: false.into() }
     }
 
-    /// One search and what it comes to.
-    fn made(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Outcome, DiagnoseError> {
+    /// One search of some laws and what it comes to.
+    fn made(
+        &self,
+        data: DiagnosisData,
+        library: &[&'static dyn Effect],
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Outcome, DiagnoseError> {
         // Records whose samples slipped hold nothing that a model could be fitted to.
         // A log that slipped or is in other units is no ground for the long way.
         let sound = self.log_checks.finding.is_none();
         let search_settings = SelectSettings { by_simulation: sound, ..self.settings.select.clone() };
-        // Along a position that has lost a part of itself every law is told wrong.
-        let library = if self.log_checks.lossy { &[] } else { library() };
         let (data, selection) = select(data, library, &search_settings, &mut *progress);
         let selection = if sound { selection.heard_again(&data, search_settings.iterations) } else { selection };
         progress("simulating all records");

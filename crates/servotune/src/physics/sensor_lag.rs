@@ -68,7 +68,7 @@ impl Parametric for SensorLag {
 
     fn grid(scene: &MotionScene) -> Vec<SensorLag> {
         let t = scene.sample_time_s;
-        logarithmic(0.1 * t, 20.0 * t, 14).into_iter().map(|time_constant_s| SensorLag { time_constant_s }).collect()
+        logarithmic(0.1 * t, 100.0 * t, 18).into_iter().map(|time_constant_s| SensorLag { time_constant_s }).collect()
     }
 
     fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {

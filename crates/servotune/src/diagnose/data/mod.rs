@@ -2,6 +2,7 @@
 
 pub(super) mod checks;
 pub(super) mod excerpt;
+pub(super) mod lap;
 pub(super) mod linear_form;
 pub(super) mod log_filter;
 pub(super) mod plant_check;

@@ -1,7 +1,7 @@
 //! A record made ready: what acted on the plant, what it answered, and whose repeat it is.
 
+use super::lap;
 use super::turning_points::{newest, turning_points};
-use crate::diagnose::rules::LAP_DIGITS;
 use crate::numeric::statistics::mean;
 use crate::recording::{Case, Record, Role};
 
@@ -109,21 +109,11 @@ impl Run {
         self.position.len()
     }
 
-    /// The period of what drives the record, where that repeats at least once: of reference and excitation, or of the command
-    /// where nothing else is known.
-    pub fn period(&self) -> Option<usize> {
-        let drives: Vec<&[f64]> = match &self.reference {
-            Some(r) => vec![r, &self.excitation],
-            None => vec![&self.command],
-        };
-        let moving: Vec<(&[f64], f64)> = drives
-            .into_iter()
-            .filter(|x| x.iter().any(|v| *v != x[0]))
-            .map(|x| (x, LAP_DIGITS * x.iter().fold(0.0f64, |m, v| m.max(v.abs()))))
-            .collect();
-        let repeats =
-            |n: usize| moving.iter().all(|(x, close)| x.iter().zip(&x[n..]).all(|(a, b)| (a - b).abs() <= *close));
-        (SHORTEST_LAP..=self.len() / 2).find(|&n| !moving.is_empty() && repeats(n))
+    /// The lap of what drives the record, where that repeats at least once: of reference and excitation, or of the command where nothing else is
+    /// known or these do not repeat.
+    pub fn lap(&self) -> Option<usize> {
+        let known = self.reference.as_ref().map_or(vec![&self.command[..]], |r| vec![r, &self.excitation]);
+        lap::exact(&known).or_else(|| lap::measured(&self.command))
     }
 
     /// Whether there are no samples.
@@ -134,8 +124,6 @@ impl Run {
 
 /// Half the taps of [`Run::measured`]; they solve the four equations of the Taylor series.
 const AHEAD: [f64; 4] = [533.0 / 840.0, -139.0 / 840.0, 29.0 / 840.0, -1.0 / 280.0];
-/// Shortest lap (samples): below it there is no spectrum of noise to speak of.
-const SHORTEST_LAP: usize = 256;
 
 /// Samples at the start over which a command at rest is averaged.
 const AT_REST: usize = 16;

@@ -15,7 +15,7 @@ use crate::diagnose::data::stacked_records::{NuisanceBasis, StackedRecords};
 use crate::diagnose::noise::lines::{Line, take_lines};
 use crate::diagnose::noise::repeats::{in_laps, noise_of, noise_series, values, weigh, without_start};
 use crate::diagnose::noise::whitening::{NoiseLevels, Whitener};
-use crate::diagnose::rules::{FAR_FROM_REPEATS, FAR_FROM_SENSOR, ROUNDING_ALIKE};
+use crate::diagnose::rules::{FAR_FROM_REPEATS, FAR_FROM_SENSOR, NO_FINER, ROUNDING_ALIKE};
 use crate::lti::{Body, LtiError, Plant};
 use crate::numeric::least_squares::Qr;
 use crate::numeric::statistics::rms;
@@ -216,6 +216,20 @@ impl DiagnosisData {
             false => plain > FAR_FROM_SENSOR * self.levels.sensor_rms,
         };
         far && self.is_sprung()
+    }
+
+    /// The sensor's noise taken to be no finer than a small share of what the best model leaves in plain simulation (position_unit): in a band where a
+    /// filter has left the log a millionth of that, an error says nothing of what acts.
+    pub fn no_finer_than(mut self, left: f64) -> DiagnosisData {
+        let least = NO_FINER * left;
+        if self.levels.sensor_rms < least {
+            self.levels.sensor_rms = least;
+            self.whitener = Whitener::new(&self.levels, &self.form.given.body, self.scene.sample_time_s);
+            self.repeats.clear();
+            self.stack.segments.iter_mut().for_each(|s| s.weight = 1.0);
+            self.scene.noise = least;
+        }
+        self
     }
 
     /// Models judged by plain simulation error, every frequency as large as it is, `left` (position_unit) being what the best model leaves: far

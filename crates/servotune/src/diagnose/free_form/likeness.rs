@@ -53,6 +53,8 @@ struct Form {
     value: Vec<f64>,
     /// Whether its sign is part of the law: no friction gives energy, no end of a stroke pulls.
     directed: bool,
+    /// Whether it lies around a place of its own: it has no two sides.
+    local: bool,
 }
 
 /// Places of a kink, as shares of the range.
@@ -70,8 +72,15 @@ fn range(c: &Plain) -> (f64, f64, f64) {
 impl Plain {
     /// A shape at the curve's knots.
     fn form(&self, facts: &'static Facts, words: &str, f: &dyn Fn(f64) -> f64) -> Form {
-        let directed = self.port != CurvePort::SensorOverPosition && facts.name != torque_ripple::FACTS.name;
-        Form { facts, words: words.into(), value: self.knots.at.iter().map(|a| f(*a)).collect(), directed }
+        let either = [torque_ripple::FACTS.name, shock::FACTS.name].contains(&facts.name);
+        let directed = self.port != CurvePort::SensorOverPosition && !either;
+        Form {
+            facts,
+            words: words.into(),
+            value: self.knots.at.iter().map(|a| f(*a)).collect(),
+            directed,
+            local: facts.name == shock::FACTS.name,
+        }
     }
 
     /// A shape of either sign that no law of the library has.
@@ -112,7 +121,10 @@ fn torque_forms(c: &Plain, unit: &str) -> Vec<Form> {
             }
             for place in &c.knots.at {
                 let words = format!("a detent at {} {unit}", said(*place, 3));
-                all.extend(KINKS.map(|s| c.nameless(&words, &|x| (-((x - place) / (s * half)).powi(2)).exp())));
+                all.extend(KINKS.map(|s| {
+                    let detent = c.nameless(&words, &|x| (-((x - place) / (s * half)).powi(2)).exp());
+                    Form { local: true, ..detent }
+                }));
             }
         }
         CurvePort::TorqueOverLoading => {
@@ -238,7 +250,10 @@ pub(in crate::diagnose) fn likeness(c: &Plain, unit: &str) -> Likeness {
     let Some((left, form, shares)) = best else { return Likeness::none() };
     let (beside, left) = match form.words == TWO_GAINS {
         true => (weaker((shares[1] + shares[2]) / (shares[1] - shares[2]), sides(c.port)), left),
-        false => lopsided(c, &form).map_or((None, left), |(text, left)| (Some(text), left)),
+        false => Some(&form)
+            .filter(|f| !f.local)
+            .and_then(|f| lopsided(c, f))
+            .map_or((None, left), |(text, left)| (Some(text), left)),
     };
     let share = if whole > 0.0 { 1.0 - left / whole } else { 0.0 };
     if share < CURVE_LIKE {

@@ -69,7 +69,7 @@ pub(in crate::diagnose) fn in_laps(errors: &[(usize, Vec<f64>)], runs: &[Run]) -
     let mut out = Vec::new();
     for (r, e) in errors {
         let alone = errors.iter().filter(|(o, _)| runs[*o].group == runs[*r].group).count() == 1;
-        match runs[*r].period().filter(|_| alone) {
+        match runs[*r].lap().filter(|_| alone) {
             Some(n) => {
                 let from = if e.len() / n > 2 { n } else { 0 };
                 out.extend(e[from..].chunks_exact(n).map(|lap| (*r, lap.to_vec())));

@@ -38,6 +38,9 @@ rules! {
     CURVE_NAMED: f64 = 2.0, "noise",
         "error on held-out records under a loading curve, or a law found from the plant beside a curve, up to which it is a drag, or that law, by name",
         "as for laws: a name leaves no several times the noise";
+    ALONE_LEFT: f64 = 1.2, "noise",
+        "error on held-out records under the law alone that the plant was cleared of, up to which it is named where the search of all laws found no name",
+        "a friction beside a run-out left 1.01, a friction that acts one way only, which the library lacks, 1.9";
     LOADING_FALLS: f64 = 0.15, "share",
         "deepest fall of a loading curve over its height, below which it is a drag",
         "judgement: a drag takes energy; noise moves single knots";
@@ -97,6 +100,9 @@ rules! {
     CLEARED_DONE: f64 = 1.1, "noise",
         "simulation error with the law over the sensor's noise below which no other law and no curve is tried",
         "nothing leaves less than the noise; what is left to win is a tenth of it";
+    LAG_INSTEAD: f64 = 0.95, "share",
+        "squared simulation error that a lag of the reading takes off the given plant's, over what a linear refit takes, from which a remark says so",
+        "judgement: one number that does nearly all of what several do is the likelier cause";
     LAGS_ALIKE: f64 = 0.1, "share",
         "share of the best lag's gain by which another may fall short",
         "before or behind the arm a lag is the same to the records";

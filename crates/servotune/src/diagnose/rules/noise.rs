@@ -19,6 +19,9 @@ rules! {
     FAR_FROM_SENSOR: f64 = 30.0, "ratio",
         "the same over the sensor's noise, without repeats",
         "without repeats an uneven push counts as noise too";
+    NO_FINER: f64 = 1e-3, "share",
+        "plain simulation error of the cleared plant and its law, without a controller, of which the sensor's noise is at least that",
+        "judgement: a speed that was filtered and summed up has a billionth of its motion at high frequencies";
 
     [Push]
     PUSH_CHANCE: f64 = 1e-9, "probability",
@@ -79,6 +82,9 @@ rules! {
     HUM_SPREAD: f64 = 0.42, "share",
         "relative spread of the amplitude over the records below which a line hums",
         "a narrow band of noise has 0.52 (Rayleigh)";
+    LINE_REST: f64 = 0.1, "ratio",
+        "size of a line over that of one nearer than a record resolves, up to which it is what that one left, and from which both are a band of noise",
+        "judgement: a frequency is found to a thousandth of what a record resolves";
     HUM_COHERENCE: f64 = 0.5, "coherence",
         "coherence of the halves of all records from which a line hums",
         "noise of the band's width has none";

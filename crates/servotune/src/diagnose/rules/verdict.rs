@@ -165,6 +165,9 @@ rules! {
     LOOP_EXPLAINS_HALF: f64 = 0.5, "share",
         "that share",
         "the larger part is more than half";
+    OPEN_SHOWS: f64 = 0.25, "share",
+        "squared open-loop error of held-out records, beyond the noise, that findings must take off what the better linear plant leaves, where they leave several times the noise",
+        "judgement: what does not show in the simulation does not explain it";
     NAME_YIELDS: f64 = 0.25, "share",
         "error that a curve in the place of names leaves over that of the names, below which it takes their place",
         "judgement: a curve of many numbers must be far better than a name";

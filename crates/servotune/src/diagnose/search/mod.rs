@@ -5,6 +5,7 @@ mod bootstrap;
 pub(super) mod bootstrap_chance;
 pub(super) mod candidate;
 pub(super) mod cleared_plant;
+pub(super) mod clearing;
 pub(super) mod curve_balance;
 mod drift_test;
 mod far_from_noise;

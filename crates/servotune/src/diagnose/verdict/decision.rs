@@ -48,7 +48,7 @@ impl Row {
 }
 
 /// All rows. What has no name is given to the wind where the linear refit comes down to its noise.
-const TABLE: [Row; 12] = [
+const TABLE: [Row; 13] = [
     // The log is at fault, and no model explains a log.
     Row::of(|e| e.facts.log_fault().is_some().into(), Verdict::DataFault, |e| list(e.facts.log_fault())),
     // The log's clock explains by one number what all linear numbers do.
@@ -88,6 +88,16 @@ const TABLE: [Row; 12] = [
         remark: |_| {
             Some("no record was repeated: the error that the refit leaves is coloured, and cannot be told from noise of torque".into())
         },
+    },
+    // In open loop what was found hardly changes the simulation, which is several times the noise off: something else acts.
+    Row {
+        holds: |e| {
+            Answer::from(e.names.iter().any(|f| !e.facts.noise.iter().any(|n| n.effect == f.effect)))
+                & e.facts.hardly_shown()
+        },
+        verdict: Verdict::LocatedUnexplained,
+        findings: |e| e.nameless(e.facts.figures().explained_share.clamp(0.0, 1.0)),
+        remark: |e| Some(e.said_left()),
     },
     // What was found may be one of several.
     Row::of(|e| e.open.into(), Verdict::Family, |e| e.names.clone()),
@@ -159,7 +169,8 @@ impl<'a> Evidence<'a> {
 
     /// The finding without a name, of which laws explain a share.
     fn nameless(&self, explained: f64) -> Vec<Finding> {
-        vec![unexplained(self.facts.data, self.facts.selection, explained)]
+        let simulated = self.facts.reported.withdrawn.is_none();
+        vec![unexplained(self.facts.data, self.facts.selection, simulated.then_some(explained))]
     }
 
     fn said_left(&self) -> String {

@@ -8,7 +8,8 @@ use super::offered_models::Reported;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::Simulation;
 use crate::diagnose::rules::{
-    Answer, COLOURED, HELD_OUT_DOWN, LOOP_EXPLAINS, LOOP_EXPLAINS_HALF, LOOP_LEFT, LOOP_LEFT_TWICE, WIND_LEFT, asked,
+    Answer, COLOURED, HELD_OUT_DOWN, LOOP_EXPLAINS, LOOP_EXPLAINS_HALF, LOOP_LEFT, LOOP_LEFT_TWICE, OPEN_SHOWS,
+    WIND_LEFT, asked,
 };
 use crate::diagnose::search::selection::Selection;
 use crate::lti::Plant;
@@ -80,6 +81,19 @@ impl Facts<'_> {
         Answer::from(self.fit.simulation == Simulation::ClosedLoop)
             & asked!(times, LOOP_LEFT_TWICE: f.rms_after > LOOP_LEFT_TWICE * f.noise_floor)
             & asked!(f.explained_share, < LOOP_EXPLAINS_HALF)
+    }
+
+    /// Whether figures of records in open loop leave several times the noise, and hardly less than the better linear plant does. A free body drifts:
+    /// its noise is what repeats or laps differ by, and where there are none nothing tells.
+    pub(super) fn hardly_shown(&self) -> Answer {
+        let (f, repeats) = (self.figures(), self.data.repeats_rms);
+        let noise = if self.data.is_sprung() { f.noise_floor } else { f.noise_floor.max(repeats) };
+        let tells = self.data.is_sprung() || repeats.is_finite();
+        let room = |rms: f64| (rms * rms - noise * noise).max(0.0);
+        let taken = 1.0 - room(f.rms_after) / room(f.rms_before.min(f.rms_refit_linear)).max(f64::MIN_POSITIVE);
+        Answer::from(self.fit.simulation == Simulation::OpenLoop && tells && self.data.levels.from_repeats)
+            & asked!(f.rms_after / noise, LOOP_LEFT: f.rms_after > LOOP_LEFT * noise)
+            & asked!(taken, < OPEN_SHOWS)
     }
 
     /// Whether torque without a pattern acts, and the linear refit comes near what repeats differ by: a plant that was fitted under wind differs

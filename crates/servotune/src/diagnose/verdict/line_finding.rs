@@ -4,10 +4,11 @@ use super::finding::{Estimate, Finding, Where};
 use super::naming::{HUM, RUNOUT, everywhere, text_of};
 use crate::diagnose::data::linear_form::{Sampled, starts};
 use crate::diagnose::data::run::Run;
+use crate::diagnose::data::stacked_records::Segment;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::noise::lines::Line;
 use crate::diagnose::noise::lines::mains;
-use crate::diagnose::rules::{HUM_COHERENCE, HUM_FADES, HUM_PERIODS, HUM_SPREAD};
+use crate::diagnose::rules::{HUM_COHERENCE, HUM_FADES, HUM_PERIODS, HUM_SPREAD, LINE_REST};
 use crate::diagnose::search::selection::Selection;
 use crate::lti::FrequencyResponse;
 use crate::physics::unexplained;
@@ -101,7 +102,27 @@ fn frequency(data: &DiagnosisData, line: &Line) -> Estimate {
 pub(super) fn line_findings(data: &DiagnosisData, selection: &Selection) -> (Vec<Finding>, Vec<f64>) {
     let errors = if data.lines.is_empty() { Vec::new() } else { left(data, selection) };
     let all: Vec<(&Line, Phasors)> = data.lines.iter().map(|l| (l, Phasors::of(data, &errors, l))).collect();
-    let (hums, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|(_, p)| p.steady());
+    let sizes: Vec<(f64, f64)> = all.iter().map(|(l, p)| (l.hz, p.amplitudes().iter().sum::<f64>())).collect();
+    let width = 1.0 / data.scene.duration_s.max(data.scene.sample_time_s);
+    // What a line nearer than the records resolve has over a line's own size.
+    let beside = |(l, p): &(&Line, Phasors)| {
+        let own: f64 = p.amplitudes().iter().sum();
+        let others = sizes.iter().filter(|(hz, _)| *hz != l.hz && (hz - l.hz).abs() < width);
+        others.map(|(_, size)| size / own).fold(0.0, f64::max)
+    };
+    // A much stronger one left it.
+    let (seen, beside): (Vec<_>, Vec<f64>) = all
+        .into_iter()
+        .map(|line| (beside(&line), line))
+        .filter(|(b, _)| b * LINE_REST < 1.0)
+        .map(|(b, line)| (line, b))
+        .unzip();
+    let laps = laps_hz(data, &seen);
+    // At a multiple of the drive's own lap it is what the model lacks.
+    let driven = |hz: f64| laps.iter().any(|f| (hz - (hz / f).round() * f).abs() < LINE_REST * width);
+    let hums = |(l, p): &(&Line, Phasors), beside: f64| p.steady() && beside < LINE_REST && !driven(l.hz);
+    let (hums, others): (Vec<_>, Vec<_>) = seen.into_iter().zip(beside).partition(|(line, beside)| hums(line, *beside));
+    let [hums, others] = [hums, others].map(|part| part.into_iter().map(|(line, _)| line).collect::<Vec<_>>());
     let runs: Vec<&Run> = data.fit_runs.iter().map(|&r| &data.runs[r]).collect();
     let given = &data.form.given;
     let make = |effect: &str, family: &[&str], lines: &[&Line], parameters: BTreeMap<String, Estimate>| {
@@ -158,6 +179,13 @@ pub(super) fn line_findings(data: &DiagnosisData, selection: &Selection) -> (Vec
         out.push(make(HUM, family, &[l], parameters));
     }
     (out, others.iter().map(|(l, _)| l.hz).collect())
+}
+
+/// Frequencies of the laps (Hz) of records that were not repeated, where there are lines to compare.
+fn laps_hz(data: &DiagnosisData, lines: &[(&Line, Phasors)]) -> Vec<f64> {
+    let alone = data.stack.segments.iter().filter(|s| s.runs.len() == 1 && !lines.is_empty());
+    let lap = |s: &Segment| data.runs[s.runs[0]].lap();
+    alone.filter_map(lap).map(|n| 1.0 / (n as f64 * data.scene.sample_time_s)).collect()
 }
 
 /// Whether two findings are of one hum: their frequencies lie within their intervals of each other.

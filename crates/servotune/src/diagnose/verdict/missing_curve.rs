@@ -49,6 +49,8 @@ pub(in crate::diagnose) struct Standing<'a> {
     pub errors: &'a [Vec<Vec<f64>>; 3],
     /// What of the records counts as noise (rms).
     pub floor: f64,
+    /// Whether names stand, which only a far better curve outdoes: none is then sought on short pieces.
+    pub named: bool,
 }
 
 /// Looks for a curve and takes it where it is worth it: on whole records, then in the loop that they were recorded in, then on short pieces of
@@ -72,8 +74,9 @@ pub(in crate::diagnose) fn stand_in(
             on(&ground.in_loop(standing.closed?), None, progress)
         })
         .or_else(|| {
+            let pieces = ground.in_short_pieces(data.scene.sample_time_s).filter(|_| !standing.named)?;
             progress("a curve without a name, on short pieces of the records");
-            on(&ground.in_short_pieces(data.scene.sample_time_s)?, None, progress)
+            on(&pieces, None, progress)
         })
 }
 

@@ -237,20 +237,21 @@ fn scaled(law: &AnyLaw, place: usize, by: f64) -> AnyLaw {
     law.number(place).map_or_else(|| law.clone(), |n| law.with_number(place, n * by))
 }
 
-/// There, but no effect of the library explains it.
-pub(in crate::diagnose) fn unexplained(data: &DiagnosisData, selection: &Selection, explained: f64) -> Finding {
+/// There, but no effect of the library explains it; the nearest of them explain a share, or none in simulation.
+pub(in crate::diagnose) fn unexplained(data: &DiagnosisData, selection: &Selection, explained: Option<f64>) -> Finding {
     let (fit, model) = (data.fit(vec![]), &selection.baseline);
     let (error, _) = fit.screen_basis(&model.refitted.p);
     let place = place(data, &data.stack, &error);
     let laws: Vec<&str> = selection.best().chosen.iter().map(|c| c.setting.facts().name).collect();
-    let nearest = match laws[..] {
-        [] => "none of its laws explains enough of it".to_owned(),
-        [one] => format!("its nearest law, {one}, leaves {} % of the error in excess of noise", percent(explained)),
-        _ => format!(
-            "its nearest laws, {}, leave {} % of the error in excess of noise",
-            laws.join(" and "),
-            percent(explained)
-        ),
+    let (which, leave, explain) = match laws.len() {
+        1 => ("its nearest law", "leaves", "explains it along the recorded motion alone: simulated, it does not"),
+        _ => ("its nearest laws", "leave", "explain it along the recorded motion alone: simulated, they do not"),
+    };
+    let names = laws.join(" and ");
+    let nearest = match explained {
+        _ if laws.is_empty() => "none of its laws explains enough of it".to_owned(),
+        Some(share) => format!("{which}, {names}, {leave} {} % of the error in excess of noise", percent(share)),
+        None => format!("{which}, {names}, {explain}"),
     };
     let band = place.frequency_hz.first().copied().unwrap_or([0.0, 0.0]);
     Finding {
