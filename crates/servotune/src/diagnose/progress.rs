@@ -1,11 +1,12 @@
 //! How far a diagnosis is: the step, its share of the work and the time left.
 //!
-//! Shares are those of a case with one finding; further findings and further searches take longer, and the time left says so as it goes.
+//! Shares are those of a case with one finding; further findings take longer, and the time left says so as it goes. A further search, and one for a
+//! curve, have shares and time of their own.
 
 use std::time::Instant;
 
 /// How steps begin, and the share of the work that is done when they do.
-const STEPS: [(&str, f64); 9] = [
+const STEPS: [(&str, f64); 19] = [
     ("checking the logs", 0.0),
     ("is the command held", 0.02),
     ("refit of the linear", 0.05),
@@ -15,10 +16,21 @@ const STEPS: [(&str, f64); 9] = [
     ("rivals of", 0.6),
     ("fit by simulation", 0.7),
     ("simulating all", 0.9),
+    (CURVE, 0.0),
+    ("a curve without a name: torque over position and", 0.95),
+    ("a curve without a name: torque over position", 0.03),
+    ("a curve without a name: torque over velocity", 0.08),
+    ("a curve without a name: torque over loading", 0.15),
+    ("a curve without a name: torque over time", 0.25),
+    ("a curve without a name: amplifier", 0.35),
+    ("a curve without a name: gain over position", 0.4),
+    ("a curve without a name: gain over time", 0.45),
+    ("a curve without a name: sensor", 0.5),
 ];
 
-/// How a search begins that is made once more.
+/// How a search begins that is made once more, and how one for a curve does.
 pub(super) const AGAIN: &str = "the search again";
+const CURVE: &str = "a curve without a name: the linear plant";
 
 /// The clock of a diagnosis.
 pub(super) struct Pace {
@@ -33,9 +45,9 @@ impl Pace {
 
     /// The step with its share and the time left; no time before a tenth is done.
     ///
-    /// A search that is made again begins anew.
+    /// A search that is made again, and one for a curve, begin anew.
     pub fn says(&mut self, step: &str) -> String {
-        if step.starts_with(AGAIN) {
+        if step.starts_with(AGAIN) || step.starts_with(CURVE) {
             *self = Pace::new();
         }
         let own = STEPS.iter().find(|(begins, _)| step.starts_with(begins)).map_or(self.share, |s| s.1);
@@ -63,5 +75,10 @@ mod tests {
         assert!(pace.says("scan of 25 effects for finding 2").contains("(60 %"));
         assert_eq!(pace.says("the search again, without a run-out"), "the search again, without a run-out");
         assert!(pace.says("scan of 25 effects for finding 1").contains("(15 %"));
+        assert_eq!(
+            pace.says("a curve without a name: the linear plant by simulation"),
+            super::CURVE.to_owned() + " by simulation"
+        );
+        assert!(pace.says("a curve without a name: torque over position and velocity").contains("(95 %"));
     }
 }
