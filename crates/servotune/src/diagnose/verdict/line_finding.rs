@@ -97,11 +97,12 @@ fn frequency(data: &DiagnosisData, line: &Line) -> Estimate {
     Estimate { value: line.hz, low: line.hz - off, high: line.hz + off, unit: "Hz".into() }
 }
 
-/// One finding for all orders of the spindle, one for each other line; and the frequencies (Hz) of those that are none, but narrow
-/// bands of noise or something that rings.
-pub(super) fn line_findings(data: &DiagnosisData, selection: &Selection) -> (Vec<Finding>, Vec<f64>) {
-    let errors = if data.lines.is_empty() { Vec::new() } else { left(data, selection) };
-    let all: Vec<(&Line, Phasors)> = data.lines.iter().map(|l| (l, Phasors::of(data, &errors, l))).collect();
+/// A line and how it shows in every run.
+type Heard<'a> = (&'a Line, Phasors);
+
+/// Lines that hum, and those that do not: narrow bands of noise, what rings, and what the model lacks at a multiple of the drive's own lap. A line that
+/// a far stronger one left goes.
+fn told_apart<'a>(data: &DiagnosisData, all: Vec<Heard<'a>>) -> [Vec<Heard<'a>>; 2] {
     let sizes: Vec<(f64, f64)> = all.iter().map(|(l, p)| (l.hz, p.amplitudes().iter().sum::<f64>())).collect();
     let width = 1.0 / data.scene.duration_s.max(data.scene.sample_time_s);
     // What a line nearer than the records resolve has over a line's own size.
@@ -122,7 +123,15 @@ pub(super) fn line_findings(data: &DiagnosisData, selection: &Selection) -> (Vec
     let driven = |hz: f64| laps.iter().any(|f| (hz - (hz / f).round() * f).abs() < LINE_REST * width);
     let hums = |(l, p): &(&Line, Phasors), beside: f64| p.steady() && beside < LINE_REST && !driven(l.hz);
     let (hums, others): (Vec<_>, Vec<_>) = seen.into_iter().zip(beside).partition(|(line, beside)| hums(line, *beside));
-    let [hums, others] = [hums, others].map(|part| part.into_iter().map(|(line, _)| line).collect::<Vec<_>>());
+    [hums, others].map(|part| part.into_iter().map(|(line, _)| line).collect())
+}
+
+/// One finding for all orders of the spindle, one for each other line; and the frequencies (Hz) of those that are none, but narrow
+/// bands of noise or something that rings.
+pub(super) fn line_findings(data: &DiagnosisData, selection: &Selection) -> (Vec<Finding>, Vec<f64>) {
+    let errors = if data.lines.is_empty() { Vec::new() } else { left(data, selection) };
+    let all: Vec<(&Line, Phasors)> = data.lines.iter().map(|l| (l, Phasors::of(data, &errors, l))).collect();
+    let [hums, others] = told_apart(data, all);
     let runs: Vec<&Run> = data.fit_runs.iter().map(|&r| &data.runs[r]).collect();
     let given = &data.form.given;
     let make = |effect: &str, family: &[&str], lines: &[&Line], parameters: BTreeMap<String, Estimate>| {
