@@ -2,12 +2,12 @@
 //! shared with the program.
 #![allow(clippy::unwrap_used)]
 
-use servotune::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
+use super::diagnose_common::{diagnosed_with, record};
+use servotune::diagnose::Diagnosis;
 use servotune::lti::{Body, Plant};
 use servotune::numeric::random::Random;
-use servotune::recording::{Case, Record, RecordEntry, Role};
+use servotune::recording::{Record, RecordEntry, Role};
 use std::f64::consts::TAU;
-use std::path::PathBuf;
 
 /// Sample time (s), samples of a lap, steps of the integrator a sample, noise of the reading (mm rms), of the measured command over its size.
 const T: f64 = 4e-4;
@@ -76,33 +76,12 @@ fn bench(lag_s: f64) -> (Diagnosis, f64) {
         let noise: Vec<f64> = u.iter().map(|_| NOISE * r.normal()).collect();
         errs.extend(read(&wrong, lag_s).iter().zip(&noise).map(|(a, b)| a - b));
         let position = read(&u, lag_s).iter().zip(&noise).map(|(y, e)| y + e).collect();
-        let file = PathBuf::from(name);
-        let record = Record {
-            file: file.clone(),
-            sample_time_s: T,
-            gaps: vec![],
-            reference: None,
-            excitation: vec![0.0; u.len()],
-            command: u.iter().zip(&wrong).map(|(u, e)| u + e).collect(),
-            position,
-            pes: None,
-            spindle_rad: None,
-            temperature_c: None,
-            further: vec![],
-        };
-        (RecordEntry { file, role, repeat_group: None }, record)
+        let command: Vec<f64> = u.iter().zip(&wrong).map(|(u, e)| u + e).collect();
+        let (entry, logged) = record(name, role, "", &command, position);
+        (RecordEntry { repeat_group: None, ..entry }, Record { sample_time_s: T, ..logged })
     };
     let records = vec![part("laps.csv", Role::Fit, 8), part("held.csv", Role::Holdout, 4)];
-    let case = Case {
-        id: "bench".into(),
-        plant: PathBuf::new(),
-        controller: None,
-        spindle_hz: None,
-        further_inputs: vec![],
-        records,
-    };
-    let made = diagnose(&case, &plant(), None, &DiagnoseSettings::default(), |_| {}).unwrap();
-    (made.diagnosis, rms(&errs))
+    (diagnosed_with(&plant(), records), rms(&errs))
 }
 
 #[test]

@@ -105,7 +105,7 @@ pub fn record(name: &str, role: Role, group: &str, command: &[f64], position: Ve
         sample_time_s: T,
         gaps: vec![],
         reference: None,
-        excitation: vec![0.0; N],
+        excitation: vec![0.0; command.len()],
         command: command.to_vec(),
         position,
         pes: None,

@@ -5,7 +5,7 @@
 
 use std::time::Instant;
 
-/// How steps begin, and the share of the work that is done when they do.
+/// How steps begin, the longer of two before the shorter, and the share of the work that is done when they do.
 const STEPS: [(&str, f64); 19] = [
     ("checking the logs", 0.0),
     ("is the command held", 0.02),

@@ -118,13 +118,14 @@ impl Trial<'_> {
     fn named_by(&self, data: DiagnosisData, progress: &mut dyn FnMut(&str)) -> Result<Outcome, DiagnoseError> {
         // Along a position that has lost a part of itself every law is told wrong.
         let every = if self.log_checks.lossy { &[] } else { library() };
-        let (again, foretold) = (data.clone(), data.foretold.as_ref().map(|l| l.effect().facts().name));
+        let foretold = data.foretold.as_ref().map(|l| l.effect().facts().name);
+        let again = (foretold.is_some() || self.closed.is_none()).then(|| data.clone());
         let first = self.made(data, every, progress)?;
-        match foretold {
-            Some(law) if first.judgement.verdict == Verdict::LocatedUnexplained => {
-                self.law_alone(first, again, law, progress)
-            }
-            _ => self.without_last(first, again, progress),
+        let nameless = first.judgement.verdict == Verdict::LocatedUnexplained;
+        match (again, foretold) {
+            (Some(data), Some(law)) if nameless => self.law_alone(first, data, law, progress),
+            (Some(data), _) => self.without_last(first, data, progress),
+            (None, _) => Ok(first),
         }
     }
 
@@ -142,8 +143,7 @@ impl Trial<'_> {
         let kind: Vec<&'static dyn Effect> = library().iter().copied().filter(of_kind).collect();
         let alone = self.made(data, &kind, progress)?;
         let left = alone.fit.times_noise();
-        let named = matches!(alone.judgement.verdict, Verdict::Named | Verdict::Family);
-        let holds = Answer::from(named) & asked!(left, ALONE_LEFT: left <= ALONE_LEFT);
+        let holds = Answer::from(alone.judgement.has_name()) & asked!(left, ALONE_LEFT: left <= ALONE_LEFT);
         Ok(if holds.yes { alone.by(holds) } else { first })
     }
 
@@ -158,16 +158,16 @@ impl Trial<'_> {
         let laws = &first.selection.model.chosen;
         let last = laws.iter().max_by_key(|c| c.step).map(|c| c.setting.facts().name).filter(|_| laws.len() > 1);
         let (Some(last), Some(_), None) = (last, first.fit.holdout, self.closed) else { return Ok(first) };
-        if !first.named_far_from_noise().yes {
+        let far = first.named_far_from_noise();
+        if !far.yes {
             return Ok(first);
         }
         progress(&format!("the search again, without {last}"));
-        let found: Vec<&'static dyn Effect> =
-            laws.iter().map(|c| c.effect()).filter(|e| e.facts().name != last).collect();
+        let stays = |name: &str| name != last && laws.iter().any(|c| c.setting.facts().name == name);
+        let found: Vec<&'static dyn Effect> = library().iter().copied().filter(|e| stays(e.facts().name)).collect();
         let fewer = self.made(data, &found, progress)?;
-        let named = matches!(fewer.judgement.verdict, Verdict::Named | Verdict::Family);
         let [with, without] = [&first, &fewer].map(Outcome::judged);
-        if !(named && without <= with) {
+        if !(fewer.judgement.has_name() && without <= with) {
             return Ok(first);
         }
         let unit = &self.given.position_unit;
@@ -177,7 +177,7 @@ impl Trial<'_> {
             said(with, 3)
         );
         let Outcome { judgement, .. } = fewer;
-        Ok(Outcome { judgement: judgement.said(Some(remark)), ..fewer })
+        Ok(Outcome { judgement: judgement.said(Some(remark)), ..fewer }.by(far))
     }
 
     /// What was found with its names, or with a curve in their place that leaves far less of the records that were not used.

@@ -8,8 +8,8 @@ use super::offered_models::Reported;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulation::Simulation;
 use crate::diagnose::rules::{
-    Answer, COLOURED, HELD_OUT_DOWN, LOOP_EXPLAINS, LOOP_EXPLAINS_HALF, LOOP_LEFT, LOOP_LEFT_TWICE, OPEN_SHOWS,
-    WIND_LEFT, asked,
+    Answer, COLOURED, HELD_OUT_DOWN, LOOP_EXPLAINS, LOOP_EXPLAINS_HALF, LOOP_LEFT, LOOP_LEFT_TWICE, NAME_FAR,
+    OPEN_SHOWS, WIND_LEFT, asked,
 };
 use crate::diagnose::search::selection::Selection;
 use crate::lti::Plant;
@@ -88,11 +88,10 @@ impl Facts<'_> {
     pub(super) fn hardly_shown(&self) -> Answer {
         let (f, repeats) = (self.figures(), self.data.repeats_rms);
         let noise = if self.data.is_sprung() { f.noise_floor } else { f.noise_floor.max(repeats) };
-        let tells = self.data.is_sprung() || repeats.is_finite();
         let room = |rms: f64| (rms * rms - noise * noise).max(0.0);
         let taken = 1.0 - room(f.rms_after) / room(f.rms_before.min(f.rms_refit_linear)).max(f64::MIN_POSITIVE);
-        Answer::from(self.fit.simulation == Simulation::OpenLoop && tells && self.data.levels.from_repeats)
-            & asked!(f.rms_after / noise, LOOP_LEFT: f.rms_after > LOOP_LEFT * noise)
+        Answer::from(self.fit.simulation == Simulation::OpenLoop && self.data.levels.from_repeats)
+            & asked!(f.rms_after / noise, NAME_FAR: f.rms_after > NAME_FAR * noise)
             & asked!(taken, < OPEN_SHOWS)
     }
 

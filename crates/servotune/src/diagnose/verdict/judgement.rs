@@ -45,6 +45,11 @@ impl Judgement {
         Judgement { remarks, ..self }
     }
 
+    /// Whether what was found has a name, or one of several.
+    pub fn has_name(&self) -> bool {
+        matches!(self.verdict, Verdict::Named | Verdict::Family)
+    }
+
     /// Whether it says that nothing is missing but these.
     pub fn only(&self, names: &[String]) -> bool {
         let says = matches!(self.verdict, Verdict::Named | Verdict::NoMismatch);

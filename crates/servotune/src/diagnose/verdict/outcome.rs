@@ -61,8 +61,7 @@ impl Outcome {
     /// Whether names stand that leave several times what repeats differ by.
     pub fn named_far_from_noise(&self) -> Answer {
         let f = self.figures();
-        let named = matches!(self.judgement.verdict, Verdict::Named | Verdict::Family);
-        Answer::from(named && self.data.levels.from_repeats)
+        Answer::from(self.judgement.has_name() && self.data.levels.from_repeats)
             & asked!(f.rms_after / f.noise_floor, NAME_FAR: f.rms_after > NAME_FAR * f.noise_floor)
     }
 
@@ -73,8 +72,7 @@ impl Outcome {
 
     /// Whether this law has a name among what was found.
     pub fn names(&self, law: &str) -> bool {
-        let named = matches!(self.judgement.verdict, Verdict::Named | Verdict::Family);
-        named && self.judgement.findings.iter().any(|f| f.effect == law)
+        self.judgement.has_name() && self.judgement.findings.iter().any(|f| f.effect == law)
     }
 
     /// The same with the rules that led to it.
