@@ -17,11 +17,14 @@ pub struct AmplifierLag {
     pub time_constant_s: f64,
 }
 
-/// The keys of a first-order lag, of the reading too.
-pub(super) const TIME_CONSTANT_S: Key = Key::new("time_constant_s", Unit::Second, "time constant")
-    .unless(&["bandwidth_hz"])
-    .positive()
-    .scan(ScanEnd::At(0.1, Measure::Sample), ScanEnd::At(20.0, Measure::Sample));
+/// The keys of a first-order lag, of the reading too; its time constant is searched up to so many samples.
+pub(super) const fn time_constant_s(longest: f64) -> Key {
+    Key::new("time_constant_s", Unit::Second, "time constant")
+        .unless(&["bandwidth_hz"])
+        .positive()
+        .scan(ScanEnd::At(0.1, Measure::Sample), ScanEnd::At(longest, Measure::Sample))
+}
+const TIME_CONSTANT_S: Key = time_constant_s(20.0);
 pub(super) const BANDWIDTH_HZ: Key = Key::new("bandwidth_hz", Unit::Hertz, "1/(2 pi time_constant_s)")
     .unless(&["time_constant_s"])
     .positive()

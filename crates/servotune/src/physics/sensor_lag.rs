@@ -2,8 +2,9 @@
 //!
 //! tau y' = x - y; over an interval where x runs straight with slope s: y = x - s tau + (y0 - x0 + s tau) exp(-t/tau).
 
-use super::amplifier_lag::{BANDWIDTH_HZ, TIME_CONSTANT_S};
+use super::amplifier_lag::{BANDWIDTH_HZ, time_constant_s};
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port};
+use super::key::Key;
 use super::parameter::Parameter;
 use super::sample::{MotionScene, Sample, logarithmic};
 use super::share::Share;
@@ -16,6 +17,9 @@ pub struct SensorLag {
     /// Time constant (s), above 0.
     pub time_constant_s: f64,
 }
+
+/// Longer than an amplifier's: the drive of a bench may filter the speed that it logs at a few hertz.
+const TIME_CONSTANT_S: Key = time_constant_s(100.0);
 
 /// What is known beforehand.
 pub static FACTS: Facts = Facts {
