@@ -24,10 +24,9 @@ use crate::diagnose::verdict::facts::Facts;
 use crate::diagnose::verdict::finding::{FitReport, Verdict};
 use crate::diagnose::verdict::fit_report::{Errors, fit_report};
 use crate::diagnose::verdict::held_out::{held_out, mean};
-use crate::diagnose::verdict::judgement::{Judgement, Later};
+use crate::diagnose::verdict::judgement::Judgement;
 use crate::diagnose::verdict::log_checks::LogChecks;
 use crate::diagnose::verdict::missing_curve::{StandIn, Standing, stand_in};
-use crate::diagnose::verdict::naming::unexplained;
 use crate::diagnose::verdict::next_experiment::propose;
 use crate::diagnose::verdict::noise_finding::noise_findings;
 use crate::diagnose::verdict::observed_play::{observed_play, open_to_play};
@@ -144,7 +143,11 @@ impl Trial<'_> {
         let alone = self.made(data, &kind, progress)?;
         let left = alone.fit.times_noise();
         let holds = Answer::from(alone.judgement.has_name()) & asked!(left, ALONE_LEFT: left <= ALONE_LEFT);
-        Ok(if holds.yes { alone.by(holds) } else { first })
+        if holds.yes {
+            return Ok(alone.by(holds));
+        }
+        // Without a name too the law that simulates more is the nearest.
+        Ok(if left < first.fit.times_noise() { alone.nameless(holds) } else { first })
     }
 
     /// What was found, without the law that was taken last where several in open loop leave several times the noise, and the records that were not used
@@ -194,9 +197,8 @@ impl Trial<'_> {
             "{} is not named: a model with it leaves {names_leave} times the noise on the records that judge, one with a free curve in its place {curve_leaves} times",
             named.judgement.names()
         );
-        let nameless = unexplained(&named.data, &named.selection, Some(f.explained_share.clamp(0.0, 1.0)));
-        let judgement = named.judgement.said(Some(remark)).after(Later::Nameless(nameless), by.consulted);
-        self.with_curve(Outcome { judgement, ..named }, found)
+        let judgement = named.judgement.said(Some(remark));
+        self.with_curve(Outcome { judgement, ..named }.nameless(by), found)
     }
 
     /// What was found, with another model where that simulates the records that judge no worse than the one that is offered.

@@ -95,8 +95,8 @@ pub static FACTS: Facts = Facts {
 const CREEP: [f64; 2] = [1e-3, 0.3];
 
 /// Speeds (over the highest) and sizes of a rise within which a fuller form is fitted.
-const RISES_WITHIN: [f64; 2] = [1e-3, 0.5];
-const RISES: [f64; 2] = [0.01, 3.0];
+const RISES_WITHIN: [f64; 2] = [3e-4, 0.5];
+const RISES: [f64; 2] = [0.005, 3.0];
 
 /// Lengths to a doubling.
 const OCTAVE: f64 = 1.34;
@@ -242,23 +242,27 @@ impl Parametric for CoulombFriction {
         all
     }
 
-    /// With Stribeck's rise, with damped bristles; one after the other makes both.
+    /// A film as bristles; these with Stribeck's rise, with damping. One after the other makes all.
     fn fuller(&self, scene: &MotionScene) -> Vec<(CoulombFriction, Vec<[f64; 2]>)> {
+        let of = |range: [f64; 2], by: f64| range.map(|v| by * v);
+        let [short, long] = lengths(scene);
+        let ranges = vec![[short, long], of(RISES_WITHIN, scene.speed), RISES, of(BRISTLE_TIMES, scene.sample_time_s)];
+        let mut all: Vec<CoulombFriction> = Vec::new();
         if matches!(self.turning, Turning::Creep { .. }) {
-            return Vec::new();
+            all.extend(logarithmic(short, long, 3).into_iter().map(|length| CoulombFriction::sticking(length, None)));
+            return all.into_iter().map(|law| (law, ranges.clone())).collect();
         }
+        // From a small rise: it grows where the records have one, and a large one at once would hold the arm.
         let rising = |share: f64| {
-            let stribeck = Some(Stribeck { speed: share * scene.speed, rise: 0.2 });
+            let stribeck = Some(Stribeck { speed: share * scene.speed, rise: 0.02 });
             CoulombFriction { stribeck, ..self.clone() }
         };
-        let speeds = if self.stribeck.is_none() { logarithmic(0.01, 0.16, 3) } else { Vec::new() };
-        let mut all: Vec<CoulombFriction> = speeds.into_iter().map(rising).collect();
+        if self.stribeck.is_none() {
+            all.extend(logarithmic(1e-3, 0.1, 3).into_iter().map(rising));
+        }
         if self.bristle_time_s.is_none() {
             all.push(CoulombFriction { bristle_time_s: Some(scene.sample_time_s), ..self.clone() });
         }
-        let of = |range: [f64; 2], by: f64| range.map(|v| by * v);
-        let speeds = of(RISES_WITHIN, scene.speed);
-        let ranges = vec![lengths(scene), speeds, RISES, of(BRISTLE_TIMES, scene.sample_time_s)];
         all.into_iter().map(|law| (law, ranges.clone())).collect()
     }
 

@@ -254,7 +254,12 @@ impl Residuals for Problem<'_> {
         let (free_parameters, strengths) = (self.free.free_parameters.len(), self.free.strengths.len());
         if i < free_parameters + strengths {
             let step = if i < free_parameters { 0.3 } else { f64::INFINITY };
-            return Limit { low: f64::NEG_INFINITY, high: f64::INFINITY, step };
+            // Below no delay at all nothing moves, and a fit would stay there.
+            let form = &self.data.form;
+            let place = self.free.free_parameters.get(i).map(|&at| form.free_parameters[at]);
+            let delayed = matches!(place, Some(FreeParameter::Delay));
+            let low = if delayed { -form.given.delay_s / form.sample_time_s } else { f64::NEG_INFINITY };
+            return Limit { low, high: f64::INFINITY, step };
         }
         let [e, k] = self.free.numbers[i - free_parameters - strengths];
         let c = &self.model.chosen[e];

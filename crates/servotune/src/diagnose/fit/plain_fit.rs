@@ -29,9 +29,19 @@ pub(in crate::diagnose) fn body_descended(
     model: &Model,
     runs: &[(&Run, usize)],
 ) -> Option<Model> {
+    descended_from(of_body(data, model, runs), ROUGH)
+}
+
+/// The same to the end: a law with several numbers lies in a narrow valley.
+pub(in crate::diagnose) fn body_settled(data: &DiagnosisData, model: &Model, runs: &[(&Run, usize)]) -> Option<Model> {
+    descended_from(of_body(data, model, runs), TOLERANCE)
+}
+
+/// The plain error in open loop, the modes left as they are.
+fn of_body<'a>(data: &'a DiagnosisData, model: &'a Model, runs: &[(&'a Run, usize)]) -> Problem<'a> {
     let mut problem = Problem::plain_error(data, model, None, runs);
     problem.free.free_parameters.retain(|&i| is_of_body(data.form.free_parameters[i]));
-    descended_from(problem, ROUGH)
+    problem
 }
 
 /// The same in open loop with the laws alone moved.

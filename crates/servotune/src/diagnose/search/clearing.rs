@@ -6,27 +6,23 @@
 
 use super::cleared_plant::{Cleared, Departure};
 use super::curve_balance::curves;
-use super::torque_balance::{Balance, Balanced, recorded_means, smoothings, with_freedom};
+use super::torque_balance::{Balance, Balanced, recorded_means, smoothings};
 use crate::diagnose::data::run::Run;
 use crate::diagnose::data::stacked_records::Segment;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_problem::Problem;
-use crate::diagnose::fit::plain_fit::{body_descended, descended, laws_descended};
+use crate::diagnose::fit::plain_fit::{body_descended, body_settled, descended, laws_descended};
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::fit::simulation::{rms, size};
 use crate::diagnose::free_form::estimation::Curved;
 use crate::diagnose::rules::{
     CLEARED_ALONE, CLEARED_BETTER, CLEARED_BY_CURVE, CLEARED_DONE, CLEARED_FAR, CLEARED_FULLER, CLEARED_TELLS,
-    LAG_INSTEAD,
 };
 use crate::lti::Plant;
-use crate::numeric::digits::said;
-use crate::physics::{AnyLaw, LawSetting, effect, sensor_lag};
-use rayon::prelude::*;
+use crate::physics::LawSetting;
 use std::cell::LazyCell;
-use std::f64::consts::TAU;
 use std::ops::Deref;
 
 /// Laws that are tried by simulation, as they stand and fitted.
@@ -37,21 +33,20 @@ const FITTED: usize = 3;
 const SLIDES: [f64; 2] = [0.0, 6.0];
 
 /// Rounds in which a fuller form is tried, each with one thing more.
-const FULLER: usize = 2;
+const FULLER: usize = 3;
+/// Most fits to the end, one after the other.
+const SETTLED: usize = 3;
 /// Curves that are tried by simulation where no law clears the plant as well.
 const CURVES: usize = 2;
 
-/// Samples above which a lag of the reading is no mere delay.
-const LAG_SAMPLES: f64 = 4.0;
-
 /// What plants and laws are tried on.
 #[derive(Clone)]
-struct Tried<'a> {
-    own: &'a DiagnosisData,
+pub(super) struct Tried<'a> {
+    pub own: &'a DiagnosisData,
     /// The linear refit.
     linear: Model,
     /// Runs, each with the number of records that it stands for.
-    whole: Vec<(&'a Run, usize)>,
+    pub whole: Vec<(&'a Run, usize)>,
 }
 
 /// Where the search sets out: another plant where the given one conceals what acts, none where the given one, or a refit of it, does.
@@ -76,13 +71,13 @@ pub(in crate::diagnose) fn departure(data: &DiagnosisData, iterations: usize, sa
 }
 
 /// A plant with what was fitted beside it.
-struct Fitted {
+pub(super) struct Fitted {
     /// Sum of squares that its simulation leaves.
-    left: f64,
-    ground: DiagnosisData,
-    model: Model,
+    pub left: f64,
+    pub ground: DiagnosisData,
+    pub model: Model,
     /// Whether what stands beside it is a curve without a name.
-    curve: bool,
+    pub curve: bool,
 }
 
 impl Fitted {
@@ -164,7 +159,7 @@ impl Tried<'_> {
     }
 
     /// Its sum of squares.
-    fn left(&self, ground: &DiagnosisData, model: &Model) -> f64 {
+    pub(super) fn left(&self, ground: &DiagnosisData, model: &Model) -> f64 {
         size(&self.errors(ground, model))
     }
 
@@ -190,7 +185,7 @@ impl Tried<'_> {
     }
 
     /// A plant with a law beside it, and the ground around it.
-    fn model(&self, plant: &Plant, law: Option<SelectedEffect>) -> (DiagnosisData, Model) {
+    pub(super) fn model(&self, plant: &Plant, law: Option<SelectedEffect>) -> (DiagnosisData, Model) {
         let ground = around(self.own, plant);
         let mut model = self.linear.clone();
         model.chosen = law.into_iter().collect();
@@ -198,7 +193,7 @@ impl Tried<'_> {
         (ground, model)
     }
 
-    fn fitted(&self, ground: &DiagnosisData, model: &Model) -> Option<Model> {
+    pub(super) fn fitted(&self, ground: &DiagnosisData, model: &Model) -> Option<Model> {
         body_descended(ground, model, &self.whole)
     }
 
@@ -265,51 +260,6 @@ impl Tried<'_> {
         best.map(|(left, model)| Fitted { left, ground, model, curve: false })
     }
 
-    /// The given plant behind the lag of its reading that leaves least.
-    fn lagging(&self) -> Option<(f64, DiagnosisData, Model)> {
-        let (ground, bare) = self.model(&self.own.form.given, None);
-        let behind = |law: AnyLaw| {
-            let setting = LawSetting::fixed(law);
-            let lag = SelectedEffect { setting, continuous: Vec::new(), range: Vec::new(), step: 0 };
-            let model = Model { chosen: vec![with_freedom(lag, &self.own.scene)], ..bare.clone() };
-            let left = self.left(&ground, &model);
-            left.is_finite().then_some((left, model))
-        };
-        let grid = effect(sensor_lag::FACTS.name)?.grid(&self.own.scene);
-        let tried: Vec<(f64, Model)> = grid.into_par_iter().filter_map(behind).collect();
-        let (left, model) = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some((left, ground, model))
-    }
-
-    /// The same with the body fitted: no balance of torques along recorded motion shows what filters the record itself.
-    fn filtered(&self) -> Option<Fitted> {
-        let (left, ground, model) = self.lagging()?;
-        let fitted = self.fitted(&ground, &model).unwrap_or(model);
-        Some(Fitted { left: self.left(&ground, &fitted).min(left), ground, model: fitted, curve: false })
-    }
-
-    /// What is said where such a lag alone explains nearly all that a linear refit does; `given` and `linear` are what these leave (rms).
-    fn lag_instead(&self, given: f64, linear: f64, size_of: &dyn Fn(f64) -> f64) -> Option<String> {
-        if linear > CLEARED_BETTER * given {
-            return None;
-        }
-        let (_, ground, model) = self.lagging()?;
-        let model = laws_descended(&ground, &model, &self.whole)?;
-        let left = size_of(self.left(&ground, &model));
-        let share = (given * given - left * left) / (given * given - linear * linear);
-        let time_s = model.chosen.first()?.setting.law.number(0)?;
-        let slow = time_s > LAG_SAMPLES * self.own.scene.sample_time_s;
-        (slow && share > LAG_INSTEAD).then(|| {
-            format!(
-                "one number explains {} % of what a linear refit does: the given plant behind a first-order low-pass of {} Hz (time constant {} s); look for a filter in the sensor or \
-                 the drive before the plant is changed (sensor_lag, amplifier_lag)",
-                said(100.0 * share, 3),
-                said(1.0 / (TAU * time_s), 3),
-                said(time_s, 3),
-            )
-        })
-    }
-
     /// The best law of some balances, in its fuller form where that is clearly better.
     fn of_laws(&self, laws: &[(f64, Balanced)]) -> Option<Fitted> {
         let simulated = |(_, b): &(f64, Balanced)| {
@@ -329,7 +279,7 @@ impl Tried<'_> {
             }
         }
         let best = settled.into_iter().min_by(|a, b| a.left.total_cmp(&b.left))?;
-        Some(self.fuller(best))
+        Some(self.fuller(if self.done(best.left) { best } else { self.settled(best) }))
     }
 
     /// The fuller form of a fitted law, where that is clearly better: one thing more at a time, each best beside what stands already.
@@ -349,6 +299,22 @@ impl Tried<'_> {
                 }
             }
             if !better {
+                break;
+            }
+            best = self.settled(best);
+        }
+        best
+    }
+
+    /// The same fitted to the end, as long as that is clearly better.
+    fn settled(&self, mut best: Fitted) -> Fitted {
+        for _ in 0..SETTLED {
+            let Some(model) = body_settled(&best.ground, &best.model, &self.whole) else { break };
+            let (left, before) = (self.left(&best.ground, &model), best.left);
+            if left < before {
+                best = Fitted { left, model, ..best };
+            }
+            if !(left < CLEARED_FULLER * before) || self.done(left) {
                 break;
             }
         }

@@ -9,6 +9,7 @@ pub(super) mod clearing;
 pub(super) mod curve_balance;
 mod drift_test;
 mod far_from_noise;
+mod reading_lag;
 pub(super) mod residual_effect;
 mod residual_screen;
 mod rival;

@@ -6,8 +6,10 @@ use super::diagnosis_json::Diagnosis;
 use super::finding::{FitFigures, FitReport, NextExperiment, Tried, Verdict};
 use super::fit_report::{Errors, figures_of};
 use super::held_out::{HeldOut, mean};
-use super::judgement::Judgement;
+use super::judgement::{Judgement, Later};
 use super::log_checks::LogChecks;
+use super::naming::unexplained;
+use super::next_experiment::propose;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::Corrected;
 use crate::diagnose::fit::coupling::Coupling;
@@ -79,6 +81,18 @@ impl Outcome {
     pub fn by(self, answer: Answer) -> Outcome {
         let consulted = [self.judgement.consulted, answer.consulted].concat();
         Outcome { judgement: Judgement { consulted, ..self.judgement }, ..self }
+    }
+
+    /// The same with its laws the nearest to something that has no name, by these rules.
+    pub fn nameless(self, answer: Answer) -> Outcome {
+        if !self.judgement.has_name() {
+            return self.by(answer);
+        }
+        let share = self.figures().explained_share.clamp(0.0, 1.0);
+        let nameless = unexplained(&self.data, &self.selection, Some(share));
+        let judgement = self.judgement.after(Later::Nameless(nameless), answer.consulted);
+        let next_experiment = propose(&judgement, &self.data, &self.selection);
+        Outcome { judgement, next_experiment, ..self }
     }
 
     /// The law that the curve is like that stands in for what has no name, and the plant beside that curve.
