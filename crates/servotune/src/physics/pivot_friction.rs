@@ -182,6 +182,8 @@ impl Law for MaxwellSlip {
 const ELASTIC: f64 = 0.0025;
 /// Forms beside Dahl's law, from nearly one spring to a long tail.
 const SHAPES: [f64; 2] = [0.1, 3.5];
+/// Shapes that a fuller form sets out from.
+const LOADED: [f64; 3] = [0.7, 1.6, 2.8];
 
 /// First loading over `d` sliding lengths; `tail` below 0 ends at -1/tail lengths.
 fn first_loading(d: f64, tail: f64) -> f64 {
@@ -266,14 +268,16 @@ impl Parametric for PivotFriction {
         vec![Some(&mut self.sliding_length), shape, self.bristle_time_s.as_mut()]
     }
 
-    /// With damped bristles.
+    /// Of other loadings, their shape free; with damped bristles.
     fn fuller(&self, scene: &MotionScene) -> Vec<(PivotFriction, Vec<[f64; 2]>)> {
         if self.bristle_time_s.is_some() {
             return Vec::new();
         }
         let times = BRISTLE_TIMES.map(|samples| samples * scene.sample_time_s);
         let ranges = vec![[shortest_loop(scene), 4.0 * scene.travel], SHAPES, times];
-        vec![(PivotFriction { bristle_time_s: Some(scene.sample_time_s), ..self.clone() }, ranges)]
+        let shaped = LOADED.map(|shape| PivotFriction { loading: Loading::MaxwellSlip { shape }, ..self.clone() });
+        let bristled = PivotFriction { bristle_time_s: Some(scene.sample_time_s), ..self.clone() };
+        shaped.into_iter().chain([bristled]).map(|law| (law, ranges.clone())).collect()
     }
 
     fn presliding_length(&self) -> Option<f64> {

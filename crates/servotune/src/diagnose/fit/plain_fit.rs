@@ -6,12 +6,16 @@ use super::output_error_problem::{Problem, is_of_body};
 use super::simulation::size;
 use crate::controller::ControlLaw;
 use crate::diagnose::data::run::Run;
-use crate::numeric::levenberg::{LevenbergSettings, Workspace, minimise};
+use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
+use crate::numeric::simplex::simplex;
 
 /// Jacobians of a fit by the plain error, and the relative fall at which it ends; at which one ends that tells laws apart.
 const ITERATIONS: usize = 15;
 const TOLERANCE: f64 = 1e-5;
 const ROUGH: f64 = 1e-3;
+/// First steps of a simplex (shares of a strength, else in the fit's own numbers), and its rounds for each number.
+const BESIDE: f64 = 0.02;
+const STEPS: u64 = 40;
 
 /// The model fitted by the plain error from where it stands, on these runs, each with the number of records that it stands for.
 pub(in crate::diagnose) fn descended(
@@ -57,7 +61,6 @@ pub(in crate::diagnose) fn laws_descended(
 
 /// The model of a problem from where it stands.
 fn descended_from(mut problem: Problem, tolerance: f64) -> Option<Model> {
-    let (data, model) = (problem.data, problem.model);
     let mut x = problem.start();
     let before = size(&problem.settle(&x));
     if !before.is_finite() {
@@ -74,12 +77,44 @@ fn descended_from(mut problem: Problem, tolerance: f64) -> Option<Model> {
         }
     }
     minimise(&mut problem, &mut x, &settings, &mut work);
-    let after = size(&problem.settle(&x));
-    let (p, chosen) = problem.unpack(&x);
+    Some(moved_to(problem, &x, before))
+}
+
+/// The model of a problem at other numbers where they leave less than `before`, a sum of squares, and a machine can be so.
+fn moved_to(mut problem: Problem, x: &[f64], before: f64) -> Model {
+    let after = size(&problem.settle(x));
+    let (p, chosen) = problem.unpack(x);
     let possible = after < before && chosen.iter().all(|c| c.setting.is_possible(&[]));
-    let mut moved = model.clone();
+    let mut moved = problem.model.clone();
     if possible {
-        (moved.refitted.plant, moved.refitted.p, moved.chosen) = (data.form.plant(&p), p, chosen);
+        (moved.refitted.plant, moved.refitted.p, moved.chosen) = (problem.data.form.plant(&p), p, chosen);
     }
-    Some(moved)
+    moved
+}
+
+/// The same as [`body_settled`] without slopes: where a drag sticks, slopes are rough along the valley.
+pub(in crate::diagnose) fn body_polished(data: &DiagnosisData, model: &Model, runs: &[(&Run, usize)]) -> Option<Model> {
+    let mut problem = of_body(data, model, runs);
+    let start = problem.start();
+    let before = size(&problem.settle(&start));
+    if !before.is_finite() {
+        return None;
+    }
+    let strengths =
+        problem.free.free_parameters.len()..problem.free.free_parameters.len() + problem.free.strengths.len();
+    let beside = |i: usize| {
+        let mut x = start.clone();
+        x[i] += if strengths.contains(&i) { BESIDE * x[i] } else { BESIDE };
+        x
+    };
+    let vertices = std::iter::once(start.clone()).chain((0..start.len()).map(beside)).collect();
+    let limits: Vec<Limit> = (0..start.len()).map(|i| problem.limit(i)).collect();
+    let within = |x: &[f64]| -> Vec<f64> { x.iter().zip(&limits).map(|(v, l)| v.clamp(l.low, l.high)).collect() };
+    let mut errors = vec![0.0; problem.rows()];
+    let best = simplex(vertices, TOLERANCE * before, STEPS * start.len() as u64, |x| {
+        problem.evaluate(&within(x), &mut errors);
+        let left = size(&errors);
+        if left.is_nan() { f64::INFINITY } else { left }
+    })?;
+    Some(moved_to(problem, &within(&best), before))
 }

@@ -13,7 +13,7 @@ use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
 use crate::diagnose::fit::model::Model;
 use crate::diagnose::fit::output_error_problem::Problem;
-use crate::diagnose::fit::plain_fit::{body_descended, body_settled, descended, laws_descended};
+use crate::diagnose::fit::plain_fit::{body_descended, body_polished, body_settled, descended, laws_descended};
 use crate::diagnose::fit::selected_effect::SelectedEffect;
 use crate::diagnose::fit::simulation::{rms, size};
 use crate::diagnose::free_form::estimation::Curved;
@@ -34,8 +34,10 @@ const SLIDES: [f64; 2] = [0.0, 6.0];
 
 /// Rounds in which a fuller form is tried, each with one thing more.
 const FULLER: usize = 3;
-/// Most fits to the end, one after the other.
-const SETTLED: usize = 3;
+/// Most fits to the end, one after the other, the share that each must leave at most for another, and most samples for one without slopes.
+const SETTLED: usize = 4;
+const FALLS: f64 = 0.9;
+const POLISHED: usize = 40_000;
 /// Curves that are tried by simulation where no law clears the plant as well.
 const CURVES: usize = 2;
 
@@ -306,15 +308,19 @@ impl Tried<'_> {
         best
     }
 
-    /// The same fitted to the end, as long as that is clearly better.
+    /// The same fitted to the end, by slopes and without, as long as that is better.
     fn settled(&self, mut best: Fitted) -> Fitted {
+        let few = self.whole.iter().map(|(run, _)| run.len()).sum::<usize>() <= POLISHED;
         for _ in 0..SETTLED {
-            let Some(model) = body_settled(&best.ground, &best.model, &self.whole) else { break };
-            let (left, before) = (self.left(&best.ground, &model), best.left);
-            if left < before {
-                best = Fitted { left, model, ..best };
+            let before = best.left;
+            for fit in [body_settled, body_polished].into_iter().take(if few { 2 } else { 1 }) {
+                let Some(model) = fit(&best.ground, &best.model, &self.whole) else { continue };
+                let left = self.left(&best.ground, &model);
+                if left < best.left {
+                    best = Fitted { left, model, ..best };
+                }
             }
-            if !(left < CLEARED_FULLER * before) || self.done(left) {
+            if best.left > FALLS * before || self.done(best.left) {
                 break;
             }
         }
