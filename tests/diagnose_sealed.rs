@@ -74,3 +74,13 @@ fn a_wind_leaves_the_better_of_two_linear_models() {
     assert_eq!((row.kind.as_str(), row.outcome), ("wind", Outcome::Right), "{told}");
     assert!(row.holdout[2] <= row.holdout[0].min(row.holdout[1]), "{told}");
 }
+
+/// A dry friction of the eleventh published set beside the plant's own model: the search stopped at seventeen times the noise, with a film in the place
+/// of short bristles.
+#[test]
+fn a_friction_in_a_narrow_valley_is_named() {
+    let row = sealed_set(20_261_228, 23, 2400)[22].row().unwrap();
+    let told = format!("{} {} {:?}", row.verdict, row.findings, row.holdout);
+    assert_eq!((row.kind.as_str(), row.outcome), ("friction", Outcome::Right), "{told}");
+    assert!(row.holdout[2] < 1.2, "{told}");
+}

@@ -7,6 +7,7 @@ mod differing_repeats;
 pub(super) mod equation_error_fit;
 pub(super) mod fit_inputs;
 pub(super) mod fitted_model;
+mod free_numbers;
 mod lagged_regression;
 pub(super) mod model;
 pub(super) mod output_error_fit;

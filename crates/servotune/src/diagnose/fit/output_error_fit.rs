@@ -9,8 +9,9 @@
 
 use super::diagnosis_data::DiagnosisData;
 use super::equation_error_fit::Refitted;
+use super::free_numbers::places;
 use super::model::Model;
-use super::output_error_problem::{Problem, places};
+use super::output_error_problem::Problem;
 use super::simulation::size;
 use crate::diagnose::data::linear_form::FreeParameter;
 use crate::diagnose::rules::{RUNS_AWAY, SIMULATION_SILENT, UNSETTLED};
