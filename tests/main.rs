@@ -64,6 +64,7 @@ mod pareto_and_budget;
 mod pes_noise_power;
 mod pes_quick;
 mod pes_simulation;
+mod physics_bearing;
 mod physics_bristles;
 mod physics_catalogue;
 mod physics_common;

@@ -84,7 +84,7 @@ fn stuck_it_damps_and_sliding_it_is_gone() {
     close(df(damped(rising()), 1.0, 1e-4 * DRAG[0], w), bristles, 1e-3);
     let dahl = PivotFriction { bristle_time_s: Some(DRAG[3]), ..PivotFriction::of(DRAG[0], Loading::Dahl) };
     close(df(dahl, 1.0, 1e-4 * DRAG[0], w), bristles, 1e-3);
-    let row = Loading::MaxwellSlip { shape: 1.0 };
+    let row = Loading::MaxwellSlip { shape: 1.0, break_away_length: None };
     let row = PivotFriction { bristle_time_s: Some(DRAG[3]), ..PivotFriction::of(DRAG[0], row) };
     // The row's first stiffness is that of its first piece, a hundredth below the curve's.
     close(df(row, 1.0, 1e-4 * DRAG[0], w), bristles, 2e-2);

@@ -97,6 +97,13 @@ const CREEP: [f64; 2] = [1e-3, 0.3];
 /// Speeds (over the highest) and sizes of a rise within which a fuller form is fitted.
 const RISES_WITHIN: [f64; 2] = [3e-4, 0.5];
 const RISES: [f64; 2] = [0.005, 3.0];
+/// Speeds from which a rise sets out, so many of them, and its first size: a large rise at once would hold an arm that is driven with little more than
+/// its friction, and no fit comes back from there.
+const RISES_FROM: [f64; 2] = [1e-3, 0.1];
+const RISING: usize = 3;
+const FIRST_RISE: f64 = 0.02;
+/// Lengths of bristles that are tried in the place of a film.
+const BRISTLES: usize = 3;
 
 /// Lengths to a doubling.
 const OCTAVE: f64 = 1.34;
@@ -244,25 +251,23 @@ impl Parametric for CoulombFriction {
 
     /// A film as bristles; these with Stribeck's rise, with damping. One after the other makes all.
     fn fuller(&self, scene: &MotionScene) -> Vec<(CoulombFriction, Vec<[f64; 2]>)> {
-        let of = |range: [f64; 2], by: f64| range.map(|v| by * v);
         let [short, long] = lengths(scene);
-        let ranges = vec![[short, long], of(RISES_WITHIN, scene.speed), RISES, of(BRISTLE_TIMES, scene.sample_time_s)];
         let mut all: Vec<CoulombFriction> = Vec::new();
         if matches!(self.turning, Turning::Creep { .. }) {
-            all.extend(logarithmic(short, long, 3).into_iter().map(|length| CoulombFriction::sticking(length, None)));
-            return all.into_iter().map(|law| (law, ranges.clone())).collect();
+            all.extend(logarithmic(short, long, BRISTLES).into_iter().map(|l| CoulombFriction::sticking(l, None)));
+        } else {
+            if self.stribeck.is_none() {
+                let [slow, fast] = RISES_FROM;
+                let rising = |share: f64| Stribeck { speed: share * scene.speed, rise: FIRST_RISE };
+                let each = logarithmic(slow, fast, RISING).into_iter().map(rising);
+                all.extend(each.map(|s| CoulombFriction { stribeck: Some(s), ..self.clone() }));
+            }
+            if self.bristle_time_s.is_none() {
+                all.push(CoulombFriction { bristle_time_s: Some(scene.sample_time_s), ..self.clone() });
+            }
         }
-        // From a small rise: it grows where the records have one, and a large one at once would hold the arm.
-        let rising = |share: f64| {
-            let stribeck = Some(Stribeck { speed: share * scene.speed, rise: 0.02 });
-            CoulombFriction { stribeck, ..self.clone() }
-        };
-        if self.stribeck.is_none() {
-            all.extend(logarithmic(1e-3, 0.1, 3).into_iter().map(rising));
-        }
-        if self.bristle_time_s.is_none() {
-            all.push(CoulombFriction { bristle_time_s: Some(scene.sample_time_s), ..self.clone() });
-        }
+        let of = |range: [f64; 2], by: f64| range.map(|v| by * v);
+        let ranges = vec![[short, long], of(RISES_WITHIN, scene.speed), RISES, of(BRISTLE_TIMES, scene.sample_time_s)];
         all.into_iter().map(|law| (law, ranges.clone())).collect()
     }
 

@@ -10,6 +10,7 @@ mod key;
 mod knots;
 mod library;
 mod machine;
+mod maxwell_slip;
 mod oscillator;
 mod pair;
 mod parameter;

@@ -6,12 +6,13 @@
 //! z = d/x_s - (d/x_s)²/4. In every shape x_s is the sliding level over the first stiffness. In files `shape`
 //! chooses: 0 is Dahl's law; above 0 it is Maxwell slip with the first loading z = 1 - (1 + m d/x_s)^(-1/m), m = shape/2 - 1
 //! (survival of a generalised Pareto law of yield lengths, Pickands 1975): 1 the parabola, 2 Dahl's 1 - exp(-d/x_s), towards 0 one
-//! spring that slips at once, above 2 elements that yield ever later.
+//! spring that slips at once, above 2 elements that yield ever later. A break-away length cuts the curve off: behind it all elements slide.
 //! Bristles that are damped (LuGre: Canudas de Wit, Olsson, Astrom, Lischinsky 1995) add `bristle_time_s` dz/dt to z: it damps what swings
 //! on the bearing while it sticks and is gone once it slides.
 
 use super::effect::{Entry, Facts, Given, Law, Parametric, PhysicsError, Port, ShownOver};
 use super::key::{Key, Measure, Prior, ScanEnd, Takes};
+use super::maxwell_slip::MaxwellSlip;
 use super::parameter::{Parameter, Unit};
 use super::sample::{MotionScene, Sample, logarithmic};
 
@@ -33,8 +34,10 @@ pub enum Loading {
     Dahl,
     /// A row of Maxwell-slip elements.
     MaxwellSlip {
-        /// 1 for the parabola, 2 for 1 - exp(-d/x_s), between 0.1 and 3.5.
+        /// 1 for the parabola, 2 for 1 - exp(-d/x_s), between 0.1 and 8.
         shape: f64,
+        /// Way behind which all of it slides (position_unit); none where its curve alone ends it. Up to the sliding length it is one spring.
+        break_away_length: Option<f64>,
     },
 }
 
@@ -42,7 +45,16 @@ const SLIDING_LENGTH: Key = Key::new("sliding_length", Unit::Position, "sliding 
     .positive()
     .scan(ScanEnd::Greatest(&[(12.0, Measure::Noise), (2e-3, Measure::Travel)]), ScanEnd::At(4.0, Measure::Travel));
 const LEVEL_COMMAND: Key = Key::new("level_command", Unit::Command, "drag once it slides, F");
-const SHAPE: Key = Key::new("shape", Unit::Ratio, "0: Dahl; above 0 a Maxwell-slip row with the first loading 1 - (1 + m d/x_s)^(-1/m), m = shape/2 - 1: 1 a parabola, 2 the curve of Dahl, towards 0 one spring that slips; the last fit moves it between 0.1 and 3.5").or(0.0).points(&[0.0, 1.0, 2.0]);
+const SHAPE: Key = Key::new("shape", Unit::Ratio, "0: Dahl; above 0 a Maxwell-slip row with the first loading 1 - (1 + m d/x_s)^(-1/m), m = shape/2 - 1: 1 a parabola, 2 the curve of Dahl, towards 0 one spring that slips; the last fit moves it between 0.1 and 8").or(0.0).points(&[0.0, 1.0, 2.0]);
+const BREAK_AWAY_LENGTH: Key = Key::new(
+    "break_away_length",
+    Unit::Position,
+    "way after a rest behind which all of a Maxwell-slip row slides: its curve is cut off there",
+)
+.or_else("its curve ends it")
+.beside("shape")
+.takes(Takes::Law("a finite number above 0, beside a shape above 0"))
+.prior(Prior::Words("in fuller forms, from the travel and a quarter of it"));
 /// Damping of the bristles, of every drag that sticks.
 pub(super) const BRISTLE_TIME_S: Key = Key::new(
     "bristle_time_s",
@@ -61,17 +73,14 @@ pub static FACTS: Facts = Facts {
     columns: 1,
     fixed: false,
     per_record: false,
-    equation: "tau = -F z, dz/dx = (1 - sgn(dx) z)/x_s (Dahl) or a row of Maxwell-slip elements up to 2 x_s; z + tau_b dz/dt of damped bristles",
-    keys: &[SLIDING_LENGTH, LEVEL_COMMAND, SHAPE, BRISTLE_TIME_S],
+    equation: "tau = -F z, dz/dx = (1 - sgn(dx) z)/x_s (Dahl) or a row of Maxwell-slip elements; z + tau_b dz/dt of damped bristles",
+    keys: &[SLIDING_LENGTH, LEVEL_COMMAND, SHAPE, BREAK_AWAY_LENGTH, BRISTLE_TIME_S],
     source: "P. R. Dahl, A Solid Friction Model, Aerospace Corporation TOR-0158, 1968; F. Al-Bender, V. Lampaert, J. Swevers, The Generalized Maxwell-Slip Model, IEEE Transactions on Automatic Control 50(11), 2005; D. Abramovitch, F. Wang, G. Franklin, Disk Drive Pivot Nonlinearity Modeling, ACC 1994",
     says: "the arm behaves like a bearing that sticks: after each reversal it first acts as a spring, then slides at a constant drag",
     confused_with: &["coulomb_friction", "cable_spring", "nonlinear_spring", "linear_parameters"],
     experiment: "the same multisine at three amplitudes over a decade, and a slow triangle with small nested reversals",
     band_hz: [1.0, 150.0],
 };
-
-/// Elements of the Maxwell-slip row: the curve's kinks stay below half a per cent of the level.
-const ELEMENTS: usize = 16;
 
 struct Dahl {
     length: f64,
@@ -120,52 +129,14 @@ impl Law for Dahl {
     }
 }
 
-/// A row of spring-slider elements whose first loading is a curve, linear between nodes (Iwan 1966): element i yields
-/// at node i and has the stiffness by which the curve's slope falls there. Unloading and nested loops follow Masing's rule.
-struct MaxwellSlip {
-    /// Yield lengths (position_unit).
-    yields: [f64; ELEMENTS],
-    /// Stiffness, so that all elements sliding make 1 (1/position_unit).
-    stiffness: [f64; ELEMENTS],
-    /// Stretch of each spring (position_unit).
-    stretch: [f64; ELEMENTS],
+struct Row {
+    row: MaxwellSlip,
     bristle_time_s: f64,
 }
 
-impl MaxwellSlip {
-    fn of(shape: f64, length: f64, bristle_time_s: f64) -> MaxwellSlip {
-        let tail = 0.5 * shape - 1.0;
-        let curve = |d: f64| first_loading(d, tail);
-        let end = loaded_to(ELASTIC, tail);
-        // Nodes closer at the start, where the curve bends most.
-        let node = |i: usize| end * (i as f64 / ELEMENTS as f64).powf(1.5);
-        let level = |i: usize| curve(node(i)) / curve(end);
-        let slope =
-            |i: usize| if i > ELEMENTS { 0.0 } else { (level(i) - level(i - 1)) / ((node(i) - node(i - 1)) * length) };
-        MaxwellSlip {
-            yields: std::array::from_fn(|i| node(i + 1) * length),
-            stiffness: std::array::from_fn(|i| slope(i + 1) - slope(i + 2)),
-            stretch: [0.0; ELEMENTS],
-            bristle_time_s,
-        }
-    }
-
-    fn level(&self, stretch: &[f64; ELEMENTS]) -> f64 {
-        stretch.iter().zip(&self.stiffness).map(|(s, k)| s * k).sum()
-    }
-
-    fn moved(&self, dx: f64) -> [f64; ELEMENTS] {
-        let mut next = self.stretch;
-        for (s, y) in next.iter_mut().zip(&self.yields) {
-            *s = (*s + dx).max(-y).min(*y);
-        }
-        next
-    }
-}
-
-impl Law for MaxwellSlip {
+impl Law for Row {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        let z = [self.level(&self.stretch), self.level(&self.moved(to.x - from.x))];
+        let z = [self.row.drag(), self.row.drag_after(to.x - from.x)];
         out[0] = damped(-0.5 * (z[0] + z[1]), self.bristle_time_s, z, from, to);
     }
 
@@ -174,32 +145,23 @@ impl Law for MaxwellSlip {
     }
 
     fn went(&mut self, way: f64) {
-        self.stretch = self.moved(way);
+        self.row.go(way);
     }
 }
 
-/// Share of the level that no element holds any more at the last node.
-const ELASTIC: f64 = 0.0025;
+/// Share of its level by which a drag has turned round.
+pub(crate) const HELD: f64 = 0.9;
+
+/// Sliding length with which Dahl's law turns round over this way.
+pub(crate) fn dahl_length(way: f64) -> f64 {
+    -way / (1.0 - HELD).ln()
+}
+
 /// Forms beside Dahl's law, from nearly one spring to a long tail.
-const SHAPES: [f64; 2] = [0.1, 3.5];
-/// Shapes that a fuller form sets out from.
-const LOADED: [f64; 3] = [0.7, 1.6, 2.8];
-
-/// First loading over `d` sliding lengths; `tail` below 0 ends at -1/tail lengths.
-fn first_loading(d: f64, tail: f64) -> f64 {
-    if tail.abs() < 1e-6 { 1.0 - (-d).exp() } else { 1.0 - (1.0 + tail * d).max(0.0).powf(-1.0 / tail) }
-}
-
-/// Sliding lengths after which a share `left` of the level is still to come; all of it where the loading ends.
-fn loaded_to(left: f64, tail: f64) -> f64 {
-    if tail < -1e-6 {
-        -1.0 / tail
-    } else if tail < 1e-6 {
-        -left.ln()
-    } else {
-        (left.powf(-tail) - 1.0) / tail
-    }
-}
+const SHAPES: [f64; 2] = [0.1, 8.0];
+/// Shapes that a fuller form sets out from, and ways at which it breaks away, over the travel.
+const LOADED: [f64; 3] = [0.7, 2.5, 5.0];
+const BREAKS_AWAY: [f64; 2] = [0.25, 1.0];
 
 /// Shortest sliding length whose hysteresis is told from dry friction: some twelve times the sensor's noise, or a small share of the travel.
 pub(crate) fn shortest_loop(scene: &MotionScene) -> f64 {
@@ -221,14 +183,14 @@ pub(super) fn bristle_time_of(given: &Given) -> Result<Option<f64>, PhysicsError
 impl Loading {
     /// The loading that files name by this shape.
     fn of(shape: f64) -> Loading {
-        if shape < 0.5 * SHAPES[0] { Loading::Dahl } else { Loading::MaxwellSlip { shape } }
+        if shape < 0.5 * SHAPES[0] { Loading::Dahl } else { Loading::MaxwellSlip { shape, break_away_length: None } }
     }
 
     /// The shape by which files name it.
     fn shape(self) -> f64 {
         match self {
             Loading::Dahl => 0.0,
-            Loading::MaxwellSlip { shape } => shape,
+            Loading::MaxwellSlip { shape, .. } => shape,
         }
     }
 }
@@ -261,35 +223,52 @@ impl Parametric for PivotFriction {
     }
 
     fn numbers_mut(&mut self) -> Vec<Option<&mut f64>> {
-        let shape = match &mut self.loading {
-            Loading::Dahl => None,
-            Loading::MaxwellSlip { shape } => Some(shape),
+        let (shape, end) = match &mut self.loading {
+            Loading::Dahl => (None, None),
+            Loading::MaxwellSlip { shape, break_away_length } => (Some(shape), break_away_length.as_mut()),
         };
-        vec![Some(&mut self.sliding_length), shape, self.bristle_time_s.as_mut()]
+        vec![Some(&mut self.sliding_length), shape, end, self.bristle_time_s.as_mut()]
     }
 
-    /// Of other loadings, their shape free; with damped bristles.
+    /// Of other loadings, their shape free; one that breaks away; with damped bristles. One after the other makes all.
     fn fuller(&self, scene: &MotionScene) -> Vec<(PivotFriction, Vec<[f64; 2]>)> {
-        if self.bristle_time_s.is_some() {
-            return Vec::new();
+        let loaded = |loading| PivotFriction { loading, ..self.clone() };
+        let mut all = Vec::new();
+        match self.loading {
+            Loading::MaxwellSlip { shape, break_away_length: None } => {
+                let ends = BREAKS_AWAY.map(|share| Some((share * scene.travel).max(2.0 * self.sliding_length)));
+                all.extend(ends.map(|break_away_length| loaded(Loading::MaxwellSlip { shape, break_away_length })));
+                all.extend(LOADED.map(Loading::of).map(loaded));
+            }
+            Loading::MaxwellSlip { .. } => {}
+            Loading::Dahl => all.extend(LOADED.map(Loading::of).map(loaded)),
         }
+        if self.bristle_time_s.is_none() {
+            all.push(PivotFriction { bristle_time_s: Some(scene.sample_time_s), ..self.clone() });
+        }
+        let [short, long] = [shortest_loop(scene), 4.0 * scene.travel];
         let times = BRISTLE_TIMES.map(|samples| samples * scene.sample_time_s);
-        let ranges = vec![[shortest_loop(scene), 4.0 * scene.travel], SHAPES, times];
-        let shaped = LOADED.map(|shape| PivotFriction { loading: Loading::MaxwellSlip { shape }, ..self.clone() });
-        let bristled = PivotFriction { bristle_time_s: Some(scene.sample_time_s), ..self.clone() };
-        shaped.into_iter().chain([bristled]).map(|law| (law, ranges.clone())).collect()
+        let ranges = vec![[short, long], SHAPES, [short, 2.0 * long], times];
+        all.into_iter().map(|law| (law, ranges.clone())).collect()
     }
 
     fn presliding_length(&self) -> Option<f64> {
-        Some(self.sliding_length)
+        Some(match self.loading {
+            Loading::Dahl => self.sliding_length,
+            Loading::MaxwellSlip { shape, break_away_length } => {
+                let row = MaxwellSlip::of(shape, self.sliding_length, break_away_length);
+                self.sliding_length.max(dahl_length(row.way_to(HELD)))
+            }
+        })
     }
 
     fn in_motion(&self, _scene: &MotionScene) -> Box<dyn Law> {
         let (length, bristle_time_s) = (self.sliding_length, self.bristle_time_s.unwrap_or(0.0));
         match self.loading {
             Loading::Dahl => Box::new(Dahl { length, bristle_time_s, z: 0.0 }),
-            Loading::MaxwellSlip { shape } => {
-                Box::new(MaxwellSlip::of(shape.clamp(SHAPES[0], SHAPES[1]), length, bristle_time_s))
+            Loading::MaxwellSlip { shape, break_away_length } => {
+                let row = MaxwellSlip::of(shape.clamp(SHAPES[0], SHAPES[1]), length, break_away_length);
+                Box::new(Row { row, bristle_time_s })
             }
         }
     }
@@ -308,6 +287,9 @@ impl Parametric for PivotFriction {
             LEVEL_COMMAND.at(strengths[0]),
             SHAPE.at(self.loading.shape()),
         ];
+        if let Loading::MaxwellSlip { break_away_length: Some(way), .. } = self.loading {
+            all.push(BREAK_AWAY_LENGTH.at(way));
+        }
         all.extend(self.bristle_time_s.map(|time| BRISTLE_TIME_S.at(time)));
         all
     }
@@ -338,7 +320,13 @@ impl Parametric for PivotFriction {
 
     fn setting_of(given: &Given, _scene: &MotionScene) -> Result<(PivotFriction, Vec<f64>), PhysicsError> {
         let sliding_length = given.need(&SLIDING_LENGTH)?;
-        let loading = Loading::of(given.or(&SHAPE)?);
+        let mut loading = Loading::of(given.or(&SHAPE)?);
+        if let Some(way) = given.get(&BREAK_AWAY_LENGTH)? {
+            match &mut loading {
+                Loading::MaxwellSlip { break_away_length, .. } if way > 0.0 => *break_away_length = Some(way),
+                _ => return Err(given.refused(&BREAK_AWAY_LENGTH, way)),
+            }
+        }
         let law = PivotFriction { sliding_length, loading, bristle_time_s: bristle_time_of(given)? };
         Ok((law, vec![given.need(&LEVEL_COMMAND)?]))
     }

@@ -42,7 +42,7 @@ rules! {
         "error on held-out records under the law alone that the plant was cleared of, up to which it is named where the search of all laws found no name",
         "a friction beside a run-out left 1.01, a friction that acts one way only, which the library lacks, 1.9";
     LOADING_FALLS: f64 = 0.15, "share",
-        "deepest fall of a loading curve over its height, below which it is a drag",
+        "deepest fall of a loading curve beyond the errors of its knots over its height, below which it is a drag",
         "judgement: a drag takes energy; noise moves single knots";
     LOADING_LEVEL: f64 = 0.6, "share",
         "its value at the middle knot, an eighth of the way, over its height, above which it is a drag and no spring",

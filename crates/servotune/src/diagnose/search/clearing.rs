@@ -271,16 +271,16 @@ impl Tried<'_> {
         };
         let mut tried: Vec<(f64, DiagnosisData, Model)> = laws.iter().filter_map(simulated).collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut settled: Vec<Fitted> = Vec::new();
+        let mut all: Vec<Fitted> = Vec::new();
         for (left, ground, model) in tried.into_iter().take(FITTED) {
             let fitted = self.fitted(&ground, &model).unwrap_or(model);
             let left = self.left(&ground, &fitted).min(left);
-            settled.push(Fitted { left, ground, model: fitted, curve: false });
+            all.push(Fitted { left, ground, model: fitted, curve: false });
             if self.done(left) {
                 break;
             }
         }
-        let best = settled.into_iter().min_by(|a, b| a.left.total_cmp(&b.left))?;
+        let best = all.into_iter().min_by(|a, b| a.left.total_cmp(&b.left))?;
         Some(self.fuller(if self.done(best.left) { best } else { self.settled(best) }))
     }
 

@@ -26,6 +26,7 @@ use crate::diagnose::search::curve_balance::{curves, surface};
 use crate::diagnose::search::selection::Selection;
 use crate::diagnose::search::torque_balance::{Balance, SMOOTHINGS, recorded_means};
 use crate::lti::{CurveKnot, Plant};
+use crate::physics::pivot_friction::{HELD, dahl_length};
 use crate::physics::sensor_curve::{self, SensorCurve};
 use crate::physics::{CurvePort, Facts, LawSetting, coulomb_friction, pivot_friction, shortest_loop};
 
@@ -256,10 +257,11 @@ fn bearing_finding(data: &DiagnosisData, best: &Foretelling, found: &Estimated) 
     }
     let last = c.value.len() - 1;
     let most = c.value.iter().fold(0.0f64, |m, v| m.max(*v));
+    // The deepest fall that the errors of its knots do not make.
     let mut highest = 0.0f64;
-    let falls = c.value.iter().fold(0.0f64, |falls, v| {
-        highest = highest.max(*v);
-        falls.max(highest - v)
+    let falls = c.value.iter().zip(&c.spread).fold(0.0f64, |falls, (v, spread)| {
+        highest = highest.max(v - 1.96 * spread);
+        falls.max(highest - (v + 1.96 * spread))
     });
     // A drag rises with the way until it slides; a spring would go on rising.
     if !(falls < LOADING_FALLS * most && c.value[last / 2] > LOADING_LEVEL * most) {
@@ -276,7 +278,8 @@ fn bearing_finding(data: &DiagnosisData, best: &Foretelling, found: &Estimated) 
     let half = (0..=last).find(|&i| c.value[i] >= 0.5 * c.value[last])?;
     let (way, off) = (c.knots.at[half] * c.value[last] / c.value[half], 1.96 * c.spread[half] / c.value[half]);
     let length = Estimate { value: way, low: way * (1.0 - off), high: way * (1.0 + off), unit: position.clone() };
-    let pivot = way > shortest_loop(&data.scene);
+    let held = (0..=last).find(|&i| c.value[i] >= HELD * c.value[last])?;
+    let pivot = way.max(dahl_length(c.knots.at[held])) > shortest_loop(&data.scene);
     let facts = if pivot { &pivot_friction::FACTS } else { &coulomb_friction::FACTS };
     let samples = best.trial.stretches.total() as f64;
     let log_p = -0.5 * samples * (found.linear.left_out / best.left_out).ln();
