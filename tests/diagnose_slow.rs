@@ -115,6 +115,18 @@ fn friction_is_named_beside_a_mode_that_the_model_lacks() {
     assert!(held.rms_after < 0.7 * held.rms_refit_linear && held.rms_after < 0.5 * held.rms_before, "{held:?}");
 }
 
+/// Fourteen laps are 35 000 samples of a motion below 20 Hz: three and a half of them become one, and the friction is found all the same.
+#[test]
+fn friction_is_named_in_a_long_record_of_which_several_samples_become_one() {
+    let d = diagnosed(SLIDES, 14).diagnosis;
+    assert!(d.remarks.iter().any(|r| r.contains("3.50 samples became one")), "{:?}", d.remarks);
+    let names: Vec<&str> = d.findings.iter().map(|f| f.effect.as_str()).collect();
+    assert_eq!(d.verdict, Verdict::Named, "{names:?} {:?}", d.remarks);
+    let friction = d.findings.iter().find(|f| f.effect == "pivot_friction").unwrap();
+    let level = friction.parameters["level_command"].value;
+    assert!((level / (SLIDES / B) - 1.0).abs() < 0.3, "{level}");
+}
+
 /// Without friction nothing of the kind is named.
 #[test]
 fn no_friction_is_named_where_there_is_none() {

@@ -189,7 +189,7 @@ pub fn abroad(
 ) -> Result<Study, StudyError> {
     let known: Vec<Row> = known.map(serde_json::from_str).transpose()?.unwrap_or_default();
     let mut rows = Vec::new();
-    let mut keep = |rows: &mut Vec<Row>, id: &str| {
+    let keep = |rows: &mut Vec<Row>, id: &str, say: &mut dyn FnMut(&str)| {
         let made_now = asked.is_empty() || asked.iter().any(|a| a == id);
         if made_now {
             say(id);
@@ -199,12 +199,12 @@ pub fn abroad(
         !made_now
     };
     for f in &foretold() {
-        if !keep(&mut rows, f.id) {
+        if !keep(&mut rows, f.id, say) {
             rows.push(foreign(f)?);
         }
     }
     for (id, what, expected, stage, size) in stages() {
-        if !keep(&mut rows, id) {
+        if !keep(&mut rows, id, say) {
             rows.push(staged(id, what, expected, &stage, size)?);
         }
     }
@@ -216,12 +216,13 @@ pub fn abroad(
         ("silverbox", "electronic Duffing oscillator, real", oscillator),
     ];
     for (id, what, make) in real {
-        if keep(&mut rows, id) {
+        if keep(&mut rows, id, say) {
             continue;
         }
         let (case, plant) = make(data)?;
         let began = Instant::now();
-        let d = diagnose(&case, &plant, None, &DiagnoseSettings::default(), |_| {})?.diagnosis;
+        let d = diagnose(&case, &plant, None, &DiagnoseSettings::default(), |step| say(&format!("{id}: {step}")))?
+            .diagnosis;
         let seconds = began.elapsed().as_secs_f64();
         rows.push(row(id, what, "no worse than given", &plant.position_unit, &d, seconds));
     }

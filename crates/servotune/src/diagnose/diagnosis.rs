@@ -9,6 +9,7 @@ use super::trial::Trial;
 use crate::controller::{ControlLaw, Controller};
 use crate::diagnose::data::excerpt::excerpts;
 use crate::diagnose::data::run::{Run, runs};
+use crate::diagnose::data::thinned::thinning;
 use crate::diagnose::fit::coupling::Decoupled;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
@@ -50,11 +51,24 @@ pub fn diagnose(
     let mut decoupled = decoupled(all, case, given, &log_checks, sample_time_s, &mut progress);
     let remarks = std::mem::take(&mut decoupled.remarks);
     let mut whole = std::mem::take(&mut decoupled.runs);
+    // A controller answers at its own samples, and what further inputs move was found at those of the log.
+    let open = controller.is_none() && case.further_inputs.is_empty();
+    let thinned = open.then(|| thinning(&whole, given, sample_time_s)).flatten();
+    let sample_time_s = sample_time_s * thinned.unwrap_or(1.0);
+    if let Some(samples) = thinned {
+        whole.iter_mut().for_each(|r| *r = r.thinned(samples));
+    }
     let mut ground =
         Ground { case, given, controller, law: law.as_ref(), settings, log_checks, sample_time_s, remarks };
     if let Some(lap) = ground.log_checks.lap {
         let (lap, unit) = (said(lap, 4), &given.position_unit);
         ground.remarks.push(format!("the logged position wraps round every {lap} {unit}: it was laid end to end"));
+    }
+    if let Some(samples) = thinned {
+        let [samples, rate] = [samples, 1.0 / sample_time_s].map(|v| said(v, 3));
+        ground.remarks.push(format!(
+            "the machine moves slowly for its sample rate: {samples} samples became one, the command averaged over them; figures are of the whole records at {rate} Hz"
+        ));
     }
     let cut = excerpts(&whole, sample_time_s);
     if let Some(cut) = &cut {
@@ -63,7 +77,7 @@ pub fn diagnose(
     }
     let mut data = ground.data(given, cut.unwrap_or_else(|| whole.clone()))?;
     preconditions::check(&data)?;
-    if controller.is_none() {
+    if controller.is_none() && thinned.is_none() {
         progress("is the command held between samples, or measured");
         if let Some(better) = ground.measured(&data)? {
             data = better;

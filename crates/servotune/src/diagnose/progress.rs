@@ -6,7 +6,7 @@
 use std::time::Instant;
 
 /// How steps begin, the longer of two before the shorter, and the share of the work that is done when they do.
-const STEPS: [(&str, f64); 19] = [
+const STEPS: [(&str, f64); 13] = [
     ("checking the logs", 0.0),
     ("is the command held", 0.02),
     ("refit of the linear", 0.05),
@@ -18,13 +18,7 @@ const STEPS: [(&str, f64); 19] = [
     ("simulating all", 0.9),
     (CURVE, 0.0),
     ("a curve without a name: torque over position and", 0.95),
-    ("a curve without a name: torque over position", 0.03),
-    ("a curve without a name: torque over velocity", 0.08),
-    ("a curve without a name: torque over loading", 0.15),
-    ("a curve without a name: torque over time", 0.25),
-    ("a curve without a name: amplifier", 0.35),
-    ("a curve without a name: gain over position", 0.4),
-    ("a curve without a name: gain over time", 0.45),
+    ("a curve without a name: at every port", 0.05),
     ("a curve without a name: sensor", 0.5),
 ];
 

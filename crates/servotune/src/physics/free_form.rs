@@ -16,6 +16,7 @@ use super::share::Share;
 use super::sliders::{Loading, Sliders, slider_stiffness};
 use crate::lti::{CurveEntry, CurveKnot, PhysicsEntry};
 use crate::numeric::spline::Spline;
+use std::cell::Cell;
 
 /// Where a curve acts and what it goes over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -245,6 +246,8 @@ struct Curve {
     port: CurvePort,
     spline: Spline,
     lag: Option<Lag>,
+    /// Where the last way began, and the value there: a step is tried with several ends.
+    began: Cell<[f64; 2]>,
 }
 
 /// What follows an amplifier's curve with a first-order lag; what acts is the mean over each interval.
@@ -267,7 +270,12 @@ impl Curve {
     /// The mean of a torque or a gain over a straight way from `a` to `b` (Simpson).
     fn mean(&self, a: f64, b: f64) -> f64 {
         let f = |x| self.spline.held(x);
-        (f(a) + 4.0 * f(0.5 * (a + b)) + f(b)) / 6.0
+        let [began, mut first] = self.began.get();
+        if began != a {
+            first = f(a);
+            self.began.set([a, first]);
+        }
+        (first + 4.0 * f(0.5 * (a + b)) + f(b)) / 6.0
     }
 }
 
@@ -322,8 +330,7 @@ impl Parametric for FreeForm {
 
     fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         if self.port == CurvePort::TorqueOverLoading {
-            let stiffness = slider_stiffness(&self.knots.at, &self.value);
-            return Box::new(Loading { sliders: Sliders::of(&self.knots.at), stiffness });
+            return Box::new(Loading(Sliders::of(&self.knots.at, &self.value)));
         }
         if self.port == CurvePort::TorqueOverMotion {
             return Box::new(Surface::of(&self.knots, &self.value));
@@ -332,7 +339,8 @@ impl Parametric for FreeForm {
             let ratio = scene.sample_time_s / tau;
             Lag { keep: (-ratio).exp(), mean: -(-ratio).exp_m1() / ratio, current: None }
         };
-        Box::new(Curve { port: self.port, spline: self.spline(), lag: self.lag_s.map(made) })
+        let began = Cell::new([f64::NAN; 2]);
+        Box::new(Curve { port: self.port, spline: self.spline(), lag: self.lag_s.map(made), began })
     }
 
     fn memory_time_s(&self) -> Option<f64> {

@@ -8,6 +8,7 @@ use super::effect::{COLUMNS, Entry, Law, Port};
 use super::library::LawSetting;
 use super::sample::{MotionScene, Sample};
 use crate::lti::{DiscretePlant, Intersample, LtiError, Plant, PlantState};
+use crate::numeric::root::bracketed_root;
 
 struct Part {
     law: Box<dyn Law>,
@@ -18,6 +19,11 @@ struct Part {
 
 impl Part {
     fn value(&self, from: &Sample, to: &Sample) -> f64 {
+        if let [strength] = self.strengths[..] {
+            let mut out = [0.0];
+            self.law.columns(from, to, &mut out);
+            return strength * out[0];
+        }
         let mut out = [0.0; COLUMNS];
         self.law.columns(from, to, &mut out[..self.strengths.len()]);
         out.iter().zip(&self.strengths).map(|(c, s)| c * s).sum()
@@ -45,6 +51,8 @@ pub struct SimulatedMachine {
     offset: f64,
     /// Position that a unit torque adds within one step.
     reach: f64,
+    /// One over two steps of the torque (1/s).
+    per_two_steps: f64,
     /// The last two positions at steps of the torque, and the speed as the last step ended.
     path: [f64; 2],
     speed: f64,
@@ -71,14 +79,15 @@ pub struct SimulatedMachine {
     arm: f64,
 }
 
-/// Most rounds of two points of the law, and the echo of a law from which on it is bracketed.
+/// Most rounds of two points of a law, and its echo from which on it is bracketed.
 const ROUNDS: usize = 6;
 const ECHOES: f64 = 0.3;
 /// Share of the torque within which it is found, and share by which a law's echo bends over the last move.
 const EXACT: f64 = 1e-9;
 const BENDS: f64 = 0.01;
-/// Steps of the secant at most; every third halves the bracket.
-const SECANTS: usize = 90;
+/// Share of the torque within which it is found in a bracket, and half the bracket where a law does not resist, over that torque.
+const CLOSE: f64 = 1e-10;
+const WIDE: f64 = 4.0;
 /// Farthest that arm and stiffest law swing within one step (rad), and most steps of a sample: errors go with the square of it.
 const SWING: f64 = 0.2;
 const MOST_STEPS: usize = 16;
@@ -167,11 +176,6 @@ impl SimulatedMachine {
         self
     }
 
-    /// The free motion at a sample.
-    fn free_motions(&self, k: usize) -> f64 {
-        self.free.get(k).copied().unwrap_or(0.0)
-    }
-
     /// A machine with these effects; `scene` says what the laws need to know of it.
     pub fn new(plant: &Plant, effects: &[&LawSetting], scene: &MotionScene) -> Result<SimulatedMachine, LtiError> {
         let t = scene.sample_time_s;
@@ -196,6 +200,7 @@ impl SimulatedMachine {
         let history = vec![0.0; delayed.whole_delay_samples() + 2];
         Ok(SimulatedMachine {
             reach: reach(&direct),
+            per_two_steps: (2.0 * direct.sample_time_s()).recip(),
             path: [0.0; 2],
             speed: 0.0,
             held: pushed.clone(),
@@ -229,7 +234,7 @@ impl SimulatedMachine {
     pub fn measure(&mut self, spindle_rad: f64, temperature: f64) -> f64 {
         let t = self.delayed.sample_time_s();
         let torqued = if self.torque.is_empty() { 0.0 } else { self.torqued.position() };
-        let x = self.origin + self.pushed.position() + torqued + self.free_motions(self.k);
+        let x = self.origin + self.pushed.position() + torqued + self.free.get(self.k).unwrap_or(&0.0);
         self.x = [x, self.x[0], self.x[1]];
         // Second-order backward difference.
         let v = (3.0 * self.x[0] - 4.0 * self.x[1] + self.x[2]) / (2.0 * t);
@@ -305,7 +310,8 @@ impl SimulatedMachine {
         for j in 0..steps {
             let share = (j + 1) as f64 / steps as f64;
             let answer = self.steps_between.get(j).map_or(self.pushed.position(), |at| self.held.between(at));
-            let (before, after) = (self.free_motions(self.k), self.free_motions(self.k + 1));
+            let free = |k: usize| self.free.get(k).copied().unwrap_or(0.0);
+            let (before, after) = (free(self.k), free(self.k + 1));
             let carried = self.origin + answer + before + share * (after - before);
             let (torque, echo) = self.solve(&from, carried);
             (self.w, self.echo) = ([torque, self.w[0]], echo);
@@ -334,7 +340,7 @@ impl SimulatedMachine {
 
     /// The speed there: second-order backward difference.
     fn speed_at(&self, x: f64) -> f64 {
-        (3.0 * x - 4.0 * self.path[0] + self.path[1]) / (2.0 * self.direct.sample_time_s())
+        (3.0 * x - 4.0 * self.path[0] + self.path[1]) * self.per_two_steps
     }
 
     /// The mean torque over a step that leads to `carried` without it, and the law's echo there.
@@ -349,7 +355,8 @@ impl SimulatedMachine {
         let near = |by: f64, w: f64| by.abs() <= EXACT * w.abs();
         // Torque and echo go on as they went; a straight law is solved by two points of it.
         let (mut w, mut echo) = (2.0 * self.w[0] - self.w[1], self.echo);
-        for _ in 0..ROUNDS {
+        let rounds = if echo.abs() < ECHOES { ROUNDS } else { 0 };
+        for _ in 0..rounds {
             let first = law(w);
             if near(first - w, first) {
                 return (first, echo);
@@ -361,40 +368,32 @@ impl SimulatedMachine {
             }
             echo = (second - first) / (next - w);
             if echo.is_nan() || echo.abs() >= ECHOES {
-                w = second;
-                break;
+                return self.bracketed(law, second, echo);
             }
             w = next + (second - next) / (1.0 - echo);
             if near(BENDS * (w - next), w) {
                 return (w, echo);
             }
         }
-        (self.bracketed(law, w), 0.0)
+        self.bracketed(law, w, echo)
     }
 
-    /// The same where arm and law answer one another too strongly, or the law has a kink there: by a bracket around the root.
-    fn bracketed(&self, law: impl Fn(f64) -> f64, w: f64) -> f64 {
-        // w - law(w) rises with w for every law that resists motion: bracket its root and close in.
-        let off = |w: f64| w - law(w);
-        let size = w.abs().max(law(0.0).abs()).max(f64::MIN_POSITIVE);
-        let (mut low, mut high) = (-4.0 * size, 4.0 * size);
-        let (mut under, mut over) = (off(low), off(high));
-        if !(under < 0.0 && over > 0.0) {
-            return w;
+    /// The same where arm and law answer one another too strongly, or the law has a kink there: by a bracket around the root. The echo is that of
+    /// its ends.
+    fn bracketed(&self, law: impl Fn(f64) -> f64, w: f64, echo: f64) -> (f64, f64) {
+        let near = w - law(w);
+        let size = w.abs().max(near.abs()).max(f64::MIN_POSITIVE);
+        let off = |w: f64| Some(w - law(w)).filter(|o| o.is_nan() || o.abs() > CLOSE * size).unwrap_or(0.0);
+        if near.abs() <= CLOSE * size {
+            return (w, echo);
         }
-        for i in 0..SECANTS {
-            // Laws have kinks, on which a secant may stand still: every third step halves.
-            let middle = if i % 3 == 2 { 0.5 * (low + high) } else { (low * over - high * under) / (over - under) };
-            let here = off(middle);
-            if here.abs() <= 1e-10 * size || high - low <= 1e-10 * size {
-                return middle;
-            }
-            if here > 0.0 {
-                (high, over) = (middle, here);
-            } else {
-                (low, under) = (middle, here);
-            }
-        }
-        0.5 * (low + high)
+        // w - law(w) rises with w for every law that resists motion, and at least as fast as w: from any place its own height leads past the root.
+        let ends = |a: f64, b: f64| [a.min(b), a.max(b)].map(|w| (w, off(w)));
+        let tight = ends(w, w - near);
+        let echo = 1.0 - (tight[1].1 - tight[0].1) / near.abs();
+        let holds = |[low, high]: &[(f64, f64); 2]| low.1 <= 0.0 && high.1 >= 0.0;
+        let wide = || Some(ends(-WIDE * size, WIDE * size)).filter(holds);
+        let Some([(low, under), (high, over)]) = Some(tight).filter(holds).or_else(wide) else { return (w, 0.0) };
+        (bracketed_root(off, low, under, high, over, CLOSE * size), echo)
     }
 }

@@ -5,24 +5,24 @@
 //! The curve is z = 1 - (1 + m d/x)^(-1/m), the survival of a generalised Pareto law of yield lengths (Pickands 1975), cut off at a
 //! break-away length where one is given.
 
+use super::sliders::Sliders;
+
 /// Elements of a row: the curve's kinks stay below half a per cent of the level where its tail is short.
 const ELEMENTS: usize = 16;
 
 /// Share of the level that no element holds any more at the last node of a curve that nothing cuts off.
 const ELASTIC: f64 = 0.0025;
 
-/// A row in motion.
+/// A loading curve of nodes, over its sliding level.
 pub(super) struct MaxwellSlip {
-    /// Yield lengths (position_unit).
-    yields: [f64; ELEMENTS],
-    /// Stiffness, so that all elements sliding make 1 (1/position_unit).
-    stiffness: [f64; ELEMENTS],
-    /// Stretch of each spring (position_unit).
-    stretch: [f64; ELEMENTS],
+    /// Ways (position_unit), from 0 on.
+    at: Vec<f64>,
+    /// Levels there.
+    level: Vec<f64>,
 }
 
 impl MaxwellSlip {
-    /// At rest; `length` (position_unit) is the sliding level over the first stiffness, m = shape/2 - 1.
+    /// The nodes; `length` (position_unit) is the sliding level over the first stiffness, m = shape/2 - 1.
     pub fn of(shape: f64, length: f64, break_away_length: Option<f64>) -> MaxwellSlip {
         let tail = 0.5 * shape - 1.0;
         let [length, left] = break_away_length.map_or([length, ELASTIC], |way| cut_off(length, way, tail));
@@ -30,55 +30,21 @@ impl MaxwellSlip {
         // the start, where short strokes see its first stiffness.
         let step = |i: usize| (i as f64 / ELEMENTS as f64).powf(1.5);
         let still = |i: usize| (1.0 - (1.0 - left.sqrt()) * step(i)).powi(2);
-        let node = |i: usize| loaded_to(still(i), tail) * length;
-        let level = |i: usize| (1.0 - still(i)) / (1.0 - left);
-        let slope = |i: usize| if i > ELEMENTS { 0.0 } else { (level(i) - level(i - 1)) / (node(i) - node(i - 1)) };
-        MaxwellSlip {
-            yields: std::array::from_fn(|i| node(i + 1)),
-            stiffness: std::array::from_fn(|i| slope(i + 1) - slope(i + 2)),
-            stretch: [0.0; ELEMENTS],
-        }
+        let at = (0..=ELEMENTS).map(|i| loaded_to(still(i), tail) * length).collect();
+        let level = (0..=ELEMENTS).map(|i| (1.0 - still(i)) / (1.0 - left)).collect();
+        MaxwellSlip { at, level }
+    }
+
+    /// At rest, in motion.
+    pub fn row(&self) -> Sliders {
+        Sliders::of(&self.at, &self.level)
     }
 
     /// Way after a rest (position_unit) behind which it holds this share of its level.
     pub fn way_to(&self, share: f64) -> f64 {
-        let held = |way: f64| self.yields.iter().zip(&self.stiffness).map(|(y, k)| k * y.min(way)).sum::<f64>();
-        let mut last = [0.0, 0.0];
-        for way in self.yields {
-            let level = held(way);
-            if level >= share {
-                return last[0] + (way - last[0]) * (share - last[1]) / (level - last[1]);
-            }
-            last = [way, level];
-        }
-        last[0]
-    }
-
-    /// What it holds, over its sliding level.
-    pub fn drag(&self) -> f64 {
-        self.level(&self.stretch)
-    }
-
-    /// The same after a way `dx` more.
-    pub fn drag_after(&self, dx: f64) -> f64 {
-        self.level(&self.moved(dx))
-    }
-
-    /// Goes the way `dx`.
-    pub fn go(&mut self, dx: f64) {
-        self.stretch = self.moved(dx);
-    }
-
-    fn level(&self, stretch: &[f64; ELEMENTS]) -> f64 {
-        stretch.iter().zip(&self.stiffness).map(|(s, k)| s * k).sum()
-    }
-
-    fn moved(&self, dx: f64) -> [f64; ELEMENTS] {
-        let mut next = self.stretch;
-        for (s, y) in next.iter_mut().zip(&self.yields) {
-            *s = (*s + dx).max(-y).min(*y);
-        }
-        next
+        let i = self.level.partition_point(|l| *l < share).clamp(1, ELEMENTS);
+        let (at, level) = (&self.at[i - 1..=i], &self.level[i - 1..=i]);
+        at[0] + (at[1] - at[0]) * (share - level[0]) / (level[1] - level[0])
     }
 }
 

@@ -15,6 +15,7 @@ use super::key::{Key, Measure, Prior, ScanEnd, Takes};
 use super::maxwell_slip::MaxwellSlip;
 use super::parameter::{Parameter, Unit};
 use super::sample::{MotionScene, Sample, logarithmic};
+use super::sliders::Sliders;
 
 /// The bearing. Its strength is the sliding level.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,13 +131,13 @@ impl Law for Dahl {
 }
 
 struct Row {
-    row: MaxwellSlip,
+    row: Sliders,
     bristle_time_s: f64,
 }
 
 impl Law for Row {
     fn columns(&self, from: &Sample, to: &Sample, out: &mut [f64]) {
-        let z = [self.row.drag(), self.row.drag_after(to.x - from.x)];
+        let z = [self.row.held(), self.row.held_after(to.x - from.x)];
         out[0] = damped(-0.5 * (z[0] + z[1]), self.bristle_time_s, z, from, to);
     }
 
@@ -267,7 +268,7 @@ impl Parametric for PivotFriction {
         match self.loading {
             Loading::Dahl => Box::new(Dahl { length, bristle_time_s, z: 0.0 }),
             Loading::MaxwellSlip { shape, break_away_length } => {
-                let row = MaxwellSlip::of(shape.clamp(SHAPES[0], SHAPES[1]), length, break_away_length);
+                let row = MaxwellSlip::of(shape.clamp(SHAPES[0], SHAPES[1]), length, break_away_length).row();
                 Box::new(Row { row, bristle_time_s })
             }
         }

@@ -8,7 +8,7 @@ use crate::recording::Role;
 
 /// Samples to fit from which records are cut, and to which they are cut together; shortest excerpt.
 const LONG: usize = 100_000;
-const TOGETHER: usize = 30_000;
+const TOGETHER: usize = 15_000;
 const SHORTEST: usize = 4096;
 /// Share of the strongest stretch's motion at which an earlier one is as good.
 const AS_GOOD: f64 = 0.8;

@@ -12,6 +12,7 @@ pub(super) mod repeat_difference;
 pub(super) mod run;
 pub(super) mod slip;
 pub(super) mod stacked_records;
+pub(super) mod thinned;
 pub(super) mod time_shift;
 pub(super) mod turning_points;
 pub(super) mod wrapped;

@@ -166,7 +166,7 @@ impl<'a> Begun<'a> {
             let there = self.simulated(free.iter().zip(d).map(|(f, d)| f + step * d).collect())?;
             Ok(here.iter().zip(&there).map(|(a, b)| (a - b) / step).collect())
         };
-        let felt = self.open[..self.resisted].iter().map(one).collect::<Result<Vec<_>, LtiError>>()?;
+        let felt = self.open[..self.resisted].par_iter().map(one).collect::<Result<Vec<_>, LtiError>>()?;
         Ok([felt, self.linear[self.resisted..].to_vec()].concat())
     }
 

@@ -9,7 +9,8 @@ use crate::diagnose::data::linear_form::body_numbers;
 use crate::diagnose::data::run::Run;
 use crate::lti::{DiscretePlant, Plant};
 use crate::physics::Sample;
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 /// A smoothed record.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,6 +58,8 @@ pub fn apart(mean: &[Sample], input: &[f64], plant: &DiscretePlant) -> Vec<Sampl
 
 /// Samples of a record that tell its start.
 const TELLS: usize = 8192;
+/// Intensities of the torque's walk that are tried.
+const WALKS: u32 = 14;
 
 /// The smoother of one machine.
 #[derive(Clone, Debug)]
@@ -88,12 +91,9 @@ impl Smoother {
         let pushes: Vec<Vec<f64>> = runs.iter().zip(known).map(|(r, w)| pushed(sampled, r, w)).collect();
         let largest = runs.iter().flat_map(|r| &r.input).fold(0.0f64, |m, u| m.max(u.abs())).max(1e-12);
         let sensor = sensor_rms.powi(2).max(1e-24);
-        let mut best: Option<(f64, Smoother)> = None;
-        for j in 0..14 {
+        let of_walk = |j: u32| {
             // From a millionth of the largest command per sample to all of it.
-            let walk = largest * 10f64.powf(-6.0 + 6.0 * f64::from(j) / 13.0);
-            let mut q = SMatrix::<f64, 3, 3>::zeros();
-            q[(2, 2)] = walk * walk;
+            let walk = largest * 10f64.powf(-6.0 + 6.0 * f64::from(j) / f64::from(WALKS - 1));
             // The walk is spread over the interval: its exact covariance for a double integrator is close enough here, where
             // only the filter's bandwidth matters.
             let noise = Matrix3::from_fn(|r, s| {
@@ -101,11 +101,11 @@ impl Smoother {
                 g[r] * g[s] * walk * walk
             });
             let smoother = Smoother { steady: steady(&step, &noise, sensor), step, push };
-            let cost = runs.iter().zip(&pushes).map(|(r, i)| smoother.cost(&r.position, i)).sum();
-            if best.as_ref().is_none_or(|(c, _)| cost < *c) {
-                best = Some((cost, smoother));
-            }
-        }
+            let cost: f64 = runs.iter().zip(&pushes).map(|(r, i)| smoother.cost(&r.position, i)).sum();
+            (cost, smoother)
+        };
+        let all: Vec<(f64, Smoother)> = (0..WALKS).into_par_iter().map(of_walk).collect();
+        let best = all.into_iter().reduce(|best, other| if other.0 < best.0 { other } else { best });
         best.map(|b| b.1).unwrap_or_else(|| Smoother {
             steady: steady(&step, &Matrix3::identity(), sensor),
             step,

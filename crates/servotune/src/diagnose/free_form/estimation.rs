@@ -4,8 +4,8 @@
 //! In: the diagnosis data, linear parameters to set out from. Out: the curve in its plain form with its errors, and how well it foretells.
 //! Spec: `specs/mismatch.md`, "Curves without a name".
 
+use super::foretelling::{Foretelling, Judged, begun, best_of, better, finished, foretold};
 use super::gauge::{Plain, plain};
-use super::left_out::LeftOut;
 use super::shape::Shape;
 use super::stretches::Stretches;
 use super::trial::Trial;
@@ -16,24 +16,8 @@ use crate::diagnose::rules::{BALANCES, BALANCES_NOT, CURVE_CLEARLY, CURVE_LAG, F
 use crate::lti::Plant;
 use crate::numeric::spline::Spline;
 use crate::physics::{CurvePort, Knots};
-use nalgebra::DMatrix;
+use rayon::prelude::*;
 use std::f64::consts::LN_2;
-
-/// A shape that was fitted, and how it foretells what it was not fitted to.
-#[derive(Clone)]
-pub(in crate::diagnose) struct Foretelling<'a> {
-    pub trial: Trial<'a>,
-    /// Mean square of the parts left out.
-    pub left_out: f64,
-    covariance: DMatrix<f64>,
-}
-
-impl Foretelling<'_> {
-    /// Standard error of one number.
-    pub fn spread(&self, i: usize) -> f64 {
-        self.covariance[(i, i)].max(0.0).sqrt()
-    }
-}
 
 /// A plant and a curve that balance the torques along recorded motion: from where a fit by simulation sets out.
 #[derive(Clone, Debug)]
@@ -81,8 +65,6 @@ pub(in crate::diagnose) struct Estimated<'a> {
     pub tried: Vec<(CurvePort, f64)>,
 }
 
-/// Times that the smoothness is chosen anew.
-const CHOICES: usize = 2;
 /// Times that the knots of the best curve are doubled.
 const FINER: usize = 2;
 /// Time constant from which a lag sets out (samples).
@@ -92,47 +74,14 @@ const LAG: f64 = 3.0;
 const LOWEST: f64 = 0.005;
 const EDGE: f64 = 0.03;
 
-/// Fits a trial, its smoothness chosen by what is left out.
-fn foretold<'a>(mut trial: Trial<'a>) -> Option<Foretelling<'a>> {
-    let curved = matches!(trial.shape, Shape::Curve(..));
-    let rough = trial.shape.roughness();
-    let judged = |trial: &mut Trial<'a>| {
-        let (r, j) = trial.slopes();
-        let sound = r.iter().chain(j.iter()).all(|v| v.is_finite());
-        sound.then(|| (LeftOut::new(&trial.stretches.blocks, &r, &j, &trial.numbers(), &rough), r, j))
-    };
-    if curved {
-        for _ in 0..CHOICES {
-            trial.smoothness = judged(&mut trial)?.0.best_smoothness();
-            trial.descend();
-        }
-    } else {
-        trial.descend();
-    }
-    let (left_out, r, j) = judged(&mut trial)?;
-    if curved {
-        trial.smoothness = left_out.best_smoothness();
-    }
-    let covariance = left_out.covariance(&r, &j, trial.smoothness);
-    let left_out = left_out.error(trial.smoothness) / trial.stretches.total().max(1) as f64;
-    left_out.is_finite().then_some(Foretelling { trial, left_out, covariance })
-}
-
-fn better<'a>(a: Option<Foretelling<'a>>, b: Option<Foretelling<'a>>) -> Option<Foretelling<'a>> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(if b.left_out < a.left_out { b } else { a }),
-        (a, b) => a.or(b),
-    }
-}
-
-/// The best fit of a shape from several linear parameters.
+/// A shape beside several linear parameters.
 fn from_each<'a>(
     data: &'a DiagnosisData,
     stretches: &'a Stretches<'a>,
     starts: &[Vec<f64>],
     shape: &Shape,
-) -> Option<Foretelling<'a>> {
-    starts.iter().map(|p| foretold(Trial::new(data, stretches, p, shape.clone()))).fold(None, better)
+) -> Vec<Trial<'a>> {
+    starts.iter().map(|p| Trial::new(data, stretches, p, shape.clone())).collect()
 }
 
 /// The same with a lag of the amplifier in front, where that foretells clearly better.
@@ -207,9 +156,9 @@ fn readings<'a>(data: &'a DiagnosisData, stretches: &'a Stretches<'a>, starts: &
         let lags = [None, Some(LAG * data.scene.sample_time_s)];
         let all = starts.iter().flat_map(|p| lags.map(|lag_s| (p, lag_s)));
         let one = |(p, lag_s): (&Vec<f64>, Option<f64>)| {
-            foretold(Trial::new(data, stretches, p, Shape::Linear).read_by(reading.clone()).lagged(lag_s))
+            Trial::new(data, stretches, p, Shape::Linear).read_by(reading.clone()).lagged(lag_s)
         };
-        all.map(one).fold(None, better)
+        best_of(all.map(one).collect())
     };
     let fold = below.then(|| fitted(&other_gains(data, starts), Shape::Fold([low, low])));
     let limits = (below || above).then(|| fitted(starts, Shape::Limits([low, high])));
@@ -224,7 +173,8 @@ fn sensor<'a>(
     readings: &[Foretelling<'a>],
 ) -> Option<Foretelling<'a>> {
     let port = CurvePort::SensorOverPosition;
-    let straight = Shape::knots(data, port).and_then(|at| from_each(data, stretches, starts, &Shape::idle(port, at)));
+    let straight =
+        Shape::knots(data, port).and_then(|at| best_of(from_each(data, stretches, starts, &Shape::idle(port, at))));
     let top = data.scene.centre + 0.5 * range(data);
     let bent = readings.iter().filter_map(|reading| {
         let (at, value): (Vec<f64>, Vec<f64>) = match reading.trial.reading {
@@ -270,38 +220,20 @@ pub(in crate::diagnose) fn estimated<'a>(
     progress: &mut dyn FnMut(&str),
 ) -> Option<Estimated<'a>> {
     progress("a curve without a name: the linear plant by simulation");
-    let linear = with_lag(from_each(data, ground, starts, &Shape::Linear)?);
+    let linear = with_lag(best_of(from_each(data, ground, starts, &Shape::Linear))?);
     // What acts may have bent the refit: the given plant is another start.
     let mut from = vec![linear.trial.p.clone()];
     from.extend(starts.first().filter(|p| **p != from[0]).cloned());
-    let (mut best, mut tried) = (None, Vec::new());
-    let mut taken = |port: CurvePort, found: Option<Foretelling<'a>>| {
-        tried.extend(found.as_ref().map(|f| (port, f.left_out)));
-        best = better(best.take(), found);
-    };
-    let later = [CurvePort::SensorOverPosition, CurvePort::TorqueOverMotion];
-    for port in CurvePort::ALL.into_iter().filter(|p| !later.contains(p)) {
-        let [name, argument] = port.names();
-        progress(&format!("a curve without a name: {name} over {argument}"));
-        // The balance of torques knows nothing of the given plant, which what acts may have bent.
-        let balanced = curves.iter().find(|c| c.shape.port() == Some(port));
-        let share = balanced.map_or(1.0, |c| c.share);
-        // Where one port balances well, one that does not is not it; where this one does, its curve is the start.
-        if share > BALANCES_NOT && curves.iter().any(|c| c.share < BALANCES) {
-            continue;
-        }
-        let idle = Shape::knots(data, port).filter(|_| share > BALANCES);
-        let idle = idle.and_then(|at| from_each(data, ground, &from, &Shape::idle(port, at)));
-        let balanced = balanced.and_then(|c| from_balance(data, ground, c, &from));
-        taken(port, better(idle, balanced));
-    }
+    progress("a curve without a name: at every port of torque and amplifier");
+    let mut found = at_ports(data, ground, curves, &from);
     let mut read = Vec::new();
     if let Some(one_place) = one_place {
         progress("a curve without a name: sensor over position");
         read = readings(data, one_place, starts);
-        taken(CurvePort::SensorOverPosition, sensor(data, one_place, &from, &read));
+        found.extend(sensor(data, one_place, &from, &read));
     }
-    let mut curve = finer(data, ground, best?);
+    let (best, mut tried) = among(found);
+    let mut curve = finer(data, ground, best?.further()?);
     progress("a curve without a name: torque over position and velocity");
     if let Some(found) = surface(data, ground, curves, &from) {
         tried.push((CurvePort::TorqueOverMotion, found.left_out));
@@ -332,13 +264,45 @@ pub(in crate::diagnose) fn estimated<'a>(
     Some(Estimated { linear, curve, plain, reading, tried })
 }
 
-/// The fit of a shape from the curve of a balance, with the plant beside which it simulates best: its own, or one of some others.
+/// The best curve at each port of torque and amplifier that may be the one.
+fn at_ports<'a>(
+    data: &'a DiagnosisData,
+    ground: &'a Stretches<'a>,
+    curves: &[Curved],
+    from: &[Vec<f64>],
+) -> Vec<Foretelling<'a>> {
+    let one = |port: CurvePort| {
+        // The balance of torques knows nothing of the given plant, which what acts may have bent.
+        let balanced = curves.iter().find(|c| c.shape.port() == Some(port));
+        let share = balanced.map_or(1.0, |c| c.share);
+        // Where one port balances well, one that does not is not it; where this one does, its curve is the start.
+        if share > BALANCES_NOT && curves.iter().any(|c| c.share < BALANCES) {
+            return Vec::new();
+        }
+        let idle = Shape::knots(data, port).filter(|_| share > BALANCES);
+        let mut trials = idle.map_or_else(Vec::new, |at| from_each(data, ground, from, &Shape::idle(port, at)));
+        trials.extend(balanced.and_then(|c| from_balance(data, ground, c, from)));
+        begun(trials)
+    };
+    let later = [CurvePort::SensorOverPosition, CurvePort::TorqueOverMotion];
+    let ports: Vec<CurvePort> = CurvePort::ALL.into_iter().filter(|p| !later.contains(p)).collect();
+    let all: Vec<Vec<Judged>> = ports.into_par_iter().map(one).collect();
+    finished(all.into_iter().flatten().collect())
+}
+
+/// The best of some curves, and how each port foretells.
+fn among(all: Vec<Foretelling>) -> (Option<Foretelling>, Vec<(CurvePort, f64)>) {
+    let tried = all.iter().filter_map(|f| Some((f.trial.shape.port()?, f.left_out))).collect();
+    (all.into_iter().map(Some).fold(None, better), tried)
+}
+
+/// A trial of the curve of a balance, with the plant beside which it simulates best: its own, or one of some others.
 fn from_balance<'a>(
     data: &'a DiagnosisData,
     ground: &'a Stretches<'a>,
     curve: &Curved,
     others: &[Vec<f64>],
-) -> Option<Foretelling<'a>> {
+) -> Option<Trial<'a>> {
     let own = data.form.numbers_of(&curve.plant);
     let beside = |p: &Vec<f64>| {
         let shape = curve.beside(&data.form.plant(p))?;
@@ -347,7 +311,7 @@ fn from_balance<'a>(
         left.is_finite().then_some((left, trial))
     };
     let best = own.iter().chain(others).filter_map(beside).min_by(|a, b| a.0.total_cmp(&b.0))?;
-    foretold(best.1)
+    Some(best.1)
 }
 
 /// A torque over position and velocity, where the balance foretells clearly better with it than with any curve over one argument.
@@ -361,7 +325,7 @@ fn surface<'a>(
         curves.iter().partition(|c| c.shape.port() == Some(CurvePort::TorqueOverMotion));
     let least = one.iter().map(|c| c.share).fold(1.0, f64::min);
     let found = both.first().filter(|c| c.share < CURVE_CLEARLY * least)?;
-    from_balance(data, ground, found, starts)
+    foretold(from_balance(data, ground, found, starts)?)
 }
 
 /// The best curve at another port beside a reading that folds or ends at limits.
@@ -370,18 +334,16 @@ fn beside<'a>(
     one_place: &'a Stretches<'a>,
 ) -> Option<(Foretelling<'a>, Vec<(CurvePort, f64)>)> {
     let data = reading.trial.data;
-    let (mut best, mut tried) = (None, Vec::new());
-    for port in CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition) {
-        let Some(at) = Shape::knots(data, port) else { continue };
+    let one = |port: CurvePort| {
         // What is read is not where the arm is: positions and speeds may be of either sign.
+        let at = Shape::knots(data, port)?;
         let at = if port == CurvePort::AmplifierOverCommand { at } else { both_sides(port, &at) };
         let from = reading.trial.clone();
-        let trial =
-            Trial::new(data, one_place, &from.p, Shape::idle(port, at)).read_by(from.reading).lagged(from.lag_s);
-        let found = foretold(trial);
-        tried.extend(found.as_ref().map(|f| (port, f.left_out)));
-        best = better(best, found);
-    }
+        foretold(Trial::new(data, one_place, &from.p, Shape::idle(port, at)).read_by(from.reading).lagged(from.lag_s))
+    };
+    let ports: Vec<CurvePort> = CurvePort::ALL.into_iter().filter(|p| *p != CurvePort::SensorOverPosition).collect();
+    let all: Vec<Option<Foretelling>> = ports.into_par_iter().map(one).collect();
+    let (best, tried) = among(all.into_iter().flatten().collect());
     best.map(|b| (b, tried))
 }
 

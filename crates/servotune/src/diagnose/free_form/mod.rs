@@ -2,6 +2,7 @@
 
 pub(super) mod curve;
 pub(super) mod estimation;
+pub(super) mod foretelling;
 pub(super) mod gauge;
 pub(super) mod left_out;
 pub(super) mod likeness;

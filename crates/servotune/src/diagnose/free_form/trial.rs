@@ -10,7 +10,7 @@ use crate::diagnose::data::linear_form::FreeParameter;
 use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::simulated_model::SimulatedModel;
-use crate::diagnose::fit::simulation::{Begun, Felt, error_from};
+use crate::diagnose::fit::simulation::{Begun, Felt, error_from, size};
 use crate::lti::{Body, Plant};
 use crate::numeric::levenberg::{LevenbergSettings, Limit, Residuals, Workspace, minimise};
 use crate::physics::{CurvePort, LawSetting};
@@ -20,8 +20,9 @@ use std::sync::Arc;
 
 /// Most Jacobians of a fit, and the relative fall of the error at which it ends.
 const ITERATIONS: usize = 6;
-/// The same of a fit of few numbers.
+/// The same of a fit of few numbers, and of both where they are only begun.
 const OF_FEW: usize = 25;
+const BEGUN: [usize; 2] = [2, 12];
 const TOLERANCE: f64 = 1e-5;
 /// Step in a linear parameter and in the logarithm of the lag; the same in a number of the shape, over its size.
 const STEP: f64 = 1e-4;
@@ -199,22 +200,26 @@ impl<'a> Trial<'a> {
 
     /// Finds the starts at `x` anew: from rest, from the last ones, and from every place that gives the first reading.
     fn settle(&mut self, x: &[f64]) {
+        self.settle_at(x, self.reads());
+    }
+
+    /// The same, where starts are known from them alone unless every place is asked for.
+    fn settle_at(&mut self, x: &[f64], every_place: bool) {
         let reads = self.reads();
         let found = self.each(x, |i, run, judged| {
             let begun = Begun::new(judged, run, self.stretches.closed, None).ok()?;
             let last = self.starts.get(i).map(|s| s.free.clone());
             // Where the reading does not hide it, the arm stands where it was found to stand.
-            let known = last.is_some() && !reads;
-            let places = if known { Vec::new() } else { start_places(judged, run, reads) };
+            let places = if last.is_some() && !every_place { Vec::new() } else { start_places(judged, run, reads) };
             let free = places.into_iter().map(|x| begun.moved(x));
             let unresisted = begun.unresisted_of(|f| seen(f, reads));
             let mut best: Option<(f64, Start)> = None;
             for free in free.chain(last) {
                 let Ok(near) = begun.found(free, &unresisted, 1) else { continue };
                 let Ok((started, felt)) = begun.better_of(near.free, ROUNDS, |f| seen(f, reads)) else { continue };
-                let size = crate::diagnose::fit::simulation::size(&started.error);
-                if size.is_finite() && best.as_ref().is_none_or(|b| size < b.0) {
-                    best = Some((size, Start { free: started.free, felt: Arc::new(felt) }));
+                let left = size(&started.error);
+                if left.is_finite() && best.as_ref().is_none_or(|b| left < b.0) {
+                    best = Some((left, Start { free: started.free, felt: Arc::new(felt) }));
                 }
             }
             best.map(|b| b.1)
@@ -246,26 +251,36 @@ impl<'a> Trial<'a> {
         size(&self.error(&x))
     }
 
-    /// Moves to the least error; gives its sum of squares, roughness aside.
-    pub fn descend(&mut self) -> f64 {
+    /// Whether its shape is a curve.
+    pub fn curved(&self) -> bool {
+        matches!(self.shape, Shape::Curve(..))
+    }
+
+    /// Moves to the least error.
+    pub fn descend(&mut self) {
+        self.descend_in(if self.curved() { ITERATIONS } else { OF_FEW });
+    }
+
+    /// Its first steps.
+    pub fn begin(&mut self) {
+        self.descend_in(BEGUN[usize::from(!self.curved())]);
+    }
+
+    fn descend_in(&mut self, iterations: usize) {
         let mut x = self.numbers();
         let before = self.clone();
         let rough = |t: &Self, x: &[f64]| size(&t.roughness(&x[t.shape_from()..]));
         self.settle(&x);
-        let first = size(&self.error(&x));
-        let least = first + rough(self, &x);
-        let iterations = if matches!(self.shape, Shape::Curve(..)) { ITERATIONS } else { OF_FEW };
+        let least = size(&self.error(&x)) + rough(self, &x);
         let settings = LevenbergSettings { iterations, tolerance: TOLERANCE };
         minimise(self, &mut x, &settings, &mut Workspace::default());
         self.settle(&x);
-        let last = size(&self.error(&x));
-        if last + rough(self, &x) < least {
+        if size(&self.error(&x)) + rough(self, &x) < least {
             self.take(&x);
-            return last;
+        } else {
+            *self = before;
+            self.settle(&self.numbers());
         }
-        *self = before;
-        self.settle(&self.numbers());
-        first
     }
 
     /// Residuals and slopes where the fit stands, by columns; roughness aside.
@@ -342,10 +357,6 @@ fn start_places(judged: &SimulatedModel, run: &Run, reads: bool) -> Vec<f64> {
     all
 }
 
-fn size(x: &[f64]) -> f64 {
-    crate::diagnose::fit::simulation::size(x)
-}
-
 impl Residuals for Trial<'_> {
     fn rows(&self) -> usize {
         self.stretches.total() + self.roughness(&self.shape.numbers()).len()
@@ -362,7 +373,8 @@ impl Residuals for Trial<'_> {
     }
 
     fn jacobian(&mut self, x: &[f64], j: &mut [f64]) {
-        self.settle(x);
+        // A step does not move the arm to another place that reads the same.
+        self.settle_at(x, false);
         let (rows, from) = (self.rows(), self.stretches.total());
         let r = self.error(x);
         let mut slopes = vec![0.0; from * self.cols()];

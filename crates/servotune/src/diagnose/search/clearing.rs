@@ -21,7 +21,8 @@ use crate::diagnose::rules::{
     CLEARED_ALONE, CLEARED_BETTER, CLEARED_BY_CURVE, CLEARED_DONE, CLEARED_FAR, CLEARED_FULLER, CLEARED_TELLS,
 };
 use crate::lti::Plant;
-use crate::physics::LawSetting;
+use crate::physics::{AnyLaw, LawSetting};
+use rayon::prelude::*;
 use std::cell::LazyCell;
 use std::ops::Deref;
 
@@ -134,7 +135,9 @@ impl Tried<'_> {
         if let Some(stands) = firsts.beside_given(&laws) {
             return Some(Cleared { given_stands: true, ..firsts.cleared(&stands) });
         }
-        let named = self.of_laws(&laws).into_iter().chain(self.filtered()).min_by(|a, b| a.left.total_cmp(&b.left));
+        let named = self.of_laws(&laws);
+        let behind_lag = if named.as_ref().is_some_and(|n| self.done(n.left)) { None } else { self.filtered() };
+        let named = named.into_iter().chain(behind_lag).min_by(|a, b| a.left.total_cmp(&b.left));
         let best = self.of_curves(&bent, named).map(|best| self.with_modes(best));
         let Some(best) = best.filter(|b| b.left < CLEARED_BETTER * CLEARED_BETTER * least) else { return off() };
         let best = self.alone(best);
@@ -243,7 +246,7 @@ impl Tried<'_> {
             let left = self.left(&ground, &model);
             left.is_finite().then_some((left, model))
         };
-        let mut tried: Vec<(f64, Model)> = laws.iter().filter_map(simulated).collect();
+        let mut tried: Vec<(f64, Model)> = laws.par_iter().filter_map(simulated).collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut seen: Vec<&'static str> = Vec::new();
         let mut best: Option<(f64, Model)> = None;
@@ -269,16 +272,18 @@ impl Tried<'_> {
             let left = self.left(&ground, &model);
             left.is_finite().then_some((left, ground, model))
         };
-        let mut tried: Vec<(f64, DiagnosisData, Model)> = laws.iter().filter_map(simulated).collect();
+        let mut tried: Vec<(f64, DiagnosisData, Model)> = laws.par_iter().filter_map(simulated).collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut all: Vec<Fitted> = Vec::new();
-        for (left, ground, model) in tried.into_iter().take(FITTED) {
+        let fit = |(left, ground, model): (f64, DiagnosisData, Model)| {
             let fitted = self.fitted(&ground, &model).unwrap_or(model);
             let left = self.left(&ground, &fitted).min(left);
-            all.push(Fitted { left, ground, model: fitted, curve: false });
-            if self.done(left) {
-                break;
-            }
+            Fitted { left, ground, model: fitted, curve: false }
+        };
+        tried.truncate(FITTED);
+        let others = tried.split_off(1.min(tried.len()));
+        let mut all: Vec<Fitted> = tried.into_iter().map(fit).collect();
+        if all.iter().all(|f| !self.done(f.left)) {
+            all.par_extend(others.into_par_iter().map(fit));
         }
         let best = all.into_iter().min_by(|a, b| a.left.total_cmp(&b.left))?;
         Some(self.fuller(if self.done(best.left) { best } else { self.settled(best) }))
@@ -287,22 +292,20 @@ impl Tried<'_> {
     /// The fuller form of a fitted law, where that is clearly better: one thing more at a time, each best beside what stands already.
     fn fuller(&self, mut best: Fitted) -> Fitted {
         for _ in 0..FULLER {
-            let plain = best.model.clone();
+            let plain = &best.model;
             let Some(law) = plain.chosen.first().filter(|_| !self.done(best.left)) else { break };
-            let mut better = false;
-            for (full, range) in law.setting.law.fuller(&self.own.scene) {
+            let fit = |(full, range): (AnyLaw, Vec<[f64; 2]>)| {
                 let continuous = full.numbers().iter().map(Option::is_some).collect();
                 let setting = LawSetting::new(full, law.setting.strengths.clone());
                 let chosen = vec![SelectedEffect { setting, continuous, range, ..law.clone() }];
-                let Some(fitted) = self.fitted(&best.ground, &Model { chosen, ..plain.clone() }) else { continue };
-                let left = self.left(&best.ground, &fitted);
-                if left < CLEARED_FULLER * best.left {
-                    (best, better) = (Fitted { left, model: fitted, ..best }, true);
-                }
-            }
-            if !better {
-                break;
-            }
+                let fitted = self.fitted(&best.ground, &Model { chosen, ..plain.clone() })?;
+                Some((self.left(&best.ground, &fitted), fitted))
+            };
+            let all: Vec<(f64, Model)> =
+                law.setting.law.fuller(&self.own.scene).into_par_iter().filter_map(fit).collect();
+            let least = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((left, model)) = least.filter(|l| l.0 < CLEARED_FULLER * best.left) else { break };
+            best = Fitted { left, model, ..best };
             best = self.settled(best);
         }
         best

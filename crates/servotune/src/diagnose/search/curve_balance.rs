@@ -190,7 +190,7 @@ impl Balance<'_> {
         let arm = self.data.scene.arm_over_record();
         let mut sliders: Vec<Vec<f64>> = vec![Vec::with_capacity(self.total()); at.len() - 1];
         for part in &self.parts {
-            let mut row = Sliders::of(at);
+            let mut row = Sliders::of(at, at);
             let mut stretch = vec![vec![0.0; part.sharp.len()]; at.len() - 1];
             for k in 1..part.sharp.len() {
                 let dx = arm * (part.sharp[k].x - part.sharp[k - 1].x);
