@@ -251,21 +251,22 @@ impl Parametric for CoulombFriction {
 
     /// A film as bristles; these with Stribeck's rise, with damping. One after the other makes all.
     fn fuller(&self, scene: &MotionScene) -> Vec<(CoulombFriction, Vec<[f64; 2]>)> {
-        let [short, long] = lengths(scene);
-        let mut all: Vec<CoulombFriction> = Vec::new();
-        if matches!(self.turning, Turning::Creep { .. }) {
-            all.extend(logarithmic(short, long, BRISTLES).into_iter().map(|l| CoulombFriction::sticking(l, None)));
-        } else {
-            if self.stribeck.is_none() {
-                let [slow, fast] = RISES_FROM;
-                let rising = |share: f64| Stribeck { speed: share * scene.speed, rise: FIRST_RISE };
-                let each = logarithmic(slow, fast, RISING).into_iter().map(rising);
-                all.extend(each.map(|s| CoulombFriction { stribeck: Some(s), ..self.clone() }));
+        let ([short, long], [slow, fast]) = (lengths(scene), RISES_FROM);
+        let rising = |share: f64| {
+            let stribeck = Some(Stribeck { speed: share * scene.speed, rise: FIRST_RISE });
+            CoulombFriction { stribeck, ..self.clone() }
+        };
+        let damped = || CoulombFriction { bristle_time_s: Some(scene.sample_time_s), ..self.clone() };
+        let all: Vec<CoulombFriction> = match (self.turning, self.stribeck) {
+            (Turning::Creep { .. }, _) => {
+                logarithmic(short, long, BRISTLES).into_iter().map(|l| CoulombFriction::sticking(l, None)).collect()
             }
-            if self.bristle_time_s.is_none() {
-                all.push(CoulombFriction { bristle_time_s: Some(scene.sample_time_s), ..self.clone() });
+            (Turning::Length { .. }, rises) => {
+                let rises =
+                    rises.map_or_else(|| logarithmic(slow, fast, RISING), |_| Vec::new()).into_iter().map(rising);
+                rises.chain(self.bristle_time_s.is_none().then(damped)).collect()
             }
-        }
+        };
         let of = |range: [f64; 2], by: f64| range.map(|v| by * v);
         let ranges = vec![[short, long], of(RISES_WITHIN, scene.speed), RISES, of(BRISTLE_TIMES, scene.sample_time_s)];
         all.into_iter().map(|law| (law, ranges.clone())).collect()

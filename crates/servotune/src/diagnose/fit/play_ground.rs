@@ -34,7 +34,7 @@ const SPREAD: f64 = 1e-2;
 /// end of them, by a tenth, is no play that these records show: a slow motion in a wide gap follows any drift.
 const RATES: [f64; 2] = [0.01, 0.45];
 const DAMPINGS: [f64; 2] = [1e-3, 0.5];
-const LOADS: [f64; 2] = [0.03, 0.6];
+pub(in crate::diagnose) const LOADS: [f64; 2] = [0.03, 0.6];
 const WIDEST: f64 = 5.0;
 /// Frequency of a rival from which it is a drift, over the sample rate, and how many of the grid.
 const DRIFT: f64 = 5e-4;
@@ -58,6 +58,18 @@ pub(in crate::diagnose) struct FittedPlay {
     pub side: Side,
     pub observer: PlayObserver,
     pub deviance: f64,
+}
+
+impl FittedPlay {
+    /// Share of the load, as the observer has it.
+    pub fn load(&self) -> f64 {
+        self.observer.drive / (1.0 + self.observer.drive)
+    }
+
+    /// Whether an encoder before the play tells no share of the load: it rests at the least, as where the linear plant holds what moves with it.
+    pub fn hides_load(&self) -> bool {
+        self.side == Side::Before && self.load() < LOADS[0] * AT_END
+    }
 }
 
 /// What some readings say of observers.
@@ -140,12 +152,10 @@ impl PlayGround {
     /// Whether a play's numbers rest at an end of their ranges.
     pub fn at_end(&self, play: &FittedPlay) -> bool {
         let o = &play.observer;
-        let load = o.drive / (1.0 + o.drive);
-        let before = play.side == Side::Before;
         o.contact_hz * self.sample_time_s < RATES[0] * AT_END
             || o.damping_ratio * AT_END > DAMPINGS[1]
             || o.gap * AT_END > WIDEST * self.rest
-            || before && (load < LOADS[0] * AT_END || load * AT_END > LOADS[1])
+            || play.side == Side::Before && play.load() * AT_END > LOADS[1]
     }
 
     /// A noise of the acceleration that moves a reading by a share of its noise within a sample.

@@ -45,6 +45,9 @@ rules! {
     PLAY_CLEARLY: f64 = 0.012, "per sample",
         "deviance of the fitted records under an observer of a play, below that of a resonance under the same observer, from which the play is named",
         "judgement: over the 8000 samples that are read, odds of e^48";
+    PLAY_UNDOUBTED: f64 = 0.5, "per sample",
+        "the same, from which a play is named though its load is too small to be told",
+        "judgement: two opened plays of the thirteenth sealed set have 2.3 and 4.8; what drifts has no such contact";
     PLAY_LEAST: f64 = 60.0, "twice log-likelihood",
         "the same over all samples",
         "judgement: odds of e^30";

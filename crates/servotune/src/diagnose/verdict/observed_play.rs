@@ -11,10 +11,12 @@ use crate::diagnose::data::run::Run;
 use crate::diagnose::fit::corrected_model::{Corrected, corrected};
 use crate::diagnose::fit::diagnosis_data::DiagnosisData;
 use crate::diagnose::fit::fitted_model::refit;
-use crate::diagnose::fit::play_ground::{FittedPlay, PlayGround, Side, readings};
+use crate::diagnose::fit::play_ground::{FittedPlay, LOADS, PlayGround, Side, readings};
 use crate::diagnose::fit::simulated_model::SimulatedModel;
 use crate::diagnose::fit::simulation::errors;
-use crate::diagnose::rules::{Consulted, PLAY_CLEARLY, PLAY_HELD_OUT, PLAY_LEAST, PLAY_TOUCHES, asked};
+use crate::diagnose::rules::{
+    Answer, Consulted, PLAY_CLEARLY, PLAY_HELD_OUT, PLAY_LEAST, PLAY_TOUCHES, PLAY_UNDOUBTED, asked,
+};
 use crate::lti::{PhysicsEntry, Plant};
 use crate::physics::backlash::{Backlash, Contact, FACTS};
 use crate::physics::{LawSetting, Parametric, PlayObserver, Port, Readings};
@@ -135,7 +137,10 @@ pub(in crate::diagnose) fn observed_play(
         }
     };
     let clear = asked!(gain, > PLAY_LEAST) & asked!(gain / samples, PLAY_CLEARLY: gain > PLAY_CLEARLY * samples);
-    let found = clear & crossed & agrees & (!own.at_end(play)).into();
+    // Numbers at an end follow any drift; a load that hides does so too, unless no resonance comes near.
+    let ends = Answer::from(!own.at_end(play));
+    let ends = if play.hides_load() { ends & asked!(gain / samples, > PLAY_UNDOUBTED) } else { ends };
+    let found = clear & crossed & agrees & ends;
     found.yes.then(|| ObservedPlay { consulted: found.consulted, ..told(data, &best, gain, touching) })
 }
 
@@ -144,7 +149,7 @@ fn law(play: &FittedPlay) -> (Backlash, f64) {
     let o = &play.observer;
     let (gap, load, read) = match play.side {
         Side::Before => {
-            let load = o.drive / (1.0 + o.drive);
+            let load = if play.hides_load() { LOAD } else { play.load() };
             (o.gap / load, load, load)
         }
         _ => (o.gap / (1.0 - LOAD), LOAD, LOAD - 1.0),
@@ -164,26 +169,29 @@ fn told(data: &DiagnosisData, best: &Found, gain: f64, touching: f64) -> Observe
         1.96 * f64::sqrt(squares).hypot(form)
     };
     let behind = best.play.side == Side::Behind;
+    let hidden = behind || best.play.hides_load();
     let parameters: BTreeMap<String, Estimate> = law
         .parameters(&[read], &data.scene)
         .into_iter()
         .map(|p| {
             let by = match p.name {
-                "gap" if behind => off(&[4], FORM[0]),
+                "gap" if hidden => off(&[4], FORM[0]),
                 "gap" => off(&[4, 5], FORM[0]),
                 "contact_hz" => off(&[0], FORM[1]),
                 "damping_ratio" => off(&[1], FORM[1]),
                 "encoder_behind" => 0.0,
-                _ => off(if behind { &[] } else { &[5] }, FORM[0]),
+                _ => off(if hidden { &[] } else { &[5] }, FORM[0]),
             };
             let [mut low, mut high] = [p.value * (-by).exp(), p.value * by.exp()];
-            if behind {
-                // What is read behind the play is the gap less the load's share of it, and nothing tells that share.
+            if hidden {
+                // What is read behind the play is the gap less the load's share of it, before it that share, and nothing tells the share.
+                let range = if behind { LOAD_RANGE } else { LOADS };
+                let [one, other] = range.map(|load| if behind { 1.0 - load } else { load });
                 let read = best.play.observer.gap;
                 [low, high] = match p.name {
-                    "gap" => [read * (-by).exp(), read / (1.0 - LOAD_RANGE[1]) * by.exp()],
-                    "load_share" => LOAD_RANGE,
-                    "drive_ratio" => LOAD_RANGE.map(|s| 1.0 / (1.0 - s)),
+                    "gap" => [read / one.max(other) * (-by).exp(), read / one.min(other) * by.exp()],
+                    "load_share" => range,
+                    "drive_ratio" => range.map(|s| 1.0 / (1.0 - s)),
                     _ => [low, high],
                 };
             }
