@@ -1,7 +1,7 @@
 //! Long records of a slow motion, every so many samples: a machine that moves at 1 Hz is known as well at 100 samples a second as at 1000.
 //!
 //! In: all runs of a case in open loop, and the plant. Out: how many samples become one; the runs so thinned. The command over each new sample is the
-//! mean of what was held over it: the same impulse on the arm. Positions are those recorded at the new samples.
+//! mean of what was held over it: the same impulse on the arm. Positions are read by a cubic through those around each new sample.
 
 use super::run::Run;
 use crate::lti::Plant;
@@ -14,8 +14,9 @@ use std::f64::consts::{PI, TAU};
 /// Samples to fit from which records are thinned, and to which they may be thinned together.
 const LONG: usize = 30_000;
 const TOGETHER: usize = 10_000;
-/// Fewest that are worth it.
+/// Fewest that are worth it, and shortest record (samples) that a spectrum and a thinned motion can be had of.
 const LEAST: f64 = 1.5;
+const SHORTEST: usize = 256;
 /// New samples to a period of the fastest motion or mode.
 const A_PERIOD: f64 = 5.0;
 /// Share of the motion's power, white noise aside, that may lie above the fastest motion; share of the command's that may be averaged away.
@@ -48,7 +49,7 @@ fn top(power: &[f64], share: f64) -> usize {
 pub(in crate::diagnose) fn thinning(runs: &[Run], plant: &Plant, sample_time_s: f64) -> Option<f64> {
     let fit = || runs.iter().filter(|r| r.role == Role::Fit);
     let fitted: usize = fit().map(Run::len).sum();
-    if fitted < LONG {
+    if fitted < LONG || runs.iter().any(|r| r.len() < SHORTEST) {
         return None;
     }
     let modes = plant.modes.iter().flat_map(|m| [m.pole_rad_s, m.zero_rad_s]).fold(0.0, f64::max) / TAU;
@@ -160,5 +161,8 @@ mod tests {
         let faster = of(&[1.0, 40.0], 100_000).unwrap();
         assert!((faster - 1000.0 / (A_PERIOD * 40.0)).abs() < 0.02, "{faster}");
         assert_eq!((of(&[1.0, 200.0], 100_000), of(&[1.0], 20_000)), (None, None));
+        // One long record beside a held-out one of three samples.
+        let long = Run { input: waves(&[1.0], 1000.0, 100_000), ..run_at(waves(&[1.0], 1000.0, 100_000)) };
+        assert_eq!(thinning(&[long, run_at(vec![0.0, 1.0, 0.0])], &plant, 1e-3), None);
     }
 }

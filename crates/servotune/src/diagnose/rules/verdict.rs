@@ -47,7 +47,8 @@ rules! {
         "judgement: over the 8000 samples that are read, odds of e^48";
     PLAY_UNDOUBTED: f64 = 0.5, "per sample",
         "the same, from which a play is named though its load is too small to be told",
-        "judgement: two opened plays of the thirteenth sealed set have 2.3 and 4.8; what drifts has no such contact";
+        "judgement: two opened plays of the thirteenth sealed set have 2.3 and 4.8; what drifts has no such contact",
+        "not counted: the rule is newer than the count";
     PLAY_LEAST: f64 = 60.0, "twice log-likelihood",
         "the same over all samples",
         "judgement: odds of e^30";
