@@ -85,6 +85,11 @@ impl Parametric for RepeatableRunout {
         vec![Some(&mut self.base_hz)]
     }
 
+    /// An order of the spindle is a whole number of turns: each is a thing of its own, and none is moved.
+    fn member(&self) -> usize {
+        self.base_hz.to_bits() as usize
+    }
+
     fn in_motion(&self, scene: &MotionScene) -> Box<dyn Law> {
         // A recorded angle may wrap at one turn: only whole orders may be taken from it.
         let ratio = scene.spindle_hz.map(|s| self.base_hz / s);

@@ -15,7 +15,7 @@ use std::f64::consts::{PI, TAU};
 const LONG: usize = 30_000;
 const TOGETHER: usize = 10_000;
 /// Fewest that are worth it, and shortest record (samples) that a spectrum and a thinned motion can be had of.
-const LEAST: f64 = 1.5;
+const LEAST: f64 = 3.0;
 const SHORTEST: usize = 256;
 /// New samples to a period of the fastest motion or mode.
 const A_PERIOD: f64 = 5.0;

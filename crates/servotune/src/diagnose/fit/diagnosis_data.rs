@@ -1,25 +1,20 @@
 //! Everything that a diagnosis works on, made in order: given plant, noise, filter, refit, motion.
 
-use super::equation_error_fit::{linear_error, simulation_error};
+use super::equation_error_fit::linear_error;
 use super::fit_inputs::Fit;
-use super::model::Model;
-use super::regressors::{Drive, drive, raw_columns};
 use super::selected_effect::SelectedEffect;
-use super::trajectory::{Smoother, Trajectory, acting, apart};
+use super::trajectory::{Smoother, Trajectory, apart};
 use crate::diagnose::data::checks::{Grid, quantum};
-use crate::diagnose::data::linear_form::{
-    LinearForm, NominalModel, Sampled, body_numbers, free_motions, free_scales, starts,
-};
+use crate::diagnose::data::linear_form::{LinearForm, NominalModel, Sampled, starts};
 use crate::diagnose::data::run::{Run, mean_run};
-use crate::diagnose::data::stacked_records::{NuisanceBasis, StackedRecords};
+use crate::diagnose::data::stacked_records::StackedRecords;
 use crate::diagnose::noise::lines::{Line, take_lines};
 use crate::diagnose::noise::repeats::{in_laps, noise_of, noise_series, values, weigh, without_start};
 use crate::diagnose::noise::whitening::{NoiseLevels, Whitener};
 use crate::diagnose::rules::{FAR_FROM_REPEATS, FAR_FROM_SENSOR, NO_FINER, ROUNDING_ALIKE};
 use crate::lti::{Body, LtiError, Plant};
-use crate::numeric::least_squares::Qr;
 use crate::numeric::statistics::rms;
-use crate::physics::{Entry, MotionScene, Port};
+use crate::physics::MotionScene;
 use crate::recording::Role;
 use std::f64::consts::TAU;
 
@@ -244,7 +239,7 @@ impl DiagnosisData {
     }
 
     /// The motion behind each mean run, with a known torque beside the nominal.
-    fn smooth(&mut self, nominal: &NominalModel, sampled: &Sampled, means: &[Run], known: &[Vec<f64>]) {
+    pub(super) fn smooth(&mut self, nominal: &NominalModel, sampled: &Sampled, means: &[Run], known: &[Vec<f64>]) {
         let spindle_hz = self.scene.spindle_hz.unwrap_or(0.0);
         let noise = self.levels.sensor_rms;
         let smoother = Smoother::of(&nominal.plant, &sampled.delayed, noise, means, known);
@@ -255,87 +250,9 @@ impl DiagnosisData {
         }
     }
 
-    /// The motion anew for a model that was found: what the sensor adds is taken out of the position, because laws act on where
-    /// the arm is and not on what the encoder says; and the torques of the model help the smoother.
-    pub fn corrected(mut self, p: &[f64], chosen: &[SelectedEffect]) -> DiagnosisData {
-        let nominal = self.form.nominal(p);
-        let Ok(sampled) = Sampled::of(&nominal.plant, self.scene.sample_time_s) else { return self };
-        let arm = nominal.arm_over_record();
-        let mut means = self.means.clone();
-        let mut known: Vec<Vec<f64>> = Vec::with_capacity(means.len());
-        for (i, run) in means.iter_mut().enumerate() {
-            let motion = &self.trajectories[i];
-            let mut torque: Vec<f64> =
-                motion.samples.iter().map(|s| arm * (nominal.spring * s.x + nominal.damper * s.v)).collect();
-            for c in chosen {
-                let facts = c.setting.facts();
-                let sensed = facts.entry == Entry::Position && matches!(facts.port, Port::Sensor | Port::Disk);
-                if !sensed && facts.entry == Entry::Position {
-                    continue;
-                }
-                let raw = raw_columns(&c.setting.law, &self.scene, motion);
-                for (column, s) in raw.iter().zip(c.own(i)) {
-                    // A command reaches the arm late, like the one it is added to.
-                    let late = (facts.entry == Entry::Command).then(|| acting(&sampled.delayed, column, 0.0));
-                    let column = late.as_ref().unwrap_or(column);
-                    if sensed {
-                        run.position.iter_mut().zip(column).for_each(|(y, v)| *y -= s * v);
-                    } else {
-                        torque.iter_mut().zip(column).for_each(|(w, v)| *w += s * v);
-                    }
-                }
-            }
-            known.push(torque);
-        }
-        self.smooth(&nominal, &sampled, &means, &known);
-        self
-    }
-
     /// Errors of the mean runs with each one's own start taken out.
     pub fn without_starts(&self, errors: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         values(&without_start(&errors.into_iter().enumerate().collect::<Vec<_>>(), &|n| self.starts(n), &|_| {}))
-    }
-
-    /// The error of a model on any run along its recorded motion, effects of each record's own left out.
-    fn raw_along(&self, run: &Run, model: &Model) -> Result<(NominalModel, Vec<f64>), LtiError> {
-        let nominal = self.form.nominal(&model.refitted.p);
-        let sampled = Sampled::of(&nominal.plant, self.scene.sample_time_s)?;
-        let alone = std::slice::from_ref(run);
-        let smoother = Smoother::of(&nominal.plant, &sampled.delayed, self.levels.sensor_rms, alone, &[Vec::new()]);
-        let motion = [smoother.smooth(run, &[], &sampled.delayed, self.scene.spindle_hz.unwrap_or(0.0))];
-        let lasting: Vec<&SelectedEffect> = model.chosen.iter().filter(|c| !c.setting.facts().per_record).collect();
-        let drives: Vec<Drive> = lasting.iter().map(|c| drive(&c.setting.law, &self.scene, &motion)).collect();
-        let parts: Vec<(&Drive, &[f64])> =
-            drives.iter().zip(lasting.iter().map(|c| &c.setting.strengths[..])).collect();
-        let e = simulation_error(&sampled, &nominal, &parts, run, &motion[0], 0);
-        Ok((nominal, e))
-    }
-
-    /// The whitened error of a model on any run along its recorded motion, with `own` columns of the record taken out.
-    pub fn along(&self, run: &Run, model: &Model, own: &[Vec<f64>]) -> Result<Vec<f64>, LtiError> {
-        let (_, mut e) = self.raw_along(run, model)?;
-        let mut basis = NuisanceBasis::default();
-        for mut c in own.iter().cloned() {
-            self.whitener.apply(&mut c);
-            basis.add_local(0, c);
-        }
-        self.whitener.apply(&mut e);
-        basis.project(&mut e);
-        Ok(e)
-    }
-
-    /// The constant torque on a run beside command and laws (command_unit): what the error along the recorded motion asks for.
-    pub fn constant_torque(&self, run: &Run, model: &Model) -> Result<f64, LtiError> {
-        let (nominal, mut e) = self.raw_along(run, model)?;
-        let (t, n, body) = (self.scene.sample_time_s, run.len(), &self.form.given.body);
-        self.whitener.apply(&mut e);
-        let mut free = free_motions(body, t, n);
-        free.iter_mut().for_each(|c| self.whitener.apply(c));
-        let mut qr = Qr::default();
-        qr.factor(n, 3, |a| a.chunks_exact_mut(n).zip(&free).for_each(|(a, c)| a.copy_from_slice(c)));
-        let acceleration = qr.solve(&mut e)[2] * free_scales(body, t, n)[2];
-        let gain = body_numbers(&nominal.plant.body).0 * nominal.plant.resonance_gain;
-        Ok(acceleration * nominal.arm_over_record() / gain - run.before)
     }
 
     /// Power of the noise near a frequency (Hz) over that of noise that the filter has made white, at least 1; as repeats show it,

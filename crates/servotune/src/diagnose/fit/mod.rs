@@ -1,5 +1,6 @@
 //! Third floor of the diagnosis: motion, regressors, and models fitted by equation error and by output error.
 
+mod cleared_motion;
 pub(super) mod corrected_model;
 pub(super) mod coupling;
 pub(super) mod diagnosis_data;

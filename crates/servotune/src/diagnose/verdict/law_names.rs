@@ -69,12 +69,8 @@ impl<'a> Laws<'a> {
         let model = facts.selection.best();
         let baseline = &facts.selection.baseline;
         let explained = if baseline.excess() > 0.0 { 1.0 - model.excess().max(0.0) / baseline.excess() } else { 1.0 };
-        // A law that is asked where it hardly acts errs by its form; where the hold-out records are simulated down to their noise by it, and
-        // only by it, they have answered.
-        let down = |h: FitFigures| {
-            h.rms_after < HELD_OUT_DOWN * h.noise_floor && h.rms_refit_linear > HELD_OUT_ABOVE * h.rms_after
-        };
-        let answered = model.chosen.len() < 2 && facts.fit.holdout.is_some_and(down);
+        // A law that is asked where it hardly acts errs by its form; alone it has answered where hold-out records come down to their noise by it.
+        let answered = model.chosen.len() < 2 && down(facts).yes;
         Laws {
             facts,
             model,
@@ -99,6 +95,14 @@ impl<'a> Laws<'a> {
         }
         (named, remarks, consulted)
     }
+}
+
+/// Whether the hold-out records are simulated down to their noise by the laws, and only by them.
+fn down(facts: &Facts) -> Answer {
+    facts.fit.holdout.map_or(false.into(), |h: FitFigures| {
+        asked!(h.rms_after / h.noise_floor, < HELD_OUT_DOWN)
+            & asked!(h.rms_refit_linear / h.rms_after, > HELD_OUT_ABOVE)
+    })
 }
 
 /// Down to the noise, and not only because there was little above it; or as near as its level may err, no law seeing anything more.
@@ -193,7 +197,9 @@ fn decisive(l: &Laws) -> Answer {
 
 fn too_many(l: &Laws) -> Answer {
     let laws = l.model.chosen.len();
+    // What is seen beside two that simulate the hold-out records down to their noise is the roughness of their form.
     let two = Answer::from(laws > 1) & !l.clean.clone() & asked!(l.explained, < NAMED_SHARE_OF_SEVERAL);
+    let two = if laws == 2 { two & !down(l.facts) } else { two };
     let many = Answer::from(laws > 2) & stand_in(l);
     Answer::from(l.beside.is_some()) & (many | two)
 }

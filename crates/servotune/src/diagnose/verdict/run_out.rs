@@ -103,7 +103,10 @@ impl RunOut {
         let findings = own.iter().enumerate().map(|(i, setting)| self.finding(&made.data, i, setting)).collect();
         let Corrected { mut plant, effects } = made.corrected;
         plant.physics.extend(own.iter().map(|setting| entry(setting, &made.data.scene)));
-        let judgement = made.judgement.after(Later::Beside(findings), helps.consulted).said(Some(
+        // What the second search found of a run-out is the rest of this one: the model has both, and the name stands once.
+        let mut found = made.judgement;
+        found.findings.retain(|f| f.effect != RUNOUT);
+        let judgement = found.after(Later::Beside(findings), helps.consulted).said(Some(
             "orders of the spindle stood out of what the first search left; they were taken out of the records, and the rest was searched again".into(),
         ));
         // Which of them a push fell into, the search found.
